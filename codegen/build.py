@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from language.missing import ToolMissing as ToolMissing
+from language.missing import MissingToolError as MissingToolError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 WARNINGS = [
@@ -28,7 +28,8 @@ WARNINGS = [
     "-Wswitch-enum",
     "-Wvla",
 ]
-SECONDS = 120
+
+TIMEOUT = 120
 """Longest compilation or run before it is given up."""
 
 
@@ -36,27 +37,29 @@ class BuildError(Exception):
     """Generated code does not compile or run: a defect of ours; the message is the compiler's."""
 
 
-def compiler(named: str | None = None) -> list[str]:
+def find_compiler(name: str | None = None) -> list[str]:
     """Return the C compiler: the one named, else `CC`, else cc, gcc, clang. Raises ToolMissing."""
-    wanted = shlex.split(named or os.environ.get("CC", ""))
-    for candidate in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
+    requested = shlex.split(name or os.environ.get("CC", ""))
+    for candidate in [requested] if requested else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             return candidate
-    name = wanted[0] if wanted else "cc"
-    raise ToolMissing(f"the C compiler `{name}` is missing: apt-get install gcc libc6-dev")
+    executable = requested[0] if requested else "cc"
+    raise MissingToolError(
+        f"the C compiler `{executable}` is missing: apt-get install gcc libc6-dev"
+    )
 
 
-def optimised(level: str) -> tuple[str, ...]:
+def flags_at_level(level: str) -> tuple[str, ...]:
     """Return the flags with another level of optimisation, like `O3`."""
     return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
 
 
-def compiler_version(named: str | None = None) -> str:
+def compiler_version(name: str | None = None) -> str:
     """Return where the compiler is and the first line that it says of itself. Raises BuildError."""
-    command = compiler(named)
+    command = find_compiler(name)
     try:
         done = subprocess.run(
-            [*command, "--version"], capture_output=True, text=True, timeout=SECONDS, check=False
+            [*command, "--version"], capture_output=True, text=True, timeout=TIMEOUT, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BuildError(f"the C compiler `{command[0]}` does not run: {error}") from None
@@ -68,35 +71,39 @@ def compile_program(
     sources: Sequence[Path],
     target: Path,
     flags: Sequence[str] = FLAGS,
-    named: str | None = None,
+    compiler_name: str | None = None,
 ) -> None:
     """Compile sources into an executable. Raises ToolMissing, BuildError."""
-    linked([*compiler(named), *flags, *WARNINGS, *map(str, sources), "-lm"], target)
+    run_compiler(
+        [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
+    )
 
 
-def linked(command: Sequence[str], target: Path) -> None:
+def run_compiler(command: Sequence[str], target: Path) -> None:
     """Let a compiler make an executable. Raises BuildError with its first error."""
     try:
         done = subprocess.run(
-            [*command, "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
+            [*command, "-o", str(target)], capture_output=True, text=True, timeout=TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiler was not done after {SECONDS} s") from None
+        raise BuildError(f"the compiler was not done after {TIMEOUT} s") from None
     if done.returncode != 0:
         raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
 
 
-def run_executable(target: Path, records: bytes, more: Mapping[str, str] | None = None) -> bytes:
-    """Run a harness on input records, with `more` in its environment, and return its output
+def run_executable(
+    target: Path, records: bytes, extra_environment: Mapping[str, str] | None = None
+) -> bytes:
+    """Run a harness on input records, with `extra_environment` in its environment, and return its output
     records. Raises BuildError.
     """
-    environment = {**os.environ, **(more or {})}
+    environment = {**os.environ, **(extra_environment or {})}
     try:
         done = subprocess.run(
-            [str(target)], input=records, capture_output=True, env=environment, timeout=SECONDS
+            [str(target)], input=records, capture_output=True, env=environment, timeout=TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
+        raise BuildError(f"the compiled program was not done after {TIMEOUT} s") from None
     if done.returncode != 0:
         raise BuildError(f"the compiled program ended with {done.returncode}")
     return done.stdout

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 from codegen.build import FLAGS
-from codegen.rendering import render, version
-from codegen.source import c_files
+from codegen.rendering import product_version, render
+from codegen.source import emit_c_files
 from language.printing import digest
 from language.program import Program
 
-OWN = ("-std=c99", "-O2")
+SET_BY_CMAKE = ("-std=c99", "-O2")
 """What CMake sets by its own properties, and by the kind of a build."""
 FILE = "CMakeLists.txt"
 
 
-def cmake_file(program: Program) -> dict[str, str]:
+def emit_cmake_file(program: Program) -> dict[str, str]:
     """Return the file by its name: a static library, and its header to install.
 
     Raises ValueError where a Program has no C.
     """
-    files = sorted(c_files(program))
+    files = sorted(emit_c_files(program))
     context = {
         "name": program.name,
-        "version": version(),
+        "version": product_version(),
         "digest": digest(program),
         "sources": [file for file in files if file.endswith(".c")],
         "headers": [file for file in files if file.endswith(".h")],
-        "flags": [flag for flag in FLAGS if flag not in OWN],
+        "flags": [flag for flag in FLAGS if flag not in SET_BY_CMAKE],
     }
     return {FILE: render("cmake_lists.txt.jinja", context)}

@@ -9,10 +9,10 @@ from itertools import takewhile
 from pathlib import Path
 
 from codegen.build import FLAGS
-from codegen.machine import CORTEX, LINK
+from codegen.machine import CORTEX_FLAGS, CORTEX_LINK_FLAGS
 from codegen.tool import ARM_COMPILER, ARM_LINES, ARM_OBJECTS, output_of
 
-IMAGE = "image.elf"
+IMAGE_FILE = "image.elf"
 FUNCTION = re.compile(r"^[0-9a-f]+ <(?P<name>[^>]+)>:$")
 INSTRUCTION = re.compile(r"^ *(?P<at>[0-9a-f]+):\t(?P<name>[^.\s]\S*)(?:\t(?P<operands>[^;@]*))?")
 LOOP = re.compile(r"^(?P<margin> *)for \(int32_t \w+ = 0; \w+ < (?P<turns>\d+); \w+\+\+\) \{")
@@ -37,19 +37,29 @@ class Instruction:
         return found[1] if found else ""
 
 
-def disassembled(
+def disassemble(
     folder: Path, sources: Sequence[str], entry: str
 ) -> Mapping[str, tuple[Instruction, ...]]:
     """Compile and link sources; return what an entry needs: its function and others, by name.
 
     Raises ToolMissing, BuildError.
     """
-    words = [*CORTEX, *FLAGS, "-g", *LINK, f"-Wl,--entry={entry}", "-o", IMAGE]
+    words = [
+        *CORTEX_FLAGS,
+        *FLAGS,
+        "-g",
+        *CORTEX_LINK_FLAGS,
+        f"-Wl,--entry={entry}",
+        "-o",
+        IMAGE_FILE,
+    ]
     output_of([ARM_COMPILER, *words, *sources, "-lm", "-lc", "-lgcc"], folder)
-    functions = _functions(output_of([ARM_OBJECTS, "-d", "--no-show-raw-insn", IMAGE], folder))
-    loops = {source: _loops((folder / source).read_text()) for source in sources}
+    functions = _parse_functions(
+        output_of([ARM_OBJECTS, "-d", "--no-show-raw-insn", IMAGE_FILE], folder)
+    )
+    loops = {source: _find_loops((folder / source).read_text()) for source in sources}
     addresses = [match["at"] for found in functions.values() for match in found]
-    around = _around(folder, addresses, loops)
+    around = _enclosing_loops(folder, addresses, loops)
     return {
         name: tuple(
             Instruction(one["at"], one["name"], (one["operands"] or "").strip(), around[one["at"]])
@@ -59,44 +69,44 @@ def disassembled(
     }
 
 
-def _functions(text: str) -> dict[str, list[re.Match[str]]]:
+def _parse_functions(text: str) -> dict[str, list[re.Match[str]]]:
     """Return the lines of instructions by function; constants between them begin with a dot."""
-    found: dict[str, list[re.Match[str]]] = {}
+    lines_by_function: dict[str, list[re.Match[str]]] = {}
     own: list[re.Match[str]] = []
     for line in text.splitlines():
         if head := FUNCTION.match(line):
-            own = found.setdefault(head["name"], [])
+            own = lines_by_function.setdefault(head["name"], [])
         elif match := INSTRUCTION.match(line):
             own.append(match)
-    return found
+    return lines_by_function
 
 
-def _loops(text: str) -> list[tuple[range, int]]:
+def _find_loops(text: str) -> list[tuple[range, int]]:
     """Return the lines of each loop of generated C and how often it turns."""
     lines = text.splitlines()
-    found = []
+    loops = []
     for first, line in enumerate(lines, start=1):
         if match := LOOP.match(line):
             inside = takewhile(lambda one: not one.startswith(match["margin"] + "}"), lines[first:])
-            found.append((range(first, first + 1 + sum(1 for _ in inside)), int(match["turns"])))
-    return found
+            loops.append((range(first, first + 1 + sum(1 for _ in inside)), int(match["turns"])))
+    return loops
 
 
-def _around(
+def _enclosing_loops(
     folder: Path, addresses: Sequence[str], loops: Mapping[str, list[tuple[range, int]]]
 ) -> dict[str, dict[str, int]]:
     """Return the loops around each address, along all functions that it is inlined into."""
     (folder / "addresses").write_text("\n".join(f"0x{one}" for one in addresses) + "\n")
-    text = output_of([ARM_LINES, "-e", IMAGE, "-i", "-a", "@addresses"], folder)
-    found: dict[str, dict[str, int]] = {}
+    text = output_of([ARM_LINES, "-e", IMAGE_FILE, "-i", "-a", "@addresses"], folder)
+    loops_by_address: dict[str, dict[str, int]] = {}
     own: dict[str, int] = {}
     for line in text.splitlines():
         if line.startswith("0x"):
-            own = found.setdefault(f"{int(line, 16):x}", {})
+            own = loops_by_address.setdefault(f"{int(line, 16):x}", {})
             continue
         place, _, number = line.split(" ")[0].rpartition(":")
         at = int(number) if number.isdigit() else 0
         for lines, turns in loops.get(Path(place).name, ()):
             if at in lines:
                 own[f"{Path(place).name}:{lines.start}"] = turns
-    return found
+    return loops_by_address

@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 from language.covariance import COVARIANCE_RANGE
-from language.limit import MICRO_STEP_LIMIT
+from language.limit import MICRO_STEP_LIMIT_FAULT
 from language.operation import FaultBit
 from language.program import Program
 from language.rewind import REWIND_LIMIT
 from language.run import EVENT_LIMIT
 from language.stamp import STALE_CALIBRATION
 from language.stepping import LIVELOCK, ZENO
-from language.traversal import walk
+from language.traversal import walk_ops
 
-WHY = {
+FAULT_REASONS = {
     COVARIANCE_RANGE: "a variance was outside its range",
     EVENT_LIMIT: "more transitions in a tick than `events`: the rest is dropped",
     LIVELOCK: "transitions at an instant did not end: no more are taken",
-    MICRO_STEP_LIMIT: "transitions of a tick did not end: no more are taken",
+    MICRO_STEP_LIMIT_FAULT: "transitions of a tick did not end: no more are taken",
     REWIND_LIMIT: "a rewind would go back further than ticks are kept",
     STALE_CALIBRATION: "solved numbers belong to another calibration",
     ZENO: "more transitions than a step may have: its rest is dropped",
 }
-OUTSIDE = "{} was outside its range"
+RANGE_REASON = "{} was outside its range"
 
 
-def why_set(program: Program, fault: str) -> str:
+def fault_reason(program: Program, fault: str) -> str:
     """Return why a fault bit is set; nothing where only the spec knows."""
-    if fault in WHY:
-        return WHY[fault]
-    ops = (op for block in program.blocks.values() for op in walk(block))
+    if fault in FAULT_REASONS:
+        return FAULT_REASONS[fault]
+    ops = (op for block in program.blocks.values() for op in walk_ops(block))
     set_by = (
         op.signal for op in ops if isinstance(op, FaultBit) and op.fault == fault and op.value
     )
     names = dict.fromkeys(name for name in set_by if name)
-    return OUTSIDE.format(" or ".join(names)) if names else ""
+    return RANGE_REASON.format(" or ".join(names)) if names else ""

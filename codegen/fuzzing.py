@@ -14,129 +14,135 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.harness import Main, fed, write_harness
+from codegen.harness import HarnessMain, tick_inputs, write_harness
 from codegen.names import c_type
-from codegen.sanitizers import built, ran
-from language.number import LARGEST
-from language.program import Program, Variable, short
+from codegen.sanitizers import build_sanitised, run_sanitised
+from language.number import MAX_FINITE
+from language.program import Program, Variable, unqualified_name
 
-FUZZER = "clang-19"
-WORDS, ABSOLUTE, SPREAD = 256, 96, 64
+FUZZER_COMPILER = "clang-19"
+WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
 """Words of an input; those that are values, and how many of these are spread over its range. The
 others are changes: half of them small and smaller steps, as many none."""
-WITHOUT_RANGE = (-1000.0, 1000.0)
-MAIN = Main("fuzz_main.c.jinja")
-LONGEST = 64
+DEFAULT_INPUT_RANGE = (-1000.0, 1000.0)
+MAIN = HarnessMain("fuzz_main.c.jinja")
+MAX_SEQUENCE_TICKS = 64
 """Most ticks of a sequence that the C reads."""
-STUCK = 60
+FUZZER_TIMEOUT = 60
 """Seconds of one sequence after which libFuzzer takes it for one without end."""
-SEQUENCES = "sequences.bin"
-COVERED = re.compile(r"cov: (\d+)")
-HEAD = struct.Struct("<II")
+SEQUENCES_FILE = "sequences.bin"
+COVERAGE_LINE = re.compile(r"cov: (\d+)")
+SEQUENCE_HEADER = struct.Struct("<II")
 Range = tuple[float, float]
-Words = tuple[float, ...]
+WordValues = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Sequences:
+class FuzzerRun:
     """What libFuzzer tried: each sequence with the CRC-32 of its records, `edges` of the C that it
     came along, and what sanitizers said.
     """
 
-    tried: tuple[tuple[bytes, int], ...]
+    sequences: tuple[tuple[bytes, int], ...]
     edges: int
     findings: tuple[str, ...]
 
 
-def fuzzed(
+def run_fuzzer(
     program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
-) -> Sequences:
+) -> FuzzerRun:
     """Run libFuzzer on the C of a Program; `ranges` are those of inputs by name.
 
     Raises ToolMissing, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        table = words(program, ranges)
+        table = word_table(program, ranges)
         sources = write_harness(program, folder, main=MAIN)
-        (folder / "words.h").write_text(_words_header(table))
-        app = built(FUZZER, sources, folder, "fuzzer,")
+        (folder / "words.h").write_text(_format_header(table))
+        app = build_sanitised(FUZZER_COMPILER, sources, folder, "fuzzer,")
         (folder / "corpus").mkdir()
-        return _run(app, runs, ticks * len(table), seed)
+        return _run_libfuzzer(app, runs, ticks * len(table), seed)
 
 
-def words(program: Program, ranges: Mapping[str, Range]) -> list[Words]:
+def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues]:
     """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
-    return [_words(v, program, ranges.get(short(v.name))) for v in fed(program)]
+    return [
+        _input_words(v, program, ranges.get(unqualified_name(v.name))) for v in tick_inputs(program)
+    ]
 
 
-def values_of(program: Program, table: list[Words], sequence: bytes) -> Iterator[Words]:
+def decode_sequence(
+    program: Program, table: list[WordValues], sequence: bytes
+) -> Iterator[WordValues]:
     """Yield the inputs of each tick of a sequence, as the C reads them."""
-    yield from fed_by(program, table, sequence[: LONGEST * len(table)])
+    yield from decode_inputs(program, table, sequence[: MAX_SEQUENCE_TICKS * len(table)])
 
 
-def fed_by(program: Program, table: list[Words], chosen: bytes) -> Iterator[Words]:
+def decode_inputs(program: Program, table: list[WordValues], data: bytes) -> Iterator[WordValues]:
     """Yield the inputs that bytes choose, one for each, in turn: values, or changes of the last."""
-    real = [variable.type == "real" for variable in fed(program)]
-    last = [own[SPREAD // 2] for own in table]
-    for at in range(0, len(chosen) - len(table) + 1, len(table)):
-        for k, byte in enumerate(chosen[at : at + len(table)]):
-            is_change = real[k] and byte >= ABSOLUTE
+    real = [variable.type == "real" for variable in tick_inputs(program)]
+    last = [own[SPREAD_WORDS // 2] for own in table]
+    for at in range(0, len(data) - len(table) + 1, len(table)):
+        for k, byte in enumerate(data[at : at + len(table)]):
+            is_change = real[k] and byte >= ABSOLUTE_WORDS
             last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
         yield tuple(last)
 
 
-def _words(variable: Variable, program: Program, given: Range | None) -> Words:
+def _input_words(variable: Variable, program: Program, value_range: Range | None) -> WordValues:
     """Return the words of an input: values first, then changes of a real."""
     if variable.type == "truth":
-        return (0.0, 1.0) * (WORDS // 2)
+        return (0.0, 1.0) * (WORDS_PER_INPUT // 2)
     if variable.type == "whole":
-        is_byte = c_type(variable, program.number) == "uint8_t"
+        is_byte = c_type(variable, program.number_type) == "uint8_t"
         count = len(variable.values) or 8
         odd = (count, count + 1, 255) if is_byte else (-1, count, -(2**31), 2**31 - 1)
-        usual = [k % count for k in range(WORDS - len(odd))]
+        usual = [k % count for k in range(WORDS_PER_INPUT - len(odd))]
         return tuple(float(k) for k in (*usual, *odd))
-    low, high = given or WITHOUT_RANGE
-    span, most = high - low, LARGEST[program.number]
-    spread = [low + span * k / (SPREAD - 1) for k in range(SPREAD)]
+    low, high = value_range or DEFAULT_INPUT_RANGE
+    span, most = high - low, MAX_FINITE[program.number_type]
+    spread = [low + span * k / (SPREAD_WORDS - 1) for k in range(SPREAD_WORDS)]
     edges = [math.nextafter(end, to) for end in (low, high) for to in (-math.inf, math.inf)]
     special = [*edges, low - span, high + span, 0.0, -0.0, 1.0, -1.0, 5e-324, -1e-40, 1e30]
     special += [most, -most, math.nan, math.inf, -math.inf]
-    special += [0.0] * (ABSOLUTE - SPREAD - len(special))
+    special += [0.0] * (ABSOLUTE_WORDS - SPREAD_WORDS - len(special))
     steps = [sign * span * 2.0 ** (-k / 2) for k in range(40) for sign in (1.0, -1.0)]
-    return (*spread, *special, *steps, *[0.0] * (WORDS - ABSOLUTE - len(steps)))
+    return (*spread, *special, *steps, *[0.0] * (WORDS_PER_INPUT - ABSOLUTE_WORDS - len(steps)))
 
 
-def _run(app: Path, runs: int, most: int, seed: int) -> Sequences:
-    options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={STUCK}"]
-    done = ran(app, [*options, "-len_control=0", "corpus"])
-    edges = max((int(found) for line in done.lines for found in COVERED.findall(line)), default=0)
-    kept = app.parent / SEQUENCES
+def _run_libfuzzer(app: Path, runs: int, most: int, seed: int) -> FuzzerRun:
+    options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={FUZZER_TIMEOUT}"]
+    done = run_sanitised(app, [*options, "-len_control=0", "corpus"])
+    edges = max(
+        (int(found) for line in done.lines for found in COVERAGE_LINE.findall(line)), default=0
+    )
+    kept = app.parent / SEQUENCES_FILE
     data = kept.read_bytes() if kept.exists() else b""  # none where the first one did not end
-    return Sequences(tuple(_tried(data)), edges, done.found)
+    return FuzzerRun(tuple(_read_sequences(data)), edges, done.findings)
 
 
-def _tried(data: bytes) -> Iterator[tuple[bytes, int]]:
+def _read_sequences(data: bytes) -> Iterator[tuple[bytes, int]]:
     at = 0
     while at < len(data):
-        size, checksum = HEAD.unpack_from(data, at)
-        at += HEAD.size
+        size, checksum = SEQUENCE_HEADER.unpack_from(data, at)
+        at += SEQUENCE_HEADER.size
         yield data[at : at + size], checksum
         at += size
 
 
-def _words_header(table: list[Words]) -> str:
-    sizes = f"#define ABSOLUTE {ABSOLUTE}\n#define FIRST {SPREAD // 2}\n#define LONGEST {LONGEST}\n"
-    return sizes + table_text(table)
+def _format_header(table: list[WordValues]) -> str:
+    sizes = f"#define ABSOLUTE {ABSOLUTE_WORDS}\n#define FIRST {SPREAD_WORDS // 2}\n#define LONGEST {MAX_SEQUENCE_TICKS}\n"
+    return sizes + format_word_table(table)
 
 
-def table_text(table: list[Words]) -> str:
+def format_word_table(table: list[WordValues]) -> str:
     """Return the table as C: hexadecimal digits of each double."""
-    rows = ",\n".join(f"    {{{', '.join(_literal(word) for word in own)}}}" for own in table)
-    return f"static const double word[{len(table)}][{WORDS}] = {{\n{rows}\n}};\n"
+    rows = ",\n".join(f"    {{{', '.join(_format_double(word) for word in own)}}}" for own in table)
+    return f"static const double word[{len(table)}][{WORDS_PER_INPUT}] = {{\n{rows}\n}};\n"
 
 
-def _literal(value: float) -> str:
+def _format_double(value: float) -> str:
     if math.isnan(value):
         return "NAN"
     return value.hex() if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"

@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Iterator
 from functools import reduce
 
-from language.number import LARGEST
+from language.number import MAX_FINITE
 from language.operation import (
     Assign,
     Binary,
@@ -20,12 +20,12 @@ from language.operation import (
     Compare,
     Expr,
     Ref,
-    Run,
+    RunBlock,
     Unary,
     Value,
 )
 from language.program import Program
-from language.substitution import with_expressions
+from language.substitution import map_expressions
 
 LATCH = "latch"
 WITHIN = "within"
@@ -34,34 +34,36 @@ LATCH_EACH = "latch_each"
 """What takes the inputs one by one."""
 
 
-def gated(program: Program, by_amount: bool = True) -> Program:
+def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
     """Return a Program that takes its inputs at once where all are within their ranges (rule C17).
 
-    `by_amount` compares the size of x with one end of a range, which takes one branch; tools that
+    `by_magnitude` compares the size of x with one end of a range, which takes one branch; tools that
     follow ranges through code know x better without it.
     """
-    largest = LARGEST[program.number]
+    largest = MAX_FINITE[program.number_type]
     words = frozenset(variable.name for variable in program.variables if variable.values)
 
     def fewer(expr: Expr) -> Expr:
-        plain = _finite(_unsigned(expr, words), largest)
-        return centred(plain) if by_amount else plain
+        plain = _finite_as_range(_drop_unsigned_bound(expr, words), largest)
+        return fold_range_check(plain) if by_magnitude else plain
 
-    blocks = {name: with_expressions(block, fewer) for name, block in program.blocks.items()}
-    taken = blocks.get(LATCH, ())
-    held = [op for op in taken if isinstance(op, Branch) and _takes(op.then)]
-    if len(held) == len(taken) > 1:
-        inside = reduce(_both, (part for branch in held for part in _parts(branch.condition)))
-        together = tuple(op for branch in held for op in branch.then)
+    blocks = {name: map_expressions(block, fewer) for name, block in program.blocks.items()}
+    latch = blocks.get(LATCH, ())
+    branches = [op for op in latch if isinstance(op, Branch) and _is_single_assignment(op.then)]
+    if len(branches) == len(latch) > 1:
+        inside = reduce(
+            _conjunction, (part for branch in branches for part in _conjuncts(branch.condition))
+        )
+        assignments = tuple(op for branch in branches for op in branch.then)
         blocks = {
-            LATCH_EACH: taken,
+            LATCH_EACH: latch,
             **blocks,
-            LATCH: (Branch(inside, together, (Run(LATCH_EACH),)),),
+            LATCH: (Branch(inside, assignments, (RunBlock(LATCH_EACH),)),),
         }
     return dataclasses.replace(program, blocks=blocks)
 
 
-def centred(expr: Expr) -> Expr:
+def fold_range_check(expr: Expr) -> Expr:
     """Return `low <= x <= high` as one comparison where 0 is between; with a NaN both are false.
 
     |x| <= high where the ends are equal, else `within`, which compares bits.
@@ -74,20 +76,20 @@ def centred(expr: Expr) -> Expr:
                 return Compare("<=", Call("abs", (value,)), Value(high))
             return Call(WITHIN, (value, Value(low), Value(high)))
         case Unary("not", Binary() as inside):
-            return Unary("not", centred(inside))
+            return Unary("not", fold_range_check(inside))
     return expr
 
 
-def _finite(expr: Expr, largest: float) -> Expr:
+def _finite_as_range(expr: Expr, largest: float) -> Expr:
     """Return `x - x >= 0`, true for what is finite, as a range that ends at the largest number."""
     match expr:
         case Compare(">=", Binary("-", value, same), Value(0.0)) if value == same:
             low, high = Value(-largest), Value(largest)
-            return _both(Compare(">=", value, low), Compare("<=", value, high))
+            return _conjunction(Compare(">=", value, low), Compare("<=", value, high))
     return expr
 
 
-def _unsigned(expr: Expr, words: frozenset[str]) -> Expr:
+def _drop_unsigned_bound(expr: Expr, words: frozenset[str]) -> Expr:
     """Return the range of a word of an enumeration without `>= 0`: in C it is unsigned."""
     match expr:
         case Binary("and", Compare(">=", Ref(name), Value(0)), rest) if name in words:
@@ -95,17 +97,17 @@ def _unsigned(expr: Expr, words: frozenset[str]) -> Expr:
     return expr
 
 
-def _parts(condition: Expr) -> Iterator[Expr]:
+def _conjuncts(condition: Expr) -> Iterator[Expr]:
     match condition:
         case Binary("and", left, right):
-            yield from (*_parts(left), *_parts(right))
+            yield from (*_conjuncts(left), *_conjuncts(right))
         case _:
             yield condition
 
 
-def _both(left: Expr, right: Expr) -> Expr:
+def _conjunction(left: Expr, right: Expr) -> Expr:
     return Binary("and", left, right)
 
 
-def _takes(block: Block) -> bool:
+def _is_single_assignment(block: Block) -> bool:
     return len(block) == 1 and isinstance(block[0], Assign)

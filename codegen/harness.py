@@ -9,54 +9,54 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, compiler_version, linked
-from codegen.cache import key_of, stored
+from codegen.build import FLAGS, WARNINGS, compiler_version, run_compiler
+from codegen.cache import get_or_build, key_of
 from codegen.machine import HOST, Machine, harness_file
-from codegen.names import REAL, CNames, c_member, c_type
-from codegen.objects import with_objects
+from codegen.names import C_REAL_TYPE, CNames, c_member, c_type
+from codegen.objects import substitute_objects
 from codegen.rendering import render
-from codegen.source import c_files, stepped
+from codegen.source import emit_c_files, restrict_to_step
 from language.program import Constant, Program, Variable
 
-INCLUDED = ("harness.h", "cortex_m4f.h")
+HARNESS_HEADERS = ("harness.h", "cortex_m4f.h")
 
 
 @dataclass(frozen=True)
-class Main:
+class HarnessMain:
     """A main around a program: its template, and the files of the harness that only it needs."""
 
     template: str
     files: tuple[str, ...] = ()
 
 
-LOCKSTEP = Main("lockstep_main.c.jinja")
+LOCKSTEP = HarnessMain("lockstep_main.c.jinja")
 """Writes all that the program carries after each tick."""
 
 
 @dataclass(frozen=True)
-class Observed:
+class ComparedVariable:
     """A variable that the executable writes after each tick: its name and its kind."""
 
     name: str
     kind: str
 
 
-def observed(program: Program) -> tuple[Observed, ...]:
+def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
     """Return what is compared after a tick: all that the instance carries in C.
 
     What is in a ring is compared when it comes out of it.
     """
-    program = stepped(program)
+    program = restrict_to_step(program)
     kinds = {"real": "real", "truth": "whole", "whole": "whole"}
     return tuple(
-        Observed(variable.name, kinds[variable.type])
+        ComparedVariable(variable.name, kinds[variable.type])
         for variable in program.variables
         if variable.name.partition(".")[0] not in ("work", "input", "is_new", "check")
         and not variable.size
     )
 
 
-def fed(program: Program) -> tuple[Variable, ...]:
+def tick_inputs(program: Program) -> tuple[Variable, ...]:
     """Return the inputs of a tick, the flags of new values among them."""
     return tuple(
         variable
@@ -65,9 +65,9 @@ def fed(program: Program) -> tuple[Variable, ...]:
     )
 
 
-def tunable(program: Program) -> tuple[Constant, ...]:
+def tunable_constants(program: Program) -> tuple[Constant, ...]:
     """Return the parameters that a calibration page may change, in the order of its members."""
-    program = stepped(program)
+    program = restrict_to_step(program)
     return tuple(
         constant
         for constant in program.constants
@@ -79,19 +79,19 @@ def write_harness(
     program: Program,
     folder: Path,
     machine: Machine = HOST,
-    main: Main = LOCKSTEP,
-    more: Mapping[str, object] | None = None,
+    main: HarnessMain = LOCKSTEP,
+    extra_context: Mapping[str, object] | None = None,
 ) -> list[Path]:
     """Write the C files of a program and a main around them; return the sources to compile.
 
-    `more` is what the template of that main reads beside what each one does.
+    `extra_context` is what the template of that main reads beside what each one does.
     """
     (folder / "harness").mkdir(exist_ok=True)
     own = (*machine.files, *main.files)
-    for name in (*INCLUDED, *own):
+    for name in (*HARNESS_HEADERS, *own):
         shutil.copyfile(harness_file(name), folder / "harness" / name)
-    files = c_files(program)
-    files["main.c"] = render(main.template, {**_context(program), **(more or {})})
+    files = emit_c_files(program)
+    files["main.c"] = render(main.template, {**_main_context(program), **(extra_context or {})})
     for name, text in files.items():
         (folder / name).write_text(text)
     names = (*files, *(f"harness/{name}" for name in own))
@@ -99,49 +99,49 @@ def write_harness(
 
 
 @contextmanager
-def executable(
+def build_executable(
     program: Program,
     flags: Sequence[str] = FLAGS,
-    named: str | None = None,
+    compiler_name: str | None = None,
     machine: Machine = HOST,
-    main: Main = LOCKSTEP,
+    main: HarnessMain = LOCKSTEP,
 ) -> Iterator[Path]:
     """Give the compiled harness of a program, kept from an earlier run if there was one."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         sources = write_harness(program, folder, machine, main)
-        command, link = machine.command(named), machine.link(folder / "harness")
+        command, link = machine.command(compiler_name), machine.link(folder / "harness")
         version = compiler_version(command[0])
-        words = [*command, *flags, *WARNINGS]
-        key = key_of(sources, [*words, *machine.link(Path())], version)
+        compile_command = [*command, *flags, *WARNINGS]
+        key = key_of(sources, [*compile_command, *machine.link(Path())], version)
 
         def make(target: Path) -> None:
-            parts = with_objects(sources, words, version, folder / "objects")
-            linked([*words, *map(str, parts), *link], target)
+            parts = substitute_objects(sources, compile_command, version, folder / "objects")
+            run_compiler([*compile_command, *map(str, parts), *link], target)
 
-        yield stored(key, make, folder)
+        yield get_or_build(key, make, folder)
 
 
-def _context(program: Program) -> Mapping[str, object]:
+def _main_context(program: Program) -> Mapping[str, object]:
     """Return what a main around a program needs to know: inputs, tunables and what is compared."""
-    program = stepped(program)
-    place, real = CNames(program), REAL[program.number]
+    program = restrict_to_step(program)
+    c_names, real = CNames(program), C_REAL_TYPE[program.number_type]
     inputs = [
-        {"place": place(v.name).replace("in->", "in."), "type": c_type(v, program.number)}
-        for v in fed(program)
+        {"place": c_names(v.name).replace("in->", "in."), "type": c_type(v, program.number_type)}
+        for v in tick_inputs(program)
     ]
     fields = [
         {
-            "place": place(o.name).replace("self->", "self."),
+            "place": c_names(o.name).replace("self->", "self."),
             "type": real if o.kind == "real" else "int64_t",
         }
-        for o in observed(program)
+        for o in compared_variables(program)
     ]
     return {
         "name": program.name,
         "cast": ("uint8_t", "int32_t", "float"),
         "inputs": inputs,
         "fields": fields,
-        "page": [c_member(constant.name) for constant in tunable(program)],
+        "page": [c_member(constant.name) for constant in tunable_constants(program)],
         "real": real,
     }

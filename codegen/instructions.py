@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.build import FLAGS
-from codegen.harness import Main, executable
-from codegen.machine import CORTEX_M4F, emulated
+from codegen.harness import HarnessMain, build_executable
+from codegen.machine import CORTEX_M4F, run_in_qemu
 from language.program import Program
 
-MAIN = Main("instructions_main.c.jinja", ("instructions.h", "instructions.c"))
-COUNTING = ("-icount", "shift=0")
+MAIN = HarnessMain("instructions_main.c.jinja", ("instructions.h", "instructions.c"))
+ICOUNT_OPTIONS = ("-icount", "shift=0")
 """Of the emulator: one instruction takes 1 ns."""
 
 
 @dataclass(frozen=True)
-class Instructions:
+class InstructionCounts:
     """What each step took, the call included."""
 
     steps: tuple[int, ...]
@@ -35,11 +35,13 @@ class Instructions:
         return f"{self.mean:.0f} ({min(self.steps)} to {max(self.steps)})"
 
 
-def instructions(program: Program, records: bytes, flags: Sequence[str] = FLAGS) -> Instructions:
+def count_instructions(
+    program: Program, records: bytes, flags: Sequence[str] = FLAGS
+) -> InstructionCounts:
     """Count the instructions of each step on input records of a harness.
 
     QEMU tells what a step executes, not what it waits for. Raises ToolMissing, BuildError.
     """
-    with executable(program, flags, machine=CORTEX_M4F, main=MAIN) as steps:
-        found = emulated(steps, records, COUNTING)
-    return Instructions(struct.unpack(f"<{len(found) // 8}q", found))
+    with build_executable(program, flags, machine=CORTEX_M4F, main=MAIN) as steps:
+        output = run_in_qemu(steps, records, ICOUNT_OPTIONS)
+    return InstructionCounts(struct.unpack(f"<{len(output) // 8}q", output))

@@ -17,216 +17,266 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from codegen.way import LEFT, PLACE, NotPlain, Way
-from language.operation import Assign, Block, Branch, Choose, Expr, Loop, Op, Ref, Run, Unary, Value
-from language.program import MODE, ModeInfo, Program, Variable
-from language.run import MODE as RUN_MODE
-from language.substitution import own_expressions, with_expressions, with_parts
-from language.traversal import block_writes, expr_names, reads
-from language.wiring import finished
+from codegen.way import POINT_STATE_PREFIX, TIME_LEFT, ExecutionPath, NotSpecialisable
+from language.operation import (
+    Assign,
+    Block,
+    Branch,
+    Expr,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    Unary,
+    Value,
+)
+from language.program import MODE_VARIABLE, ModeInfo, Program, Variable
+from language.run import RUN_MODE as RUN_MODE
+from language.substitution import direct_expressions, map_expressions, map_operands
+from language.traversal import block_writes, expr_names, names_used
+from language.wiring import finalise_program
 
-Leaps = Literal["on", "anew", "off"]
+FastPathMode = Literal["on", "anew", "off"]
 """Whether there are leaps; `anew` computes all equations, for one whose states are set between its
 steps, as those of a predictor are: what they were when the step before ended does not count."""
 ENTRIES = ("init", "derive", "step")
-LEAP, DONE, RECORD, STARTED = "leap", "memory.is_leapt", "record", "memory.started"
-THROUGH = "through_events"
-END = "work.end_"
-Numbers = tuple[tuple[str, int], ...]
-MOST_STAYS = 12
+FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
+    "leap",
+    "memory.is_leapt",
+    "record",
+    "memory.started",
+)
+EVENT_PATH = "through_events"
+STEP_END_PREFIX = "work.end_"
+ModeNumbers = tuple[tuple[str, int], ...]
+MAX_CONFIGURATIONS = 12
 """Modes of chart and regions together that have a leap each: more are too much C."""
-UNDONE = (Assign(DONE, Value(False)),)
+CLEAR_TAKEN = (Assign(FAST_PATH_TAKEN, Value(False)),)
 
 
 @dataclass(frozen=True)
-class Stay:
+class ModeConfiguration:
     """Where an automaton stays in a step: its modes, as the `numbers` of the variables that hold
     them; `title` is the block of such a step.
     """
 
-    title: str
-    numbers: Numbers
+    block_name: str
+    mode_numbers: ModeNumbers
 
     @property
-    def known(self) -> dict[str, Expr]:
+    def known_values(self) -> dict[str, Expr]:
         """What the variables are."""
-        return {variable: Value(number) for variable, number in self.numbers}
+        return {variable: Value(number) for variable, number in self.mode_numbers}
 
 
-def leaping(program: Program, leaps: Leaps = "on") -> Program:
+def add_fast_path(program: Program, fast_path: FastPathMode = "on") -> Program:
     """Return a Program that takes a whole step at once where nothing happens in it: its own one if
-    it is continuous, else that of a model that it runs; the Program itself where `leaps` are off.
+    it is continuous, else that of a model that it runs; the Program itself where `fast_path` are off.
 
     Modes that wait take the general path always; modes without a guard never do. A run in float64,
     which is software on an ECU that has float32 in hardware, stays as it is: its values would be
     on the stack.
     """
-    if leaps == "off":
+    if fast_path == "off":
         return program
     if program.period is None:
-        return _stepping(program, leaps)
-    return _running(program) if program.number == "float32" else program
+        return _add_step_fast_path(program, fast_path)
+    return _add_run_fast_path(program) if program.number_type == "float32" else program
 
 
-def _stepping(program: Program, leaps: Leaps) -> Program:
+def _add_step_fast_path(program: Program, fast_path: FastPathMode) -> Program:
     match program.blocks["step"]:
         case (Branch(started, flow, enter), *rest):
             pass
         case _:
             return program
-    first = tuple(op for op in flow if op == Run(RECORD))
-    flow = tuple(op for op in flow if op != Run(RECORD))
-    stays = list(stays_of(program, LEAP)) if leaps == "anew" else _of_modes(program.modes, LEAP)
-    ways = dict(_ways(program, flow, leaps, stays))
-    once = (*first, Run(LEAP))
-    if _are_sure(ways, stays):
+    first = tuple(op for op in flow if op == RunBlock(RECORD_BLOCK))
+    flow = tuple(op for op in flow if op != RunBlock(RECORD_BLOCK))
+    configurations = (
+        list(mode_configurations(program, FAST_PATH))
+        if fast_path == "anew"
+        else _region_configurations(program.modes, FAST_PATH)
+    )
+    paths = dict(_step_paths(program, flow, fast_path, configurations))
+    once = (*first, RunBlock(FAST_PATH))
+    if _are_unconditional(paths, configurations):
         step: Block = (Branch(started, once, (*enter, *rest)),)
     else:
-        step = (*UNDONE, Branch(started, once), *_else(THROUGH))
+        step = (*CLEAR_TAKEN, Branch(started, once), *_fallback(EVENT_PATH))
     whole = (Branch(started, flow, enter), *rest)
-    return _with_leaps(program, LEAP, ways, {"step": step, THROUGH: whole})
+    return _insert_fast_path(program, FAST_PATH, paths, {"step": step, EVENT_PATH: whole})
 
 
-def _running(program: Program) -> Program:
+def _add_run_fast_path(program: Program) -> Program:
     """Return a Program whose runs of a model take a whole tick at once where nothing happens."""
     made = program
     for name, block in program.blocks.items():
-        if _is_through(block):
+        if _is_event_loop(block):
             mode = name.removeprefix("run_")
-            leap, through = f"{LEAP}_{mode}", f"{THROUGH}_{mode}"
-            stays = _of_modes(program.run_modes, leap, RUN_MODE)
+            block_name, event_path = f"{FAST_PATH}_{mode}", f"{EVENT_PATH}_{mode}"
+            configurations = _region_configurations(program.run_modes, block_name, RUN_MODE)
             equations = program.blocks.get(f"equations_{mode}", ())
-            ways = dict(_run_ways(program, block, equations, stays))
-            once: Block = (Run(leap),)
-            if not _are_sure(ways, stays):
-                once = (*UNDONE, *once, *_else(through))
-            made = _with_leaps(made, leap, ways, {name: once, through: block})
+            paths = dict(_run_paths(program, block, equations, configurations))
+            once: Block = (RunBlock(block_name),)
+            if not _are_unconditional(paths, configurations):
+                once = (*CLEAR_TAKEN, *once, *_fallback(event_path))
+            made = _insert_fast_path(made, block_name, paths, {name: once, event_path: block})
     return made
 
 
-def _else(through: str) -> Block:
-    return (Branch(Unary("not", Ref(DONE)), (Run(through),)),)
+def _fallback(event_path: str) -> Block:
+    return (Branch(Unary("not", Ref(FAST_PATH_TAKEN)), (RunBlock(event_path),)),)
 
 
-def stays_of(program: Program, leap: str) -> Iterator[Stay]:
+def mode_configurations(program: Program, prefix: str) -> Iterator[ModeConfiguration]:
     """Yield the modes of a chart; with regions beside it each with each, unless these are many."""
     names = program.mode_variables()
-    found = [_of_modes(program.modes_of(region), "", names[region]) for region in names]
-    if program.regions and math.prod(map(len, found)) > MOST_STAYS:
+    by_region = [
+        _region_configurations(program.modes_of(region), "", names[region]) for region in names
+    ]
+    if program.regions and math.prod(map(len, by_region)) > MAX_CONFIGURATIONS:
         return
-    for stays in itertools.product(*found):
-        numbers = tuple(pair for stay in stays for pair in stay.numbers)
-        yield Stay(leap + "".join(stay.title for stay in stays), numbers)
+    for combination in itertools.product(*by_region):
+        numbers = tuple(
+            pair for configuration in combination for pair in configuration.mode_numbers
+        )
+        yield ModeConfiguration(
+            prefix + "".join(configuration.block_name for configuration in combination), numbers
+        )
 
 
-def _of_modes(modes: Sequence[ModeInfo], leap: str, variable: str = MODE) -> list[Stay]:
-    return [Stay(f"{leap}_{mode.name}", ((variable, mode.number),)) for mode in modes]
+def _region_configurations(
+    modes: Sequence[ModeInfo], prefix: str, variable: str = MODE_VARIABLE
+) -> list[ModeConfiguration]:
+    return [
+        ModeConfiguration(f"{prefix}_{mode.name}", ((variable, mode.number),)) for mode in modes
+    ]
 
 
-def _are_sure(ways: Mapping[Stay, Way], stays: Sequence[Stay]) -> bool:
+def _are_unconditional(
+    paths: Mapping[ModeConfiguration, ExecutionPath], configurations: Sequence[ModeConfiguration]
+) -> bool:
     """Tell whether nothing has a guard, wherever it stays."""
-    return all(stay in ways and ways[stay].is_sure for stay in stays)
+    return all(stay in paths and paths[stay].is_unconditional for stay in configurations)
 
 
-def _is_through(block: Block) -> bool:
+def _is_event_loop(block: Block) -> bool:
     """Tell whether a block goes through a tick from event to event."""
     match block:
         case (Assign(target), Loop(), *_):
-            return target == LEFT
+            return target == TIME_LEFT
     return False
 
 
-def _run_ways(
-    program: Program, flow: Block, equations: Block, stays: Sequence[Stay]
-) -> Iterator[tuple[Stay, Way]]:
+def _run_paths(
+    program: Program, flow: Block, equations: Block, configurations: Sequence[ModeConfiguration]
+) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
     """Yield the way through a tick without a crossing of each mode of the model.
 
     What updates does not count yet when equations are made: then these are computed again.
     """
     updates = [block for name, block in program.blocks.items() if name.startswith("update")]
     is_fixed = not any(name.startswith("state.") for b in updates for name in block_writes(b))
-    for stay in stays:
-        way = Way(program, stay.known)
+    for configuration in configurations:
+        path = ExecutionPath(program, configuration.known_values)
         try:
-            way.keep(equations if is_fixed else (), ("state.", "constant."))
-            way.follow(flow)
-        except NotPlain:
+            path.reuse_equations(equations if is_fixed else (), ("state.", "constant."))
+            path.follow(flow)
+        except NotSpecialisable:
             continue
-        yield stay, way
+        yield configuration, path
 
 
-def _ways(
-    program: Program, flow: Block, leaps: Leaps, stays: Sequence[Stay]
-) -> Iterator[tuple[Stay, Way]]:
+def _step_paths(
+    program: Program,
+    flow: Block,
+    fast_path: FastPathMode,
+    configurations: Sequence[ModeConfiguration],
+) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
     """Yield the way through a step without a crossing of each stay that has one."""
-    for stay in stays:
-        way = Way(program, stay.known | {STARTED: Value(True)})
-        mode = stay.title.removeprefix(f"{LEAP}_")
-        known = program.blocks.get(f"equations_{mode}", ()) if leaps == "on" else ()
+    for configuration in configurations:
+        path = ExecutionPath(program, configuration.known_values | {STARTED: Value(True)})
+        mode = configuration.block_name.removeprefix(f"{FAST_PATH}_")
+        known = program.blocks.get(f"equations_{mode}", ()) if fast_path == "on" else ()
         try:
-            way.keep(known, ("state.", "constant.", "before."))
-            way.follow(flow)
-            way.end()
-        except NotPlain:
+            path.reuse_equations(known, ("state.", "constant.", "before."))
+            path.follow(flow)
+            path.follow_step_end()
+        except NotSpecialisable:
             continue
-        yield stay, way
+        yield configuration, path
 
 
-def _with_leaps(
-    program: Program, leap: str, ways: Mapping[Stay, Way], changed: Mapping[str, Block]
+def _insert_fast_path(
+    program: Program,
+    block_name: str,
+    paths: Mapping[ModeConfiguration, ExecutionPath],
+    changed: Mapping[str, Block],
 ) -> Program:
-    """Return a Program with a block `leap` by the modes that variables tell, and changed blocks.
+    """Return a Program with a block `block_name` by the modes that variables tell, and changed blocks.
 
     The same Program where nothing has a way, or where a block is called like that already.
     """
-    if not ways or {leap, *(stay.title for stay in ways)} & set(program.blocks):
+    if not paths or {block_name, *(stay.block_name for stay in paths)} & set(program.blocks):
         return program
-    tells = DONE in reads(changed.values())
-    done = {stay: _needed(_block(way, tells)) for stay, way in ways.items()}
-    blocks = {stay.title: _named(done[stay], way) for stay, way in ways.items()}
-    chosen = _chosen([(stay.numbers, stay.title) for stay in ways])
+    sets_taken = FAST_PATH_TAKEN in names_used(changed.values())
+    done = {
+        stay: _remove_dead_assignments(_fast_path_block(path, sets_taken))
+        for stay, path in paths.items()
+    }
+    blocks = {stay.block_name: _rename_values(done[stay], path) for stay, path in paths.items()}
+    chosen = _dispatch_on_modes([(stay.mode_numbers, stay.block_name) for stay in paths])
     made: dict[str, Variable] = {}
-    used = reads(blocks.values())
-    for way in ways.values():
-        names = ((old, name) for old, name in _names(way).items() if name in used)
-        made |= {n: dataclasses.replace(way.made[old].variable, name=n) for old, n in names}
-    made[DONE] = Variable(DONE, "truth", about="the whole step is taken: nothing happened in it")
+    used = names_used(blocks.values())
+    for path in paths.values():
+        names = ((old, name) for old, name in _value_names(path).items() if name in used)
+        made |= {n: dataclasses.replace(path.values[old].variable, name=n) for old, n in names}
+    made[FAST_PATH_TAKEN] = Variable(
+        FAST_PATH_TAKEN, "truth", about="the whole step is taken: nothing happened in it"
+    )
     variables = (
         *(v for v in program.variables if v.name not in made),
         *made.values(),
     )
-    blocks = {**program.blocks, **blocks, leap: chosen, **changed}
-    return finished(dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES)
+    blocks = {**program.blocks, **blocks, block_name: chosen, **changed}
+    return finalise_program(
+        dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES
+    )
 
 
-def _chosen(titles: Sequence[tuple[Numbers, str]]) -> Block:
+def _dispatch_on_modes(titles: Sequence[tuple[ModeNumbers, str]]) -> Block:
     """Return what runs the block of the modes that variables tell, one variable in another."""
     ((numbers, title), *_) = titles
     if not numbers:
-        return (Run(title),)
-    inner: dict[int, list[tuple[Numbers, str]]] = {}
+        return (RunBlock(title),)
+    inner: dict[int, list[tuple[ModeNumbers, str]]] = {}
     for ((_, number), *rest), one in titles:
         inner.setdefault(number, []).append((tuple(rest), one))
-    cases = tuple((number, _chosen(some)) for number, some in inner.items())
-    return (Choose(numbers[0][0], cases),)
+    cases = tuple((number, _dispatch_on_modes(some)) for number, some in inner.items())
+    return (Switch(numbers[0][0], cases),)
 
 
-def _block(way: Way, tells: bool) -> Block:
+def _fast_path_block(path: ExecutionPath, sets_taken: bool) -> Block:
     """Return what is done on a way: what comes after the guards if none of them changed; the end
-    `tells` that it is done.
+    `sets_taken` that it is done.
     """
-    last = (*way.ops, Assign(DONE, Value(True))) if tells else tuple(way.ops)
-    return (*way.first, *last) if way.is_sure else (*way.first, Branch(way.quiet, last))
+    last = (*path.ops, Assign(FAST_PATH_TAKEN, Value(True))) if sets_taken else tuple(path.ops)
+    return (
+        (*path.prologue, *last)
+        if path.is_unconditional
+        else (*path.prologue, Branch(path.is_event_free, last))
+    )
 
 
-def _names(way: Way) -> dict[str, str]:
+def _value_names(path: ExecutionPath) -> dict[str, str]:
     """Return what each value is called: as its variable is, with the point of the step."""
     names = {}
-    for name, made in way.made.items():
+    for name, made in path.values.items():
         variable, point = made.variable.name, made.point
-        if variable.startswith(END):
-            variable, point = variable.replace(END, PLACE), way.points
-        names[name] = f"{variable}_{_title(point, way.points)}"
+        if variable.startswith(STEP_END_PREFIX):
+            variable, point = variable.replace(STEP_END_PREFIX, POINT_STATE_PREFIX), path.points
+        names[name] = f"{variable}_{_point_name(point, path.points)}"
     count = Counter(names.values())
     return {
         n: f"{title}{n[n.rindex('_') :]}" if count[title] > 1 else title
@@ -234,21 +284,21 @@ def _names(way: Way) -> dict[str, str]:
     }
 
 
-def _title(point: int, points: int) -> str:
+def _point_name(point: int, points: int) -> str:
     """Return what a point of a step is called: start, middle, end, or by its number."""
     if point in (1, points):
         return "start" if point == 1 else "end"
     return "middle" if points == 3 else str(point)
 
 
-def _named(block: Block, way: Way) -> Block:
+def _rename_values(block: Block, path: ExecutionPath) -> Block:
     """Return a block whose values are called by their names."""
-    names = _names(way)
+    names = _value_names(path)
 
     def called(expr: Expr) -> Expr:
         if isinstance(expr, Ref):
             return dataclasses.replace(expr, name=names.get(expr.name, expr.name))
-        return with_parts(expr, called)
+        return map_operands(expr, called)
 
     def setting(ops: Block) -> Iterator[Op]:
         for op in ops:
@@ -260,23 +310,28 @@ def _named(block: Block, way: Way) -> Block:
                 case _:
                     yield op
 
-    return with_expressions(tuple(setting(block)), called)
+    return map_expressions(tuple(setting(block)), called)
 
 
-def _needed(block: Block) -> Block:
+def _remove_dead_assignments(block: Block) -> Block:
     """Leave out the values of a step that nothing reads."""
-    return tuple(reversed(list(_kept(block, set()))))
+    return tuple(reversed(list(_live_operations(block, set()))))
 
 
-def _kept(block: Block, read: set[str]) -> Iterator[Op]:
+def _live_operations(block: Block, live_names: set[str]) -> Iterator[Op]:
     """Yield, from the last to the first, the operations of a block whose values are read."""
     for op in reversed(block):
         kept = op
         if isinstance(op, Branch):
-            arms = [tuple(reversed(list(_kept(arm, read)))) for arm in (op.then, op.other)]
+            arms = [
+                tuple(reversed(list(_live_operations(arm, live_names))))
+                for arm in (op.then, op.other)
+            ]
             kept = Branch(op.condition, *arms)
-        elif isinstance(op, Assign) and op.target.startswith("work.") and op.target not in read:
+        elif (
+            isinstance(op, Assign) and op.target.startswith("work.") and op.target not in live_names
+        ):
             continue
-        for expr in own_expressions(op):
-            read.update(expr_names(expr))
+        for expr in direct_expressions(op):
+            live_names.update(expr_names(expr))
         yield kept

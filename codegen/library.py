@@ -15,23 +15,23 @@ from pathlib import Path
 from typing import Any
 
 from codegen.abreast import LANES
-from codegen.build import FLAGS, SECONDS, BuildError, compiler, compiler_version
-from codegen.cache import cache_folder, key_of, stored
+from codegen.build import FLAGS, TIMEOUT, BuildError, compiler_version, find_compiler
+from codegen.cache import cache_folder, get_or_build, key_of
 from codegen.objects import is_shared, object_of
-from codegen.run_places import column_places, row_width
-from codegen.run_source import run_files
-from language.assembly import Assembly
+from codegen.run_places import column_positions, row_width
+from codegen.run_source import emit_simulator_files
+from language.assembly import SimulationAssembly
 
-Address = ctypes.c_void_p
-Whole = ctypes.c_int64
-SHARED = ("-fPIC", "-shared")
+Pointer = ctypes.c_void_p
+Int64 = ctypes.c_int64
+SHARED_LIBRARY_FLAGS = ("-fPIC", "-shared")
 
 
 class FlowStruct(ctypes.Structure):
     """`FlowPlan` of templates/run.h.jinja."""
 
     _fields_ = [
-        (name, Address)
+        (name, Pointer)
         for name in (
             "first",
             "left",
@@ -50,10 +50,10 @@ class PlanStruct(ctypes.Structure):
     """`Plan` of templates/run.h.jinja."""
 
     _fields_ = [
-        ("instants", Whole),
-        ("rows", Whole),
+        ("instants", Int64),
+        ("rows", Int64),
         *(
-            (name, Address)
+            (name, Pointer)
             for name in (
                 "high",
                 "low",
@@ -77,58 +77,58 @@ class VariantsStruct(ctypes.Structure):
     """`Variants` of templates/run_driver.c.jinja."""
 
     _fields_ = [
-        ("values", Address),
-        ("tables", Whole),
-        ("table_inputs", Address),
-        ("table_pieces", Address),
-        ("table_widths", Address),
-        ("table_values", Address),
-        ("noise_strides", Address),
-        ("measures", Whole),
-        ("measure_columns", Address),
-        ("measure_kinds", Address),
-        ("measure_firsts", Address),
-        ("measure_behinds", Address),
-        ("measured", Address),
-        ("outputs", Whole),
-        ("output_columns", Address),
-        ("kept", Address),
-        ("most_events", Whole),
-        ("events", Address),
-        ("counts", Address),
-        ("is_left", Address),
-        ("faults", Address),
-        ("rows", Address),
-        ("inputs_room", Address),
+        ("values", Pointer),
+        ("tables", Int64),
+        ("table_inputs", Pointer),
+        ("table_pieces", Pointer),
+        ("table_widths", Pointer),
+        ("table_values", Pointer),
+        ("noise_strides", Pointer),
+        ("measures", Int64),
+        ("measure_columns", Pointer),
+        ("measure_kinds", Pointer),
+        ("measure_firsts", Pointer),
+        ("measure_behinds", Pointer),
+        ("measured", Pointer),
+        ("outputs", Int64),
+        ("output_columns", Pointer),
+        ("kept", Pointer),
+        ("most_events", Int64),
+        ("events", Pointer),
+        ("counts", Pointer),
+        ("is_left", Pointer),
+        ("faults", Pointer),
+        ("rows", Pointer),
+        ("inputs_room", Pointer),
     ]
 
 
-class Library:
+class SimulatorLibrary:
     """The compiled runs of one assembly; `columns` are the places of its columns in a row.
 
     `lanes` is how many variants may be carried out side by side: of so many there is room for rows.
     """
 
-    def __init__(self, assembly: Assembly, path: Path) -> None:
+    def __init__(self, assembly: SimulationAssembly, path: Path) -> None:
         """Load what was built."""
         self.assembly = assembly
-        self.columns = tuple(column_places(assembly))
+        self.columns = tuple(column_positions(assembly))
         self.width = row_width(assembly)
         self.lanes = LANES
         self._run = ctypes.CDLL(str(path)).run_variants
-        self._run.argtypes = [Address, Address, Whole, Whole]
+        self._run.argtypes = [Pointer, Pointer, Int64, Int64]
         self._run.restype = None
 
-    def bound(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
+    def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return what carries variants out, from a first to one behind the last.
 
         `plan` is an engine's (engine/plan.py), `variants` are the members of `Variants` in C: whole
         numbers, arrays, lists of arrays; all arrays contiguous.
         """
-        struct, kept = self._plan(plan)
+        struct, kept = self._pack_plan(plan)
         members = VariantsStruct()
         for name, value in variants.items():
-            setattr(members, name, _member(value, kept))
+            setattr(members, name, _struct_member(value, kept))
         run, places = self._run, (ctypes.addressof(struct), ctypes.addressof(members))
         kept += [struct, members]
 
@@ -137,10 +137,10 @@ class Library:
 
         return carry_out
 
-    def _plan(self, plan: Any) -> tuple[PlanStruct, list[Any]]:
-        kept: list[Any] = []
+    def _pack_plan(self, plan: Any) -> tuple[PlanStruct, list[Any]]:
+        keep_alive: list[Any] = []
         flows = (FlowStruct * max(1, len(plan.flows)))()
-        for struct, name in zip(flows, self.assembly.flows, strict=False):
+        for struct, name in zip(flows, self.assembly.continuous_instances, strict=False):
             flow = plan.flows[name]
             for member, array in (
                 ("first", flow.first),
@@ -156,7 +156,7 @@ class Library:
                 setattr(struct, member, array.ctypes.data)
         sensors = list(self.assembly.sensors)
         noise = [plan.noise.get(name) for name in sensors]
-        early = (Whole * max(1, len(sensors)))(*(plan.early[name] for name in sensors))
+        early = (Int64 * max(1, len(sensors)))(*(plan.early[name] for name in sensors))
         struct = PlanStruct(
             instants=len(plan.instants.high),
             rows=len(plan.rows.high),
@@ -167,93 +167,99 @@ class Library:
             row_at=plan.row_at.ctypes.data,
             row_gaps=plan.row_gaps.ctypes.data,
             flows=ctypes.addressof(flows),
-            noise=_member(noise, kept),
+            noise=_struct_member(noise, keep_alive),
             early=ctypes.addressof(early),
             row_high=plan.rows.high.ctypes.data,
             row_low=plan.rows.low.ctypes.data,
             pieces=plan.pieces.ctypes.data,
-            courses=_member([plan.courses[c.name] for c in self.assembly.courses], kept),
+            courses=_struct_member(
+                [plan.courses[c.name] for c in self.assembly.input_trajectories], keep_alive
+            ),
         )
-        return struct, [*kept, flows, early, plan]
+        return struct, [*keep_alive, flows, early, plan]
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _LibraryKey:
     """What a library is of: those of one process are loaded once."""
 
     digest: str
     command: tuple[str, ...]
     folder: Path
-    side_by_side: bool
-    assembly: Assembly = field(compare=False)
+    simd_batch: bool
+    assembly: SimulationAssembly = field(compare=False)
 
 
-def library_of(
-    assembly: Assembly,
+def load_library(
+    assembly: SimulationAssembly,
     flags: Sequence[str] = FLAGS,
-    named: str | None = None,
-    side_by_side: bool = True,
-) -> Library:
+    compiler_name: str | None = None,
+    simd_batch: bool = True,
+) -> SimulatorLibrary:
     """Return the compiled runs of an assembly, kept from an earlier time if there was one.
 
-    A single run needs none `side_by_side`, and is compiled sooner without. Raises ToolMissing,
+    A single run needs none `simd_batch`, and is compiled sooner without. Raises ToolMissing,
     BuildError.
     """
-    parts = (*compiler(named), *flags)
-    wanted = _Wanted(assembly.digest(), parts, cache_folder(), side_by_side, assembly)
-    return _loaded(wanted, tuple(flags), named)
+    parts = (*find_compiler(compiler_name), *flags)
+    library_key = _LibraryKey(assembly.digest(), parts, cache_folder(), simd_batch, assembly)
+    return _load_cached(library_key, tuple(flags), compiler_name)
 
 
 @lru_cache(maxsize=64)
-def _loaded(wanted: _Wanted, flags: tuple[str, ...], named: str | None) -> Library:
-    assembly = wanted.assembly
+def _load_cached(
+    library_key: _LibraryKey, flags: tuple[str, ...], compiler_name: str | None
+) -> SimulatorLibrary:
+    assembly = library_key.assembly
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        for file, text in run_files(assembly, wanted.side_by_side).items():
+        for file, text in emit_simulator_files(assembly, library_key.simd_batch).items():
             (folder / file).write_text(text)
         sources = sorted(folder.glob("*.c"))
-        command = [*compiler(named), *flags, *SHARED]
-        key = key_of(sources, command, compiler_version(named))
-        path = stored(key, lambda target: build_library(sources, target, flags, named), folder)
-        return Library(assembly, path)
+        command = [*find_compiler(compiler_name), *flags, *SHARED_LIBRARY_FLAGS]
+        key = key_of(sources, command, compiler_version(compiler_name))
+        path = get_or_build(
+            key, lambda target: build_library(sources, target, flags, compiler_name), folder
+        )
+        return SimulatorLibrary(assembly, path)
 
 
 def build_library(
-    sources: Sequence[Path], target: Path, flags: Sequence[str], named: str | None
+    sources: Sequence[Path], target: Path, flags: Sequence[str], compiler_name: str | None
 ) -> None:
     """Compile the sources side by side, and link them."""
-    command = compiler(named)
-    words = [*command, *flags, "-fPIC"]
-    version, room = compiler_version(named), sources[0].parent / "objects"
-    shared = [object_of(s, words, version, room) for s in sources if is_shared(s)]
+    command = find_compiler(compiler_name)
+    compile_command = [*command, *flags, "-fPIC"]
+    version, room = compiler_version(compiler_name), sources[0].parent / "objects"
+    shared = [object_of(s, compile_command, version, room) for s in sources if is_shared(s)]
     objects = [source.with_suffix(".o") for source in sources if not is_shared(source)]
     running = [
         subprocess.Popen(
-            [*words, "-c", str(made.with_suffix(".c")), "-o", str(made)],
+            [*compile_command, "-c", str(made.with_suffix(".c")), "-o", str(made)],
             stderr=subprocess.PIPE,
             text=True,
         )
         for made in objects
     ]
     for process in running:
-        _, told = process.communicate(timeout=SECONDS)
+        _, message = process.communicate(timeout=TIMEOUT)
         if process.returncode != 0:
-            raise BuildError(told.strip())
+            raise BuildError(message.strip())
     link = [*command, "-shared", *map(str, objects + shared), "-lm", "-o", str(target)]
-    done = subprocess.run(link, capture_output=True, text=True, timeout=SECONDS, check=False)
+    done = subprocess.run(link, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     if done.returncode != 0:
         raise BuildError(done.stderr.strip())
 
 
-def _member(value: Any, kept: list[Any]) -> Any:
+def _struct_member(value: Any, keep_alive: list[Any]) -> Any:
     """Return a member of a struct: a number, the address of an array, or of a list of addresses."""
     if value is None or isinstance(value, int):
         return value
     if isinstance(value, list):
-        array = (Address * max(1, len(value)))(
+        array = (Pointer * max(1, len(value)))(
             *(None if part is None else part.ctypes.data for part in value)
         )
-        kept.extend([array, value])
+        keep_alive.extend([array, value])
         return ctypes.addressof(array)
-    kept.append(value)
+    keep_alive.append(value)
     return value.ctypes.data

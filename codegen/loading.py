@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 
-def loaded(path: Path) -> Any:
+def load_predictor_library(path: Path) -> Any:
     """Return the library of a predictor (codegen/templates/predictor.c.jinja)."""
     library = ctypes.CDLL(str(path))
     pointer, whole = ctypes.c_void_p, ctypes.c_long

@@ -5,41 +5,41 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 
-from language.operation import Assign, Block, Branch, Choose, FaultBit, Loop, Op, Value
+from language.operation import Assign, Block, Branch, FaultBit, Loop, Op, Switch, Value
 from language.program import Program, Variable
-from language.traversal import walk
+from language.traversal import walk_ops
 
-LEFT = "memory.left_{}"
+RANGE_MARK = "memory.left_{}"
 
 
 def ranged_signals(program: Program) -> tuple[str, ...]:
     """Return the signals whose leaving of a range is reported."""
-    ops = (op for block in program.blocks.values() for op in walk(block))
+    ops = (op for block in program.blocks.values() for op in walk_ops(block))
     found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
     return tuple(dict.fromkeys(signal for signal in found if signal))
 
 
-def marked(program: Program) -> Program:
+def add_range_marks(program: Program) -> Program:
     """Return a Program that notes which signals left their range."""
     signals = ranged_signals(program)
     if not signals:
         return program
-    marks = {signal: LEFT.format(k) for k, signal in enumerate(signals)}
+    marks = {signal: RANGE_MARK.format(k) for k, signal in enumerate(signals)}
     variables = (*program.variables, *(Variable(name, "truth") for name in marks.values()))
-    blocks = {name: tuple(_with_marks(b, marks)) for name, b in program.blocks.items()}
+    blocks = {name: tuple(_insert_marks(b, marks)) for name, b in program.blocks.items()}
     return dataclasses.replace(program, variables=variables, blocks=blocks)
 
 
-def _with_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
+def _insert_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
     for op in block:
         match op:
             case Branch(condition, then, other):
-                inner = (tuple(_with_marks(b, marks)) for b in (then, other))
+                inner = (tuple(_insert_marks(b, marks)) for b in (then, other))
                 yield Branch(condition, *inner)
-            case Choose(selector, cases):
-                yield Choose(selector, tuple((k, tuple(_with_marks(b, marks))) for k, b in cases))
+            case Switch(selector, cases):
+                yield Switch(selector, tuple((k, tuple(_insert_marks(b, marks))) for k, b in cases))
             case Loop(count, index, body):
-                yield Loop(count, index, tuple(_with_marks(body, marks)))
+                yield Loop(count, index, tuple(_insert_marks(body, marks)))
             case FaultBit(_, signal, True) if signal:
                 yield op
                 yield Assign(marks[signal], Value(True))

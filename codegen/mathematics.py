@@ -6,23 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from codegen.expression import SUFFIX, c_expression, literal
+from codegen.expression import MATH_SUFFIX, emit_expression, format_literal
 from codegen.names import (
-    REAL,
+    C_REAL_TYPE,
 )
-from codegen.rendering import render, version
-from codegen.statement import INDENT, WIDTH, decided, is_nested, wrapped
-from language.functions import FUNCTIONS_OF
+from codegen.rendering import product_version, render
+from codegen.statement import INDENT, MAX_LINE_WIDTH, emit_select, emit_wrapped_statement, is_nested
+from language.functions import FUNCTIONS_BY_TYPE
 from language.number import NumberType
 from language.operation import Assign, Select
 from language.program import (
     Function,
-    short,
+    unqualified_name,
 )
 
 
 @dataclass(frozen=True)
-class Layout:
+class FloatFormat:
     """How IEEE 754 keeps a real: `bits` in all, `digits` after the point, exponents of 2."""
 
     bits: int
@@ -31,25 +31,27 @@ class Layout:
     highest: int
 
 
-LAYOUT: Mapping[NumberType, Layout] = {
-    "float64": Layout(64, 52, -1022, 1023),
-    "float32": Layout(32, 23, -126, 127),
+FLOAT_FORMATS: Mapping[NumberType, FloatFormat] = {
+    "float64": FloatFormat(64, 52, -1022, 1023),
+    "float32": FloatFormat(32, 23, -126, 127),
 }
 
 
-def math_files(number: NumberType) -> dict[str, str]:
+def emit_math_files(number: NumberType) -> dict[str, str]:
     """Return ha_math (ha_mathf for float32): functions without a library's bits (rule C6)."""
-    suffix = SUFFIX[number]
+    suffix = MATH_SUFFIX[number]
     context = {
-        "functions": [_function(function, number) for function in FUNCTIONS_OF[number].values()],
-        "version": version(),
-        "real": REAL[number],
+        "functions": [
+            _function_context(function, number) for function in FUNCTIONS_BY_TYPE[number].values()
+        ],
+        "version": product_version(),
+        "real": C_REAL_TYPE[number],
         "suffix": suffix,
-        "zero": literal(0.0, number),
-        "one": literal(1.0, number),
-        "layout": LAYOUT[number],
-        "lowest": literal(float(LAYOUT[number].lowest), number),
-        "highest": literal(float(LAYOUT[number].highest), number),
+        "zero": format_literal(0.0, number),
+        "one": format_literal(1.0, number),
+        "layout": FLOAT_FORMATS[number],
+        "lowest": format_literal(float(FLOAT_FORMATS[number].lowest), number),
+        "highest": format_literal(float(FLOAT_FORMATS[number].highest), number),
     }
     return {
         f"ha_math{suffix}.h": render("ha_math.h.jinja", context),
@@ -58,32 +60,44 @@ def math_files(number: NumberType) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class _FunctionNames:
+class _LocalNameMap:
     """Inside a function of ha_math every variable is a local."""
 
     number: NumberType
 
     def __call__(self, name: str) -> str:
-        return short(name)
+        return unqualified_name(name)
 
-    def whole(self, name: str, number: int) -> str:
+    def integer_constant(self, name: str, number: int) -> str:
         return str(number)
 
     def is_unsigned(self, name: str) -> bool:
         return False
 
 
-def _function(function: Function, number: NumberType) -> dict[str, Any]:
-    place = _FunctionNames(number)
+def _function_context(function: Function, number: NumberType) -> dict[str, Any]:
+    c_names = _LocalNameMap(number)
     lines: list[str] = []
     for op in function.body:
         assert isinstance(op, Assign)
-        left = "return " if op.target == "work.y" else f"const {REAL[number]} {place(op.target)} = "
+        left = (
+            "return "
+            if op.target == "work.y"
+            else f"const {C_REAL_TYPE[number]} {c_names(op.target)} = "
+        )
         if isinstance(op.value, Select) and is_nested(op.value):
-            lines += decided(REAL[number], place(op.target), op.value, place, WIDTH - len(INDENT))
+            lines += emit_select(
+                C_REAL_TYPE[number],
+                c_names(op.target),
+                op.value,
+                c_names,
+                MAX_LINE_WIDTH - len(INDENT),
+            )
             lines += ["return y;"] if op.target == "work.y" else []
         else:
-            lines += wrapped(left, c_expression(op.value, place), "", WIDTH - len(INDENT))
-    parameters = ", ".join(f"{REAL[number]} {name}" for name in function.parameters)
+            lines += emit_wrapped_statement(
+                left, emit_expression(op.value, c_names), "", MAX_LINE_WIDTH - len(INDENT)
+            )
+    parameters = ", ".join(f"{C_REAL_TYPE[number]} {name}" for name in function.parameters)
     about = function.about
     return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

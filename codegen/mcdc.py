@@ -20,16 +20,26 @@ from codegen.build import FLAGS, run_executable
 from codegen.exploring import write_explorer
 from codegen.harness import write_harness
 from codegen.machine import HOST
-from codegen.proofs.infeasible import Place, never, places_of, unshared
+from codegen.proofs.infeasible import (
+    DecisionSite,
+    decision_sites,
+    prove_infeasible,
+    unshare_expressions,
+)
 from codegen.proofs.terms import Range
-from codegen.source import STATIC, c_program
+from codegen.source import STATIC_PATTERN, run_c_passes
 from codegen.tool import output_of
 from language.program import Program
 
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
-COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
-APP, EXPLORER, POOL, MERGED = "app", "explorer", "counts_%1m.profraw", "counts.profdata"
-FUNCTION = re.compile(rf"(?:{STATIC})?void (\w+)\(")
+COVERAGE_FLAGS = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
+APP, EXPLORER, RAW_PROFILE, MERGED_PROFILE = (
+    "app",
+    "explorer",
+    "counts_%1m.profraw",
+    "counts.profdata",
+)
+FUNCTION = re.compile(rf"(?:{STATIC_PATTERN})?void (\w+)\(")
 CASE = re.compile(r"case\b|default\b")
 
 
@@ -52,11 +62,11 @@ class Decision:
         return sum(not shown and outcome is None for shown, outcome in pairs)
 
 
-T = TypeVar("T", Decision, Place)
+T = TypeVar("T", Decision, DecisionSite)
 
 
 @dataclass(frozen=True)
-class Covered:
+class McdcCoverage:
     """What `sequences` of inputs have shown of the C of a Program, over so many `steps`."""
 
     file: str
@@ -80,76 +90,80 @@ class Covered:
         return sum(decision.open for decision in self.decisions)
 
     @property
-    def missed(self) -> tuple[Decision, ...]:
+    def uncovered(self) -> tuple[Decision, ...]:
         """The decisions of which a condition was not shown."""
         return tuple(decision for decision in self.decisions if not all(decision.shown))
 
 
-def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -> Covered:
+def add_infeasibility_proofs(
+    coverage: McdcCoverage, program: Program, ranges: Mapping[str, Range]
+) -> McdcCoverage:
     """Return what was covered with a proof of what no input can show of a sampled Program.
 
     `ranges` are those of its variables between two steps, as far as they stay in them.
     """
-    made = unshared(c_program(program))
-    places = _by_block(places_of(made))
-    decisions = _by_block(found.decisions)
+    c_program = unshare_expressions(run_c_passes(program))
+    sites = _group_by_block(decision_sites(c_program))
+    decisions = _group_by_block(coverage.decisions)
     missed = [block for block, of in decisions.items() if any(not all(d.shown) for d in of)]
-    placed = [p for block in missed for p in _placed(decisions[block], places.get(block, []))]
-    proven = never(made, ranges, list(dict.fromkeys(_hidden(placed))))
-    claimed = {id(decision): _claimed(at, proven, decision) for decision, at in placed}
-    replaced = (replace(d, never=claimed.get(id(d)) or d.never) for d in found.decisions)
-    return replace(found, decisions=tuple(replaced))
+    matched = [p for block in missed for p in _match_sites(decisions[block], sites.get(block, []))]
+    proven = prove_infeasible(
+        c_program, ranges, list(dict.fromkeys(_uncovered_conditions(matched)))
+    )
+    outcomes = {id(decision): _proven_outcomes(at, proven, decision) for decision, at in matched}
+    replaced = (replace(d, never=outcomes.get(id(d)) or d.never) for d in coverage.decisions)
+    return replace(coverage, decisions=tuple(replaced))
 
 
-def _hidden(placed: Iterable[tuple[Decision, list[Place]]]) -> Iterator[int]:
+def _uncovered_conditions(matched: Iterable[tuple[Decision, list[DecisionSite]]]) -> Iterator[int]:
     """Yield the numbers of the conditions that were not shown, at all places where they may be."""
-    for decision, places in placed:
+    for decision, places in matched:
         for place in places:
             if len(place.conditions) == len(decision.shown):
                 pairs = zip(place.conditions, decision.shown, strict=True)
                 yield from (number for number, shown in pairs if not shown)
 
 
-def _by_block(things: Iterable[T]) -> dict[str, list[T]]:
-    found: dict[str, list[T]] = {}
-    for thing in things:
-        found.setdefault(thing.block, []).append(thing)
-    return found
+def _group_by_block(items: Iterable[T]) -> dict[str, list[T]]:
+    groups: dict[str, list[T]] = {}
+    for thing in items:
+        groups.setdefault(thing.block, []).append(thing)
+    return groups
 
 
-def _placed(
-    decisions: Sequence[Decision], places: Sequence[Place]
-) -> Iterator[tuple[Decision, list[Place]]]:
+def _match_sites(
+    decisions: Sequence[Decision], sites: Sequence[DecisionSite]
+) -> Iterator[tuple[Decision, list[DecisionSite]]]:
     """Yield the decisions of a block with their places: where both are the same in the same order,
     each has one, else all that have its text, unless there are fewer of these than of decisions.
     """
-    if [d.text for d in decisions] == [place.text for place in places]:
-        yield from ((d, [place]) for d, place in zip(decisions, places, strict=True))
+    if [d.text for d in decisions] == [place.text for place in sites]:
+        yield from ((d, [place]) for d, place in zip(decisions, sites, strict=True))
         return
     counts = Counter(d.text for d in decisions)
     for decision in decisions:
-        found = [place for place in places if place.text == decision.text]
+        found = [place for place in sites if place.text == decision.text]
         yield decision, found if len(found) >= counts[decision.text] else []
 
 
-def _claimed(
-    places: Sequence[Place], proven: Mapping[int, bool], decision: Decision
+def _proven_outcomes(
+    sites: Sequence[DecisionSite], proven: Mapping[int, bool], decision: Decision
 ) -> tuple[bool | None, ...]:
     """Return what is proven of each condition at all places where it may stand."""
     found: list[bool | None] = []
     for position, shown in enumerate(decision.shown):
-        of = [place.conditions for place in places if len(place.conditions) == len(decision.shown)]
+        of = [place.conditions for place in sites if len(place.conditions) == len(decision.shown)]
         outcomes = {proven.get(conditions[position]) for conditions in of}
         found.append(outcomes.pop() if len(outcomes) == 1 and not shown else None)
     return tuple(found)
 
 
-def mcdc(
+def measure_mcdc(
     program: Program,
     sequences: Sequence[Sequence[bytes]],
-    ways: Sequence[bytes] = (),
+    corpus: Sequence[bytes] = (),
     ranges: Mapping[str, Range] | None = None,
-) -> Covered:
+) -> McdcCoverage:
     """Run the C of a Program on sequences of input records, and on ways through it, and tell what
     they show of it.
 
@@ -159,72 +173,76 @@ def mcdc(
     file = f"{program.name}.c"
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        counting = {"LLVM_PROFILE_FILE": str(folder / POOL)}  # a run adds to what is there
-        app = _built(write_harness(program, folder), folder, HOST.link(folder))
+        environment = {
+            "LLVM_PROFILE_FILE": str(folder / RAW_PROFILE)
+        }  # a run adds to what is there
+        app = _build(write_harness(program, folder), folder, HOST.link(folder))
         for sequence in sequences:
-            run_executable(app, b"".join(sequence), counting)
+            run_executable(app, b"".join(sequence), environment)
         steps = sum(map(len, sequences))
-        if ways:
-            steps += _go(ways, program, ranges or {}, folder, counting)
-        pools = sorted(path.name for path in folder.glob("counts_*.profraw"))
-        output_of([MERGER, "merge", "-sparse", *pools, "-o", MERGED], folder)
-        command = [EXPORTER, "export", APP, f"-instr-profile={MERGED}", str(folder / file)]
+        if corpus:
+            steps += _run_corpus(corpus, program, ranges or {}, folder, environment)
+        profiles = sorted(path.name for path in folder.glob("counts_*.profraw"))
+        output_of([MERGER, "merge", "-sparse", *profiles, "-o", MERGED_PROFILE], folder)
+        command = [EXPORTER, "export", APP, f"-instr-profile={MERGED_PROFILE}", str(folder / file)]
         found = json.loads(output_of(command, folder))
         text = (folder / file).read_text().split("\n")
-    (counted,) = found["data"][0]["files"]
-    decisions = tuple(_decisions(program.name, counted, text))
-    return Covered(file, len(sequences) + len(ways), steps, decisions)
+    (coverage,) = found["data"][0]["files"]
+    decisions = tuple(_parse_decisions(program.name, coverage, text))
+    return McdcCoverage(file, len(sequences) + len(corpus), steps, decisions)
 
 
-def _built(sources: Sequence[Path], folder: Path, link: Sequence[str], app: str = APP) -> Path:
-    flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERED]
+def _build(sources: Sequence[Path], folder: Path, link: Sequence[str], app: str = APP) -> Path:
+    flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERAGE_FLAGS]
     output_of([COMPILER, *flags, *map(str, sources), "-o", app, *link], folder)
     return folder / app
 
 
-def _go(
-    ways: Sequence[bytes],
+def _run_corpus(
+    corpus: Sequence[bytes],
     program: Program,
     ranges: Mapping[str, Range],
     folder: Path,
-    counting: Mapping[str, str],
+    environment: Mapping[str, str],
 ) -> int:
     """Go some ways through the C of a Program; return how many steps these are."""
     sources = write_explorer(program, ranges, folder)
-    app = _built(sources, folder, ("-DALONE", "-lm"), EXPLORER)
+    app = _build(sources, folder, ("-DALONE", "-lm"), EXPLORER)
     names = []
-    for number, way in enumerate(ways):
+    for number, entry in enumerate(corpus):
         names.append(str(folder / f"{number}.way"))
-        Path(names[-1]).write_bytes(way)
-    (done,) = output_of([str(app), *names], folder, counting).split()
+        Path(names[-1]).write_bytes(entry)
+    (done,) = output_of([str(app), *names], folder, environment).split()
     return int(done)
 
 
-def _decisions(name: str, counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:
+def _parse_decisions(
+    name: str, coverage: dict[str, Any], text: Sequence[str]
+) -> Iterator[Decision]:
     """Yield decisions in the order of the file: several conditions, then one alone."""
     found = []
     spans = []
-    for record in counted["mcdc_records"]:
+    for record in coverage["mcdc_records"]:
         begin, end = tuple(record[:2]), tuple(record[2:4])
         spans.append((begin, end))
         found.append((begin, end, tuple(record[-1])))
-    for branch in counted["branches"]:
+    for branch in coverage["branches"]:
         begin, end, (true, false) = tuple(branch[:2]), tuple(branch[2:4]), branch[4:6]
         is_inside = any(first <= begin and end <= last for first, last in spans)
-        if not is_inside and not CASE.match(_text(text, begin, end)):
+        if not is_inside and not CASE.match(_source_text(text, begin, end)):
             found.append((begin, end, (bool(true and false),)))
     for begin, end, shown in sorted(found):
-        block = _block(name, text[: begin[0]])
-        yield Decision(block, begin[0], _text(text, begin, end), shown, (None,) * len(shown))
+        block = _enclosing_block(name, text[: begin[0]])
+        yield Decision(block, begin[0], _source_text(text, begin, end), shown, (None,) * len(shown))
 
 
-def _block(name: str, lines: Sequence[str]) -> str:
+def _enclosing_block(name: str, lines: Sequence[str]) -> str:
     """Return the block whose function begins last in some lines."""
     begun = next(found[1] for line in reversed(lines) if (found := FUNCTION.match(line)))
     return begun.removeprefix(f"{name}_").lower() if begun.startswith(f"{name}_") else begun
 
 
-def _text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:
+def _source_text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:
     """Return the text from one place to another, lines and columns counted from 1."""
     inside = list(lines[begin[0] - 1 : end[0]])
     inside[-1] = inside[-1][: end[1] - 1]

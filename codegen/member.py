@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from codegen.comment import comment as safe
-from codegen.expression import literal
+from codegen.comment import sanitise_comment as safe
+from codegen.expression import format_literal
 from codegen.names import CNames, c_member, c_type
-from codegen.usage import ON_PAGE
-from language.number import NumberType, decimal
-from language.program import MODE, Constant, Program, Variable
-from language.units import shown_unit
+from codegen.usage import PAGE_GROUPS
+from language.number import NumberType, shortest_decimal
+from language.program import MODE_VARIABLE, Constant, Program, Variable
+from language.units import display_unit
 
-SOLVED = {
+SOLVED_MATRICES = {
     "A": "the linear part of the rates",
     "E": "e^(A h), h the whole step",
     "F": "the integral of e^(A t) over the whole step",
@@ -26,7 +26,7 @@ SOLVED = {
     "L": "the gain of the correction",
 }
 """Matrices of solved numbers, by their letter."""
-GROUPS = {
+STRUCT_GROUPS = {
     "state": "",
     "discrete": "discrete variables",
     "latched": "inputs of this tick",
@@ -40,26 +40,26 @@ GROUPS = {
 
 
 @dataclass(frozen=True)
-class Page:
+class PageLayout:
     """A calibration page: the `qualifiers` of what points to it, and the constants it `holds`."""
 
     qualifiers: str
-    holds: frozenset[str]
+    groups: frozenset[str]
 
     @property
     def holds_solved(self) -> bool:
         """Tell whether solved numbers are calibrated with what they were solved for."""
-        return "solved" in self.holds
+        return "solved" in self.groups
 
 
-CONSTANTS = Page("const", ON_PAGE)
+HOST_PAGE = PageLayout("const", PAGE_GROUPS)
 """Nobody writes to it while it is read, and solved numbers are constants: on this machine."""
-PAGE = Page("const volatile", ON_PAGE | {"solved"})
+ECU_PAGE = PageLayout("const volatile", PAGE_GROUPS | {"solved"})
 """On an ECU: a tool may write to it, the solved numbers included (rule C14)."""
 
 
 @dataclass(frozen=True)
-class Field:
+class StructMember:
     """A member of a struct with its comment."""
 
     type: str
@@ -70,98 +70,104 @@ class Field:
     title: str = ""
 
 
-def page_of(program: Program) -> list[Field]:
+def calibration_members(program: Program) -> list[StructMember]:
     """Return the members of the calibration page, tables among them, with their defaults."""
-    return [_constant(c, program.number) for c in program.constants if c.kind == "tunable"]
+    return [
+        _constant_member(c, program.number_type) for c in program.constants if c.kind == "tunable"
+    ]
 
 
-def members(program: Program, page: Page) -> dict[str, Any]:
+def struct_members(program: Program, layout: PageLayout) -> dict[str, Any]:
     """The members of the structures."""
-    number, constants, variables = program.number, program.constants, program.variables
-    solved = _solved([c for c in constants if c.kind == "solved"], number)
+    number, constants, variables = program.number_type, program.constants, program.variables
+    solved = _solved_members([c for c in constants if c.kind == "solved"], number)
     return {
-        "calibration": page_of(program),
-        "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
-        "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
-        "axes": [_constant(c, number) for c in constants if c.name.startswith("axis.")],
-        "solved": [] if page.holds_solved else solved,
-        "solved_on_page": solved if page.holds_solved else [],
-        "page": f"{page.qualifiers} {program.name}_Cal",
-        "inputs": [field_of(v, number) for v in program.inputs],
-        "is_new": [field_of(v, number) for v in variables if v.name.startswith("is_new.")],
-        "groups": _groups(program),
-        "memory": [field_of(v, number) for v in variables if v.name.startswith("memory.")],
-        "outputs": _outputs(program),
+        "calibration": calibration_members(program),
+        "derived": [_constant_member(c, number) for c in constants if c.kind == "derived"],
+        "constants": [
+            _constant_member(c, number) for c in constants if c.name.startswith("constant.")
+        ],
+        "axes": [_constant_member(c, number) for c in constants if c.name.startswith("axis.")],
+        "solved": [] if layout.holds_solved else solved,
+        "solved_on_page": solved if layout.holds_solved else [],
+        "page": f"{layout.qualifiers} {program.name}_Cal",
+        "inputs": [member_of(v, number) for v in program.inputs],
+        "is_new": [member_of(v, number) for v in variables if v.name.startswith("is_new.")],
+        "groups": _group_members(program),
+        "memory": [member_of(v, number) for v in variables if v.name.startswith("memory.")],
+        "outputs": _output_members(program),
     }
 
 
-def field_of(variable: Variable, number: NumberType) -> Field:
+def member_of(variable: Variable, number: NumberType) -> StructMember:
     """Return a variable as a member."""
-    comment = shown_unit(variable.unit) if variable.type == "real" else variable.about
+    comment = display_unit(variable.unit) if variable.type == "real" else variable.about
     if variable.type == "real" and variable.about:
-        comment = f"{shown_unit(variable.unit)}; {variable.about}"
+        comment = f"{display_unit(variable.unit)}; {variable.about}"
     member = c_member(variable.name)
-    return Field(c_type(variable, number), member, safe(comment), size=variable.size)
+    return StructMember(c_type(variable, number), member, safe(comment), size=variable.size)
 
 
-def _solved(constants: list[Constant], number: NumberType) -> list[Field]:
+def _solved_members(constants: list[Constant], number: NumberType) -> list[StructMember]:
     """Return solved numbers, `solved.<mode>_<letter>.<row>.<column>` where they are of a matrix,
     the first of each with its title.
     """
-    begun = {""}
-    found = []
+    titled = {""}
+    members = []
     for constant in constants:
         group, *entry = constant.name.split(".")[1:]
-        about = SOLVED.get(group.rpartition("_")[2], "") if entry else ""
+        about = SOLVED_MATRICES.get(group.rpartition("_")[2], "") if entry else ""
         title = safe(f"{group}_row__column: {about}") if about else ""
-        found.append(replace(_constant(constant, number), title="" if title in begun else title))
-        begun.add(title)
-    return found
+        members.append(
+            replace(_constant_member(constant, number), title="" if title in titled else title)
+        )
+        titled.add(title)
+    return members
 
 
-def _constant(constant: Constant, number: NumberType) -> Field:
-    comment = "; ".join(text for text in (shown_unit(constant.unit), constant.key) if text)
+def _constant_member(constant: Constant, number: NumberType) -> StructMember:
+    comment = "; ".join(text for text in (display_unit(constant.unit), constant.key) if text)
     if constant.range:
         low, high = (
-            str(int(end)) if constant.type == "whole" else decimal(end, number)
+            str(int(end)) if constant.type == "whole" else shortest_decimal(end, number)
             for end in constant.range
         )
         comment += f"; {low} to {high}"
-    value = literal(constant.value, number)
+    value = format_literal(constant.value, number)
     if constant.items:
-        value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
+        value = f"{{{', '.join(format_literal(item, number) for item in constant.items)}}}"
     kind = c_type(constant, number)
     comment = "; ".join(text for text in (comment, constant.about) if text)
-    return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
+    return StructMember(kind, c_member(constant.name), safe(comment), value, len(constant.items))
 
 
-def _groups(program: Program) -> list[tuple[str, str, list[Field]]]:
+def _group_members(program: Program) -> list[tuple[str, str, list[StructMember]]]:
     found = []
-    for group, about in GROUPS.items():
+    for group, about in STRUCT_GROUPS.items():
         inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
-        fields = [field_of(v, program.number) for v in inside]
+        fields = [member_of(v, program.number_type) for v in inside]
         if fields:
             found.append((group, about, fields))
     return found
 
 
-def _outputs(program: Program) -> list[dict[str, str]]:
-    types = {v.name: c_type(v, program.number) for v in program.variables}
+def _output_members(program: Program) -> list[dict[str, str]]:
+    types = {v.name: c_type(v, program.number_type) for v in program.variables}
     known = {v.name: v for v in program.variables}
-    place = CNames(program)
+    c_names = CNames(program)
     return [
         {
             "type": types[wire.source],
             "name": wire.name,
-            "comment": _told(program, known[wire.source], wire.unit),
-            "source": place(wire.source),
+            "comment": _output_comment(program, known[wire.source], wire.unit),
+            "source": c_names(wire.source),
         }
         for wire in program.outputs
     ]
 
 
-def _told(program: Program, shown: Variable, unit: str) -> str:
+def _output_comment(program: Program, source: Variable, unit: str) -> str:
     """Return what an output is in: its unit, or what its numbers stand for."""
-    if shown.name == MODE:
+    if source.name == MODE_VARIABLE:
         return f"{program.name}_MODE_*"
-    return shown_unit(unit) if shown.type == "real" else shown.about
+    return display_unit(unit) if source.type == "real" else source.about

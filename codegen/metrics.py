@@ -10,17 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.build import FLAGS
-from codegen.longest_step import Unbounded, longest_step
-from codegen.machine import CORTEX
-from codegen.proofs.stack import stack_of
-from codegen.source import c_files
+from codegen.longest_step import Unbounded, worst_case_instructions
+from codegen.machine import CORTEX_FLAGS
+from codegen.proofs.stack import stack_usage
+from codegen.source import emit_c_files
 from codegen.tool import ARM_COMPILER, ARM_SIZE, output_of
 from language.program import Program
 
 STRUCTURES = ("Self", "In", "Out")
-PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
+SIZE_PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
 SECTION = re.compile(r"^(\.[\w.]+)\s+(\d+)\s+\d+", re.MULTILINE)
-KINDS = {".text": "code", ".rodata": "constants", ".data": "data", ".bss": "data"}
+SECTION_KINDS = {".text": "code", ".rodata": "constants", ".data": "data", ".bss": "data"}
 """What a section holds, by the first word of its name."""
 
 
@@ -53,55 +53,55 @@ class Metrics:
         return self.code + self.constants + self.page
 
 
-def metrics(program: Program) -> Metrics:
+def measure_code(program: Program) -> Metrics:
     """Compile the C of a Program for a Cortex-M4F, `-O2`, and measure it.
 
     Raises ToolMissing, BuildError.
     """
     name = program.name
     with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:
-        folder, files = Path(folder_name), c_files(program)
-        probes = "".join(PROBE.format(structure=one, name=name) for one in STRUCTURES)
+        folder, files = Path(folder_name), emit_c_files(program)
+        probes = "".join(SIZE_PROBE.format(structure=one, name=name) for one in STRUCTURES)
         for file, text in {**files, "probe.c": f'#include "{name}.h"\n{probes}'}.items():
             (folder / file).write_text(text)
         sources = [file for file in files if file.endswith(".c")]
-        held = _sections(folder, sources)
-        sizes = _sections(folder, ["probe.c"])
-        found = stack_of(folder, sources, f"{name}_Step")
-        longest, unbounded = _longest(folder, sources, f"{name}_Step")
+        section_sizes = _section_sizes(folder, sources)
+        sizes = _section_sizes(folder, ["probe.c"])
+        stack = stack_usage(folder, sources, f"{name}_Step")
+        longest, unbounded = _worst_case(folder, sources, f"{name}_Step")
     kinds: Counter[str] = Counter()
-    for section, size in held.items():
-        kinds[KINDS.get("." + section.split(".")[1], "")] += size
+    for section, size in section_sizes.items():
+        kinds[SECTION_KINDS.get("." + section.split(".")[1], "")] += size
     return Metrics(
         name,
-        program.number,
+        program.number_type,
         code=kinds["code"],
         constants=kinds["constants"],
-        page=held[f".calibration.{name}"],
+        page=section_sizes[f".calibration.{name}"],
         data=kinds["data"],
         instance=sizes[".rodata.of_Self"],
         inputs=sizes[".rodata.of_In"],
         outputs=sizes[".rodata.of_Out"],
-        stack=found.most,
-        beside=found.beside,
+        stack=stack.most,
+        beside=stack.beside,
         longest=longest,
         unbounded=unbounded,
     )
 
 
-def _longest(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
+def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
     """Return the most instructions of a step, or None and why there is no bound."""
     try:
-        return longest_step(folder, sources, entry), ""
+        return worst_case_instructions(folder, sources, entry), ""
     except Unbounded as error:
         return None, str(error)
 
 
-def _sections(folder: Path, sources: Sequence[str]) -> Counter[str]:
+def _section_sizes(folder: Path, sources: Sequence[str]) -> Counter[str]:
     """Return the bytes of each section of all sources together."""
-    output_of([ARM_COMPILER, *CORTEX, *FLAGS, "-fdata-sections", "-c", *sources], folder)
+    output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fdata-sections", "-c", *sources], folder)
     objects = [f"{Path(source).stem}.o" for source in sources]
-    found: Counter[str] = Counter()
+    sizes: Counter[str] = Counter()
     for line in SECTION.finditer(output_of([ARM_SIZE, "-A", "-d", *objects], folder)):
-        found[line[1]] += int(line[2])
-    return found
+        sizes[line[1]] += int(line[2])
+    return sizes

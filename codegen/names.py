@@ -10,22 +10,22 @@ from functools import cached_property
 from language.model import CHART
 from language.number import NumberType
 from language.program import (
-    MODE,
-    TICKS,
+    MODE_VARIABLE,
+    TICK_UNIT,
     Constant,
     Program,
     TransitionInfo,
     Variable,
     mode_variable,
-    short,
+    unqualified_name,
 )
 
-REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
-MODES = ("memory.mode", "memory.run_mode")
-CHOSEN = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
+C_REAL_TYPE: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
+MODE_PREFIXES = ("memory.mode", "memory.run_mode")
+TRANSITION_PREFIXES = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
 """Variables that hold the number of a transition."""
-UNSIGNED = ("timer.", "memory.faults", *CHOSEN)
-SOLVED_APART, SOLVED_ON_PAGE = "solved_", "cal->solved."
+UNSIGNED_PREFIXES = ("timer.", "memory.faults", *TRANSITION_PREFIXES)
+SOLVED_PREFIX_CONSTANT, SOLVED_PREFIX_ON_PAGE = "solved_", "cal->solved."
 """What stands before solved numbers: constants of their own, or a part of the calibration page."""
 
 
@@ -38,12 +38,12 @@ class CNames:
 
     program: Program
     local: frozenset[str] = frozenset()
-    solved: str = SOLVED_APART
+    solved_prefix: str = SOLVED_PREFIX_CONSTANT
 
     @property
     def number(self) -> NumberType:
         """The type of the reals (rule C1)."""
-        return self.program.number
+        return self.program.number_type
 
     def __call__(self, name: str) -> str:
         """Return the C text for a variable or constant."""
@@ -55,7 +55,7 @@ class CNames:
             case "constant":
                 return f"constant.{rest}"
             case "solved":
-                return f"{self.solved}{member}"
+                return f"{self.solved_prefix}{member}"
             case "axis":
                 return f"axis_{member}"
             case "calibration":
@@ -71,38 +71,40 @@ class CNames:
             case _:
                 return f"self->{group}.{rest}"
 
-    def whole(self, name: str, number: int) -> str:
+    def integer_constant(self, name: str, number: int) -> str:
         """Return a number as it is written beside a variable: a mode by its name."""
         if name == "memory.mode":
             return mode_constant(self.program, number)
         if name == "memory.run_mode":
             return run_mode_constant(self.program, number)
         for region in self.program.regions:
-            if name == mode_variable(MODE, region.name):
+            if name == mode_variable(MODE_VARIABLE, region.name):
                 return mode_constant(self.program, number, region.name)
-        if name.startswith(CHOSEN) and number in self._transitions:
-            return self._transitions[number]
-        values = self._values(name)
+        if name.startswith(TRANSITION_PREFIXES) and number in self._transition_names:
+            return self._transition_names[number]
+        values = self._enumeration_values(name)
         if values and 0 <= number < len(values):
             return value_constant(self.program, values, number)
-        return f"{number}U" if name.startswith(UNSIGNED) else str(number)
+        return f"{number}U" if name.startswith(UNSIGNED_PREFIXES) else str(number)
 
     def is_unsigned(self, name: str) -> bool:
         """Tell whether a variable is a whole number without a sign."""
-        return name in self._unsigned
+        return name in self._unsigned_variables
 
     @cached_property
-    def _unsigned(self) -> frozenset[str]:
+    def _unsigned_variables(self) -> frozenset[str]:
         kinds = {v.name: c_type(v, self.number) for v in self.program.variables}
-        ticks = (c.name for c in self.program.constants if c.unit == TICKS)
+        ticks = (c.name for c in self.program.constants if c.unit == TICK_UNIT)
         return frozenset((*(n for n, kind in kinds.items() if kind.startswith("uint")), *ticks))
 
     @cached_property
-    def _transitions(self) -> Mapping[int, str]:
+    def _transition_names(self) -> Mapping[int, str]:
         return transition_constants(self.program)
 
-    def _values(self, name: str) -> tuple[str, ...]:
-        return next((values for known, values in _lists(self.program) if known == name), ())
+    def _enumeration_values(self, name: str) -> tuple[str, ...]:
+        return next(
+            (values for known, values in _enumeration_lists(self.program) if known == name), ()
+        )
 
 
 def c_member(name: str) -> str:
@@ -110,7 +112,7 @@ def c_member(name: str) -> str:
 
     Row and column of a solved matrix are apart by two underscores: `drive_L_w_em__y_w`.
     """
-    matrix, *entry = short(name).split(".")
+    matrix, *entry = unqualified_name(name).split(".")
     apart = "__" if name.startswith("solved.") else "_"
     return "_".join((matrix, apart.join(entry))) if entry else matrix
 
@@ -118,18 +120,18 @@ def c_member(name: str) -> str:
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
     """Return the C type of a variable or constant; reals are of a number type (rule C10)."""
     if variable.type == "real":
-        return REAL[number]
+        return C_REAL_TYPE[number]
     if variable.type == "truth":
         return "bool"
     if variable.values:
         return "uint8_t"
-    if variable.name.startswith("timer.") or variable.unit == TICKS:
+    if variable.name.startswith("timer.") or variable.unit == TICK_UNIT:
         return "uint16_t"
     if variable.name == "memory.faults":
         return "uint32_t"
-    if variable.name.startswith(CHOSEN):
+    if variable.name.startswith(TRANSITION_PREFIXES):
         return "uint16_t"
-    return "int16_t" if variable.name.startswith(MODES) else "int32_t"
+    return "int16_t" if variable.name.startswith(MODE_PREFIXES) else "int32_t"
 
 
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:
@@ -142,15 +144,15 @@ def transition_constants(program: Program) -> dict[int, str]:
     """Return the names of transitions in C by their numbers: source and name, with the number where
     several are called like that.
     """
-    names = {info.number: _called(program, info) for info in program.transitions}
+    names = {info.number: _transition_constant(program, info) for info in program.transitions}
     count = Counter(names.values())
     return {n: f"{name}_{n}" if count[name] > 1 else name for n, name in names.items()}
 
 
-def _called(program: Program, info: TransitionInfo) -> str:
+def _transition_constant(program: Program, info: TransitionInfo) -> str:
     source = program.mode_name(info.source, info.region)
-    if info.between:
-        source = info.between[0]
+    if info.chart_endpoints:
+        source = info.chart_endpoints[0]
     elif info.region != CHART:
         source = f"{info.region}_{source}"
     return f"{program.name}_FIRED_{source}_{info.name}".replace(".", "_")
@@ -164,11 +166,11 @@ def run_mode_constant(program: Program, number: int) -> str:
 
 def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
     """Return the lists of names that variables have, each with the first that has it."""
-    found: dict[tuple[str, ...], str] = {}
-    for name, values in _lists(program):
+    owner_by_values: dict[tuple[str, ...], str] = {}
+    for name, values in _enumeration_lists(program):
         if values:
-            found.setdefault(values, c_member(name))
-    return [(name, values) for values, name in found.items()]
+            owner_by_values.setdefault(values, c_member(name))
+    return [(name, values) for values, name in owner_by_values.items()]
 
 
 def value_constant(program: Program, values: tuple[str, ...], number: int) -> str:
@@ -177,6 +179,6 @@ def value_constant(program: Program, values: tuple[str, ...], number: int) -> st
     return f"{program.name}_{owner}_{values[number]}"
 
 
-def _lists(program: Program) -> list[tuple[str, tuple[str, ...]]]:
+def _enumeration_lists(program: Program) -> list[tuple[str, tuple[str, ...]]]:
     constants = [(constant.name, constant.values) for constant in program.constants]
     return constants + [(variable.name, variable.values) for variable in program.variables]

@@ -9,10 +9,10 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.build import linked
-from codegen.cache import key_of, stored
+from codegen.build import run_compiler
+from codegen.cache import get_or_build, key_of
 
-SHARED = re.compile(r"(ha_mathf?|harness/\w+)\.c$")
+SHARED_SOURCES = re.compile(r"(ha_mathf?|harness/\w+)\.c$")
 """Sources that do not follow from a Program. What is beside one of them in `harness` it may read,
 ha_math its own header alone.
 """
@@ -20,25 +20,27 @@ ha_math its own header alone.
 
 def is_shared(source: Path) -> bool:
     """Tell whether a source is the same in many programs."""
-    return SHARED.search(source.as_posix()) is not None
+    return SHARED_SOURCES.search(source.as_posix()) is not None
 
 
-def object_of(source: Path, command: Sequence[str], version: str, room: Path) -> Path:
+def object_of(source: Path, command: Sequence[str], version: str, folder: Path) -> Path:
     """Return the object of a shared source, kept from an earlier time if there was one.
 
     `command` are the compiler and its flags, `version` is what it says of itself. Without a cache
-    the object is made in `room`. Raises BuildError.
+    the object is made in `folder`. Raises BuildError.
     """
     read = None if source.parent.name == "harness" else [source, source.with_suffix(".h")]
     key = key_of([source], [*command, "-c"], version, read)
-    spare = room / source.stem
-    spare.mkdir(parents=True, exist_ok=True)
-    words = [*command, "-c", str(source)]
-    return stored(key, lambda made: linked(words, made), spare, "objects")
+    fallback_folder = folder / source.stem
+    fallback_folder.mkdir(parents=True, exist_ok=True)
+    compile_command = [*command, "-c", str(source)]
+    return get_or_build(
+        key, lambda made: run_compiler(compile_command, made), fallback_folder, "objects"
+    )
 
 
-def with_objects(
-    sources: Sequence[Path], command: Sequence[str], version: str, room: Path
+def substitute_objects(
+    sources: Sequence[Path], command: Sequence[str], version: str, folder: Path
 ) -> list[Path]:
     """Return the sources with an object in place of each one that is shared. Raises BuildError."""
-    return [object_of(s, command, version, room) if is_shared(s) else s for s in sources]
+    return [object_of(s, command, version, folder) if is_shared(s) else s for s in sources]

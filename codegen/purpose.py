@@ -67,7 +67,7 @@ brackets is said where something does.
 OPTIONAL = re.compile(r"\[(.*?)\]")
 
 
-def purpose(block: str, modes: Iterable[str] = (), run_modes: Iterable[str] = ()) -> str:
+def describe_function(block: str, modes: Iterable[str] = (), run_modes: Iterable[str] = ()) -> str:
     """Return what a block is for; nothing where its name begins with no such words.
 
     What is for a mode while the model inside is in one of its `run_modes` names both.

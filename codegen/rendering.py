@@ -12,9 +12,9 @@ from typing import Any
 import jinja2
 from jinja2.bccache import Bucket
 
-from codegen.cache import own_folder
+from codegen.cache import cache_subfolder
 
-COMPILED = "templates"
+TEMPLATE_CACHE = "templates"
 """Folder inside the cache where compiled templates are kept."""
 
 
@@ -33,11 +33,11 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
-        bytecode_cache=_kept(),
+        bytecode_cache=_template_cache(),
     )
 
 
-class _Kept(jinja2.FileSystemBytecodeCache):
+class _TemplateCache(jinja2.FileSystemBytecodeCache):
     """Compiled templates, kept where there is room for them: compiling all takes 0.1 s."""
 
     def load_bytecode(self, bucket: Bucket) -> None:
@@ -49,11 +49,11 @@ class _Kept(jinja2.FileSystemBytecodeCache):
             super().dump_bytecode(bucket)
 
 
-def _kept() -> jinja2.BytecodeCache | None:
-    folder = own_folder(COMPILED)
-    return _Kept(str(folder)) if folder else None
+def _template_cache() -> jinja2.BytecodeCache | None:
+    folder = cache_subfolder(TEMPLATE_CACHE)
+    return _TemplateCache(str(folder)) if folder else None
 
 
-def version() -> str:
+def product_version() -> str:
     """Return the version of the product."""
     return metadata.version("modewright")

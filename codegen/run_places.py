@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from codegen.expression import Place, c_expression
+from codegen.expression import CNameMap, emit_expression
 from codegen.names import CNames
-from language.assembly import Assembly, wires_of
+from language.assembly import SimulationAssembly, output_variables
 from language.number import NumberType
 from language.operation import Assign
-from language.program import Program, short
+from language.program import Program, unqualified_name
 
-INSTANCE = "i_{}"
+INSTANCE_NAME = "i_{}"
 """What an instance is called in C: its name may be any that the language takes."""
 
 
 @dataclass(frozen=True)
-class Places:
+class SignalNameMap:
     """Where signals are in the driver."""
 
-    assembly: Assembly
+    assembly: SimulationAssembly
     programs: Mapping[str, Program]
     is_row: bool = False
     is_timed: bool = False
@@ -28,12 +28,12 @@ class Places:
 
     def __call__(self, name: str) -> str:
         """Return the C text of `signal.<name>`."""
-        signal = short(name)
+        signal = unqualified_name(name)
         if self.is_row:
-            return f"out[{self.assembly.slots.index(signal)}]"
-        return self.signal(signal)
+            return f"out[{self.assembly.row_signals.index(signal)}]"
+        return self.emit_signal(signal)
 
-    def whole(self, name: str, number: int) -> str:
+    def integer_constant(self, name: str, number: int) -> str:
         """Return a whole number beside a signal."""
         return repr(number)
 
@@ -41,34 +41,34 @@ class Places:
         """Signals are reals."""
         return False
 
-    def signal(self, name: str) -> str:
+    def emit_signal(self, name: str) -> str:
         """Return the C text of a signal."""
-        courses = [course.name for course in self.assembly.courses]
+        courses = [course.name for course in self.assembly.input_trajectories]
         if self.is_timed and name in courses:
             return f"course_{courses.index(name)}(run, time)"
         if name in self.assembly.inputs:
             return f"run->inputs[{self.assembly.inputs.index(name)}]"
         if name in self.assembly.sensors:
-            return f"run->{INSTANCE.format(name)}.value"
+            return f"run->{INSTANCE_NAME.format(name)}.value"
         owner, _, wire = name.partition(".")
         program = self.programs[owner]
-        place = CNames(program)(wires_of(program)[wire])
+        place = CNames(program)(output_variables(program)[wire])
         return place.replace("self->", f"(double)run->{program.name}.self.")
 
-    def formula(self, block: str) -> str:
+    def emit_formula(self, block: str) -> str:
         """Return the C text of a block of the wires."""
-        return formula_of(self.assembly, block, self)
+        return emit_wire_formula(self.assembly, block, self)
 
 
-def formula_of(assembly: Assembly, block: str, place: Place) -> str:
+def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMap) -> str:
     """Return the C text of a block of the wires, whose signals are at a place."""
     (op,) = assembly.wires.blocks[block]
     assert isinstance(op, Assign)
-    return f"(double)({c_expression(op.value, place)})"
+    return f"(double)({emit_expression(op.value, c_names)})"
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeNameMap:
     """Where a formula of time reads it, whatever it is called there."""
 
     number: NumberType = "float64"
@@ -77,7 +77,7 @@ class Clock:
         """Return the C text of the time."""
         return "now"
 
-    def whole(self, name: str, number: int) -> str:
+    def integer_constant(self, name: str, number: int) -> str:
         """Return a whole number beside it."""
         return repr(number)
 
@@ -86,18 +86,18 @@ class Clock:
         return False
 
 
-def column_places(assembly: Assembly) -> list[int]:
+def column_positions(assembly: SimulationAssembly) -> list[int]:
     """Return where each recorded column stands among the numbers of a row."""
-    found, formulas = [], len(assembly.slots)
+    positions, formulas = [], len(assembly.row_signals)
     for column in assembly.columns:
         if column.block:
-            found.append(formulas)
+            positions.append(formulas)
             formulas += 1
         else:
-            found.append(assembly.slots.index(column.source))
-    return found
+            positions.append(assembly.row_signals.index(column.source))
+    return positions
 
 
-def row_width(assembly: Assembly) -> int:
+def row_width(assembly: SimulationAssembly) -> int:
     """Return how many numbers a row has."""
-    return max(1, len(assembly.slots) + sum(1 for c in assembly.columns if c.block))
+    return max(1, len(assembly.row_signals) + sum(1 for c in assembly.columns if c.block))

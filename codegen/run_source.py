@@ -13,79 +13,95 @@ from fractions import Fraction
 from typing import Any
 
 from codegen.abreast import LANES
-from codegen.expression import literal
-from codegen.marks import marked
-from codegen.mathematics import math_files
-from codegen.member import page_of
-from codegen.names import REAL, c_member, c_type
-from codegen.rendering import render, version
-from codegen.run_module import abreast_of, module_of, varying
-from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
-from language.assembly import Assembly, Course, Feed, ranged, short_input
-from language.continuous import PARTS
+from codegen.expression import format_literal
+from codegen.marks import add_range_marks
+from codegen.mathematics import emit_math_files
+from codegen.member import calibration_members
+from codegen.names import C_REAL_TYPE, c_member, c_type
+from codegen.rendering import product_version, render
+from codegen.run_module import simd_batch_of, simulator_module_context, varying_inputs
+from codegen.run_places import (
+    INSTANCE_NAME,
+    SignalNameMap,
+    TimeNameMap,
+    emit_wire_formula,
+    row_width,
+)
+from language.assembly import (
+    InputSource,
+    InputTrajectory,
+    SimulationAssembly,
+    input_name,
+    range_event_variables,
+)
+from language.continuous import ENGINE_BLOCKS
 from language.number import NumberType
-from language.program import Program, short
+from language.program import Program, unqualified_name
 from language.signal import Sensor
-from language.stepping import BETWEEN
+from language.stepping import STEP_INTERFACE
 from language.traversal import block_names
-from language.wiring import finished
+from language.wiring import finalise_program
 
 
-def run_files(assembly: Assembly, side_by_side: bool = True) -> dict[str, str]:
-    """Return the files of a system's runs by name; `side_by_side` ones are for many variants."""
-    programs = {name: _part(name, program) for name, program in assembly.programs.items()}
-    places = Places(assembly, programs)
-    inside = {
+def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) -> dict[str, str]:
+    """Return the files of a system's runs by name; `simd_batch` ones are for many variants."""
+    programs = {
+        name: _instance_program(name, program) for name, program in assembly.programs.items()
+    }
+    signal_names = SignalNameMap(assembly, programs)
+    modules = {
         name: {
-            **module_of(assembly, name, program, places, flow),
-            "abreast": abreast_of(assembly, name, program, places) if side_by_side else None,
+            **simulator_module_context(assembly, name, program, signal_names, flow),
+            "abreast": simd_batch_of(assembly, name, program, signal_names) if simd_batch else None,
         }
         for flow, (name, program) in enumerate(programs.items())
     }
-    context = _driver(assembly, programs, places, inside)
+    context = _driver_context(assembly, programs, signal_names, modules)
     files = {
         "run.h": render("run.h.jinja", context),
         "run.c": render("run_driver.c.jinja", context),
     }
     numbers: dict[NumberType, None] = {"float64": None} if context["uses_math"] else {}
     for name, program in programs.items():
-        files[f"{program.name}.h"] = render("module.h.jinja", inside[name])
-        files[f"{program.name}_run.c"] = render("run_module.c.jinja", inside[name])
-        if inside[name]["uses_math"]:
-            numbers[program.number] = None
+        files[f"{program.name}.h"] = render("module.h.jinja", modules[name])
+        files[f"{program.name}_run.c"] = render("run_module.c.jinja", modules[name])
+        if modules[name]["uses_math"]:
+            numbers[program.number_type] = None
     for number in numbers:
-        files.update(math_files(number))
+        files.update(emit_math_files(number))
     return files
 
 
-def _part(name: str, program: Program) -> Program:
+def _instance_program(name: str, program: Program) -> Program:
     """Return the Program of an instance as it is printed: its parts, or its tick."""
-    own = dataclasses.replace(program, name=INSTANCE.format(name))
+    own = dataclasses.replace(program, name=INSTANCE_NAME.format(name))
     if program.period is not None:
-        return marked(own)
-    return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
+        return add_range_marks(own)
+    return finalise_program(
+        own, ("init", "derive", *ENGINE_BLOCKS), keep=(*STEP_INTERFACE, "work.s")
+    )
 
 
-def _driver(
-    assembly: Assembly,
+def _driver_context(
+    assembly: SimulationAssembly,
     programs: Mapping[str, Program],
-    places: Places,
-    inside: Mapping[str, Mapping[str, Any]],
+    signal_names: SignalNameMap,
+    modules: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
     instances = [
         {
-            **_instance(assembly, name, program, places),
-            "is_abreast": bool(inside[name]["abreast"]),
+            **_instance_context(assembly, name, program, signal_names),
+            "is_abreast": bool(modules[name]["abreast"]),
         }
         for name, program in programs.items()
     ]
-    rows = dataclasses.replace(places, is_row=True)
-    sensors = [_sensor(sensor, places) for sensor in assembly.sensors.values()]
+    row_names = dataclasses.replace(signal_names, is_row=True)
+    sensors = [_sensor_context(sensor, signal_names) for sensor in assembly.sensors.values()]
     wired = {name for block in assembly.wires.blocks.values() for name in block_names(block)}
     called = {name for name in wired if name.startswith("call ")}
     has_lag = any(sensor.lag for sensor in assembly.sensors.values())
     return {
-        "version": version(),
+        "version": product_version(),
         "title": "A run",
         "instances": instances,
         "sensors": sensors,
@@ -95,43 +111,57 @@ def _driver(
         "inputs": len(assembly.inputs),
         "has_lag": has_lag,
         "uses_math": has_lag or bool(called),
-        "courses": [_course(assembly, course) for course in assembly.courses],
-        "slots": [_slot(assembly, signal, places) for signal in assembly.slots],
-        "formulas": _formulas(assembly, rows),
-        "happenings": _happenings(assembly),
-        "captures": _captures(assembly),
+        "courses": [_course_context(assembly, course) for course in assembly.input_trajectories],
+        "slots": [_slot_context(assembly, signal, signal_names) for signal in assembly.row_signals],
+        "formulas": _formula_columns(assembly, row_names),
+        "happenings": _happening_calls(assembly),
+        "captures": _capture_calls(assembly),
         "tunables": [
-            (INSTANCE.format(owner), short(c.name), REAL[programs[owner].number])
+            (
+                INSTANCE_NAME.format(owner),
+                unqualified_name(c.name),
+                C_REAL_TYPE[programs[owner].number_type],
+            )
             for owner, c in assembly.tunables()
         ],
     }
 
 
-def _formulas(assembly: Assembly, rows: Places) -> list[tuple[int, str]]:
+def _formula_columns(
+    assembly: SimulationAssembly, row_names: SignalNameMap
+) -> list[tuple[int, str]]:
     """Return the place in a row of each column that is a formula, behind the slots, and its C."""
     blocks = [column.block for column in assembly.columns if column.block]
-    return [(len(assembly.slots) + k, rows.formula(block)) for k, block in enumerate(blocks)]
+    return [
+        (len(assembly.row_signals) + k, row_names.emit_formula(block))
+        for k, block in enumerate(blocks)
+    ]
 
 
-def _captures(assembly: Assembly) -> list[tuple[int, str]]:
+def _capture_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
     """Return, for each sensor with a delay, the happening at which it captures, and the call."""
     return [
-        (assembly.happenings.index(f"capture {n}"), f"{INSTANCE.format(n)}_capture(run, now);")
+        (
+            assembly.instant_actions.index(f"capture {n}"),
+            f"{INSTANCE_NAME.format(n)}_capture(run, now);",
+        )
         for n, sensor in assembly.sensors.items()
         if sensor.delay
     ]
 
 
-def _slot(assembly: Assembly, signal: str, places: Places) -> dict[str, object]:
+def _slot_context(
+    assembly: SimulationAssembly, signal: str, signal_names: SignalNameMap
+) -> dict[str, object]:
     """Return what fills a slot of a row; an input may change between the instants."""
-    courses = [course.name for course in assembly.courses]
-    value = places.signal(signal)
+    courses = [course.name for course in assembly.input_trajectories]
+    value = signal_names.emit_signal(signal)
     if signal in courses:
         value = f"is_instant ? {value} : course_{courses.index(signal)}(run, at)"
-    return {"value": value, "is_flow": signal.partition(".")[0] in assembly.flows}
+    return {"value": value, "is_flow": signal.partition(".")[0] in assembly.continuous_instances}
 
 
-def _course(assembly: Assembly, course: Course) -> dict[str, object]:
+def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> dict[str, object]:
     high = float(course.delay)
     return {
         "delay": course.delay,
@@ -139,74 +169,81 @@ def _course(assembly: Assembly, course: Course) -> dict[str, object]:
         "low": repr(float(course.delay - Fraction(high))),
         "column": assembly.inputs.index(course.name),
         "formulas": [
-            (number, formula_of(assembly, block, Clock())) for number, block in course.formulas
+            (number, emit_wire_formula(assembly, block, TimeNameMap()))
+            for number, block in course.formulas
         ],
     }
 
 
-def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
-    found = []
+def _happening_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
+    calls = []
     for name in assembly.order:
-        own = INSTANCE.format(name)
+        own = INSTANCE_NAME.format(name)
         if name in assembly.sensors:
-            found.append((assembly.happenings.index(name), f"{own}_sample(run, now);"))
-        elif name not in assembly.flows:
+            calls.append((assembly.instant_actions.index(name), f"{own}_sample(run, now);"))
+        elif name not in assembly.continuous_instances:
             line = f"if (!tick_{own}(run, now)) {{ return false; }}"
-            found.append((assembly.happenings.index(name), line))
-    return found
+            calls.append((assembly.instant_actions.index(name), line))
+    return calls
 
 
-def _instance(assembly: Assembly, name: str, program: Program, places: Places) -> dict[str, Any]:
+def _instance_context(
+    assembly: SimulationAssembly, name: str, program: Program, signal_names: SignalNameMap
+) -> dict[str, Any]:
     is_flow = program.period is None
     varied = {c_member(c.name) for owner, c in assembly.tunables() if owner == name}
     flags = [
         {
-            "name": short_input(feed),
+            "name": input_name(feed),
             "seen": [
-                (f"seen_{name}_{short_input(feed)}_{sensor}", INSTANCE.format(sensor))
+                (f"seen_{name}_{input_name(feed)}_{sensor}", INSTANCE_NAME.format(sensor))
                 for sensor in feed.sensors
             ],
         }
-        for feed in assembly.feeds[name]
+        for feed in assembly.input_sources[name]
         if feed.sensors
     ]
     return {
         "name": program.name,
         "is_flow": is_flow,
-        "flow": list(assembly.flows).index(name) if is_flow else -1,
+        "flow": list(assembly.continuous_instances).index(name) if is_flow else -1,
         "is_controlled": name in assembly.controlled,
-        "ranges": ranged(program) if is_flow else (),
+        "ranges": range_event_variables(program) if is_flow else (),
         "invariants": len(program.invariants),
-        "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
+        "feeds": [
+            _feed_context(feed, program, signal_names) for feed in assembly.input_sources[name]
+        ],
         "flags": flags,
-        "varying": varying(assembly, name, program, places),
-        "page": [field for field in page_of(program) if field.name not in varied],
+        "varying": varying_inputs(assembly, name, program, signal_names),
+        "page": [field for field in calibration_members(program) if field.name not in varied],
     }
 
 
-def _fed(feed: Feed, program: Program, places: Places) -> dict[str, object]:
-    kind = c_type(feed.variable, program.number)
+def _feed_context(
+    feed: InputSource, program: Program, signal_names: SignalNameMap
+) -> dict[str, object]:
+    kind = c_type(feed.variable, program.number_type)
     if feed.block:
-        value = places.formula(feed.block)
+        value = signal_names.emit_formula(feed.block)
     elif isinstance(feed.source, str):
-        value = places.signal(feed.source)
+        value = signal_names.emit_signal(feed.source)
     else:
-        value = literal(feed.source, "float64")
+        value = format_literal(feed.source, "float64")
     return {
         "name": c_member(feed.variable.name),
         "type": kind,
         "value": f"({value}) != 0.0" if kind == "bool" else f"({kind})({value})",
-        "must_be_finite": feed.variable.type == "real" and not feed.is_limited,
+        "must_be_finite": feed.variable.type == "real" and not feed.has_saturation,
     }
 
 
-def _sensor(sensor: Sensor, places: Places) -> dict[str, object]:
-    name, lag = INSTANCE.format(sensor.name), float(sensor.lag)
+def _sensor_context(sensor: Sensor, signal_names: SignalNameMap) -> dict[str, object]:
+    name, lag = INSTANCE_NAME.format(sensor.name), float(sensor.lag)
     look = f"lag_look(&me->lag, {lag!r}, now, measured)" if sensor.lag else "measured"
     room = math.ceil(sensor.delay / sensor.period) + 2 if sensor.period and sensor.delay else 0
     return {
         "name": name,
-        "source": places.signal(sensor.source),
+        "source": signal_names.emit_signal(sensor.source),
         "lag": repr(lag) if sensor.lag else "",
         "look": look,
         "sd": repr(float(sensor.noise)) if sensor.noise else "",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
-Wholes = NDArray[np.int64]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -19,14 +19,14 @@ class Prediction:
     """
 
     innovations: Reals
-    seen: Reals
+    outputs: Reals
     states: Reals
     modes: NDArray[np.int16]
-    done: int
+    completed: int
 
 
 @dataclass(frozen=True)
-class Recorded:
+class StackedRecordings:
     """Recordings one after the other in C-contiguous arrays: `inputs` (samples, inputs), and
     `measured` (samples, seen) with NaN where nothing is known.
 
@@ -36,34 +36,34 @@ class Recorded:
 
     inputs: Reals
     measured: Reals
-    starts: Wholes
-    skips: Wholes
-    linear: Wholes
+    starts: Integers
+    burn_in: Integers
+    is_first_order_hold: Integers
 
 
 @dataclass(frozen=True)
-class Runs:
+class StackedPrediction:
     """What the runs of several recordings gave, one after the other as in a Prediction.
 
     `squares` and `counts` (recordings, seen) are the sums of the squares that count, and how many.
     """
 
-    whole: Prediction
-    starts: Wholes
-    done: Wholes
-    squares: Reals
+    stacked: Prediction
+    starts: Integers
+    completed: Integers
+    squared_sums: Reals
     counts: Reals
 
-    def each(self) -> tuple[Prediction, ...]:
+    def split(self) -> tuple[Prediction, ...]:
         """Return the run of each recording, views of what is here."""
-        whole, edges = self.whole, pairwise(self.starts.tolist())
+        stacked, edges = self.stacked, pairwise(self.starts.tolist())
         return tuple(
             Prediction(
-                whole.innovations[low:high],
-                whole.seen[low:high],
-                whole.states[low:high],
-                whole.modes[low:high],
+                stacked.innovations[low:high],
+                stacked.outputs[low:high],
+                stacked.states[low:high],
+                stacked.modes[low:high],
                 done,
             )
-            for (low, high), done in zip(edges, self.done.tolist(), strict=True)
+            for (low, high), done in zip(edges, self.completed.tolist(), strict=True)
         )

@@ -11,50 +11,50 @@ from pathlib import Path
 from codegen.build import FLAGS, BuildError
 from codegen.tool import output_of
 
-CHECKED = "address,undefined,float-divide-by-zero,float-cast-overflow"
-FOUND = ("runtime error", "ERROR: AddressSanitizer")
+SANITIZERS = "address,undefined,float-divide-by-zero,float-cast-overflow"
+ERROR_MARKERS = ("runtime error", "ERROR: AddressSanitizer")
 APP = "app"
 
 
 @dataclass(frozen=True)
-class Sanitised:
+class SanitizerReport:
     """What a program under sanitizers said: its `lines`, and the first thing that was `found`."""
 
     lines: tuple[str, ...]
-    found: tuple[str, ...]
+    findings: tuple[str, ...]
 
 
-def built(compiler: str, sources: Sequence[Path], folder: Path, beside: str = "") -> Path:
-    """Return the program made of sources, with the sanitizers `beside` the usual ones.
+def build_sanitised(compiler: str, sources: Sequence[Path], folder: Path, extra: str = "") -> Path:
+    """Return the program made of sources, with the sanitizers `extra` the usual ones.
 
     Raises ToolMissing, BuildError.
     """
     flags = [flag for flag in FLAGS if flag != "-O2"]
-    sanitizers = [f"-fsanitize={beside}{CHECKED}", "-fno-sanitize-recover=all"]
+    sanitizers = [f"-fsanitize={extra}{SANITIZERS}", "-fno-sanitize-recover=all"]
     command = [compiler, *flags, "-O1", "-g", *sanitizers, *map(str, sources), "-o", APP, "-lm"]
     output_of(command, folder)
     return folder / APP
 
 
-def ran(
-    app: Path, words: Sequence[str] = (), given: bytes = b"", seconds: float | None = None
-) -> Sanitised:
+def run_sanitised(
+    app: Path, arguments: Sequence[str] = (), stdin: bytes = b"", timeout: float | None = None
+) -> SanitizerReport:
     """Run a program in its folder, for so many seconds at most. Raises BuildError."""
     options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
     try:
         done = subprocess.run(
-            [str(app), *words],
+            [str(app), *arguments],
             cwd=app.parent,
-            input=given,
+            input=stdin,
             capture_output=True,
             env=options,
-            timeout=seconds,
+            timeout=timeout,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiled program was not done after {seconds} s") from None
+        raise BuildError(f"the compiled program was not done after {timeout} s") from None
     lines = tuple(done.stderr.decode(errors="replace").splitlines())
-    found = [line.strip() for line in lines if any(word in line for word in FOUND)]
-    if done.returncode and not found:
-        found = [f"the program ended with {done.returncode}: {' '.join(lines[-1:])}"]
-    return Sanitised(lines, tuple(text.rpartition("/")[2] for text in found[:1]))
+    findings = [line.strip() for line in lines if any(word in line for word in ERROR_MARKERS)]
+    if done.returncode and not findings:
+        findings = [f"the program ended with {done.returncode}: {' '.join(lines[-1:])}"]
+    return SanitizerReport(lines, tuple(text.rpartition("/")[2] for text in findings[:1]))

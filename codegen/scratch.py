@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from codegen.unassigned import unassigned
+from codegen.unassigned import find_unassigned_reads
 from codegen.usage import Usage
-from language.operation import Loop, Run
+from language.operation import Loop, RunBlock
 from language.program import Program, Variable
-from language.traversal import reached, reads, walk
+from language.traversal import names_used, reachable_blocks, walk_ops
 
 STEP = "step"
-MOST_ON_STACK = 128
+MAX_STACK_BYTES = 128
 """Bytes; more is kept in the instance, whose place the caller knows."""
 
 
@@ -28,59 +28,70 @@ class Scratch:
 
     block: str
     size: int
-    early: tuple[Variable, ...]
+    initialised: tuple[Variable, ...]
 
     @property
-    def is_cleared(self) -> bool:
+    def is_zeroed(self) -> bool:
         """Tell whether all of it is 0 when the block begins: there are arrays among the early."""
-        return any(variable.size for variable in self.early)
+        return any(variable.size for variable in self.initialised)
 
     @property
     def is_in_instance(self) -> bool:
         """Tell whether it is a part of the instance, not of the stack."""
-        return self.size > MOST_ON_STACK
+        return self.size > MAX_STACK_BYTES
 
 
 def scratch_of(
-    program: Program, shared: list[Variable], used: Mapping[str, Usage], inside: bool
+    program: Program,
+    shared: list[Variable],
+    usage_by_block: Mapping[str, Usage],
+    allow_inner_block: bool,
 ) -> Scratch | None:
     """Return where the `shared` values of a step live; None where there are none (rule C22).
 
-    `inside` allows for a block that `step` runs.
+    `allow_inner_block` allows for a block that `step` runs.
     """
     if not shared or STEP not in program.blocks:
         return None
     known = frozenset(variable.name for variable in shared)
-    block = _only(program, known, used) if inside else STEP
-    names = unassigned(program, block, known)
-    each = 8 if program.number == "float64" else 4
+    block = _innermost_block(program, known, usage_by_block) if allow_inner_block else STEP
+    names = find_unassigned_reads(program, block, known)
+    each = 8 if program.number_type == "float64" else 4
     size = sum(each * max(1, variable.size) for variable in shared)
     return Scratch(block, size, tuple(v for v in shared if v.name in names))
 
 
-def _only(program: Program, shared: frozenset[str], used: Mapping[str, Usage]) -> str:
+def _innermost_block(
+    program: Program, shared: frozenset[str], usage_by_block: Mapping[str, Usage]
+) -> str:
     """Return the innermost block that `step` runs, once, and that has all of the values."""
     name = STEP
     while True:
         block = program.blocks[name]
-        is_plain = not shared & reads([block]) and not any(
-            isinstance(op, Loop) for op in walk(block)
+        is_plain = not shared & names_used([block]) and not any(
+            isinstance(op, Loop) for op in walk_ops(block)
         )
-        runs = [op.block for op in walk(block) if isinstance(op, Run)]
-        callers = [called for called in runs if "work" in used[called].needs]
+        runs = [op.block for op in walk_ops(block) if isinstance(op, RunBlock)]
+        callers = [called for called in runs if "work" in usage_by_block[called].needs]
         if not is_plain or len(callers) != 1:
             return name
         name = callers[0]
 
 
-def with_own(program: Program, used: Mapping[str, Usage], scratch: Scratch) -> dict[str, Usage]:
+def adjust_usages(
+    program: Program, usage_by_block: Mapping[str, Usage], scratch: Scratch
+) -> dict[str, Usage]:
     """Return what blocks need from outside, where one has the values of a step itself: of all else
     the instance, if they are a part of that.
     """
-    mine = frozenset({"self"} if scratch.is_in_instance else ())
-    found = dict(used)
-    above = {name for name in program.blocks if scratch.block in reached(name, program.blocks)}
-    for name in above:
-        one = used[name]
-        found[name] = Usage((one.needs - {"work"}) | mine, (one.writes - {"work"}) | mine)
-    return found
+    instance = frozenset({"self"} if scratch.is_in_instance else ())
+    adjusted = dict(usage_by_block)
+    callers = {
+        name for name in program.blocks if scratch.block in reachable_blocks(name, program.blocks)
+    }
+    for name in callers:
+        one = usage_by_block[name]
+        adjusted[name] = Usage(
+            (one.needs - {"work"}) | instance, (one.writes - {"work"}) | instance
+        )
+    return adjusted

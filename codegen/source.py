@@ -6,17 +6,17 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from codegen.expression import SUFFIX, literal
-from codegen.fault import why_set
-from codegen.frame import apart
-from codegen.gate import LATCH_EACH, gated
-from codegen.leap import THROUGH, Leaps, leaping
-from codegen.mathematics import math_files
-from codegen.member import CONSTANTS, PAGE, Page, field_of, members
+from codegen.expression import MATH_SUFFIX, format_literal
+from codegen.fault import fault_reason
+from codegen.frame import select_noinline_blocks
+from codegen.gate import LATCH_EACH, merge_range_checks
+from codegen.leap import EVENT_PATH, FastPathMode, add_fast_path
+from codegen.mathematics import emit_math_files
+from codegen.member import ECU_PAGE, HOST_PAGE, PageLayout, member_of, struct_members
 from codegen.names import (
-    REAL,
-    SOLVED_APART,
-    SOLVED_ON_PAGE,
+    C_REAL_TYPE,
+    SOLVED_PREFIX_CONSTANT,
+    SOLVED_PREFIX_ON_PAGE,
     CNames,
     c_member,
     c_type,
@@ -26,46 +26,48 @@ from codegen.names import (
     transition_constants,
     value_constant,
 )
-from codegen.purpose import purpose
-from codegen.rendering import render, version
-from codegen.scratch import STEP, Scratch, scratch_of, with_own
-from codegen.statement import INDENT, WIDTH, Writer
-from codegen.unread import without_unread
-from codegen.usage import Usage, locals_of, turning, usages
-from language.functions import FUNCTIONS_OF
-from language.invariant import GROUP, INVARIANTS
-from language.operation import Run
+from codegen.purpose import describe_function
+from codegen.rendering import product_version, render
+from codegen.scratch import STEP, Scratch, adjust_usages, scratch_of
+from codegen.statement import INDENT, MAX_LINE_WIDTH, StatementEmitter
+from codegen.unread import remove_dead_stores
+from codegen.usage import Usage, block_usages, locals_of, loop_locals
+from language.functions import FUNCTIONS_BY_TYPE
+from language.invariant import INVARIANT_PREFIX, INVARIANTS
+from language.operation import RunBlock
 from language.printing import digest
 from language.program import (
     Program,
     Variable,
 )
-from language.traversal import reads, walk
-from language.wiring import finished
+from language.traversal import names_used, walk_ops
+from language.wiring import finalise_program
 
 ENTRIES = ("init", "derive", "step")
-RARE = (LATCH_EACH, THROUGH, "back_")
+COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")
 """Blocks that are kept out of the way of what a step does nearly always."""
 NOT_INLINED = {
     "RARELY": "Runs rarely: not inlined",
     "NOT_INLINED": "Computes much: its values are on the stack only while it runs",
 }
 """Keywords of functions of a module, with why."""
-STATIC = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
+STATIC_PATTERN = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
 """How the definition of such a function begins, as a pattern."""
-INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
+INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
 
 
-def c_files(program: Program, by_amount: bool = True, leaps: Leaps = "on") -> dict[str, str]:
+def emit_c_files(
+    program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
+) -> dict[str, str]:
     """Return the generated files of a Program by name: one that has a `step`.
 
-    `by_amount` as in `gated`, `leaps` as in `leaping`. A continuous automaton has none where an
+    `by_magnitude` as in `gated`, `fast_path` as in `leaping`. A continuous automaton has none where an
     input varies inside a step: then ValueError.
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
     context = {
-        **module_context(c_program(program, by_amount, leaps), PAGE),
+        **module_context(run_c_passes(program, by_magnitude, fast_path), ECU_PAGE),
         "digest": digest(program),
     }
     files = {
@@ -74,44 +76,56 @@ def c_files(program: Program, by_amount: bool = True, leaps: Leaps = "on") -> di
         f"{program.name}.c": render("module.c.jinja", context),
     }
     if context["uses_math"]:
-        files.update(math_files(program.number))
+        files.update(emit_math_files(program.number_type))
     return files
 
 
-def c_program(program: Program, by_amount: bool = True, leaps: Leaps = "on") -> Program:
+def run_c_passes(
+    program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
+) -> Program:
     """Return the Program that C is printed of: the same bits, in the way that suits C."""
-    return leaping(gated(without_unread(stepped(program), ("work.",)), by_amount), leaps)
+    return add_fast_path(
+        merge_range_checks(remove_dead_stores(restrict_to_step(program), ("work.",)), by_magnitude),
+        fast_path,
+    )
 
 
-def stepped(program: Program) -> Program:
+def restrict_to_step(program: Program) -> Program:
     """Return a Program with only what its `step` runs, as the C has it: no invariants."""
     if program.period is None:
-        return finished(program, ENTRIES)
+        return finalise_program(program, ENTRIES)
     blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
-    variables = tuple(v for v in program.variables if not v.name.startswith(GROUP))
+    variables = tuple(v for v in program.variables if not v.name.startswith(INVARIANT_PREFIX))
     return dataclasses.replace(program, blocks=blocks, variables=variables)
 
 
-def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
+def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
-    number = program.number
-    turned = turning(program)
-    local = locals_of(program, turned)
-    used = usages(program, local, page.holds)
-    kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
-    called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
-    shared = _work(program, local)
-    scratch = scratch_of(program, shared, used, page.holds_solved)
+    number = program.number_type
+    loop_variables = loop_locals(program)
+    local = locals_of(program, loop_variables)
+    usage_by_block = block_usages(program, local, page_layout.groups)
+    kinds = {variable.name: c_type(variable, program.number_type) for variable in program.variables}
+    called_functions = {
+        name.removeprefix("call ") for name in names_used(program.blocks.values()) if " " in name
+    }
+    shared = _shared_work_variables(program, local)
+    scratch = scratch_of(program, shared, usage_by_block, page_layout.holds_solved)
     if scratch and scratch.block != STEP:
-        used = with_own(program, used, scratch)
-    blocks = _blocks(program, local, turned, used, kinds, page, scratch)
+        usage_by_block = adjust_usages(program, usage_by_block, scratch)
+    blocks = _emit_functions(
+        program, local, loop_variables, usage_by_block, kinds, page_layout, scratch
+    )
     return {
-        **_names(program),
-        **members(program, page),
-        "work": [field_of(variable, number) for variable in shared],
-        "scratch": scratch and _scratch(program, scratch, kinds),
-        "work_type": _work_type(program, page, scratch),
-        "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
+        **_name_context(program),
+        **struct_members(program, page_layout),
+        "work": [member_of(variable, number) for variable in shared],
+        "scratch": scratch and _scratch_context(program, scratch, kinds),
+        "work_type": _work_type(program, page_layout, scratch),
+        "calls": {
+            block: f"{block}({', '.join(usage_by_block[block].parameters)})"
+            for block in usage_by_block
+        },
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "keywords": [
@@ -120,19 +134,19 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
             if any(block["keyword"] == word for block in blocks)
         ],
         "has_stamps": "compare_stamps" in program.blocks,
-        "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
-        "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
+        "uses_math": bool(called_functions & {*FUNCTIONS_BY_TYPE[number], *INLINE_FUNCTIONS}),
+        "uses_libm": bool(called_functions & {"abs", "sqrt", "floor"}),
     }
 
 
-def _names(program: Program) -> dict[str, Any]:
+def _name_context(program: Program) -> dict[str, Any]:
     """What the files are called, and the numbers that have names."""
     return {
         "name": program.name,
         "guard": f"{program.name.upper()}_H",
-        "version": version(),
-        "pace": _pace(program),
-        "step": _step(program),
+        "version": product_version(),
+        "pace": _format_pace(program),
+        "step": _describe_step(program),
         "modes": [(mode_constant(program, mode.number), mode.number) for mode in program.modes],
         "regions": [
             (
@@ -148,21 +162,21 @@ def _names(program: Program) -> dict[str, Any]:
             for name, values in enumerations(program)
         ],
         "faults": [
-            (bit, fault, why_set(program, fault)) for bit, fault in enumerate(program.faults)
+            (bit, fault, fault_reason(program, fault)) for bit, fault in enumerate(program.faults)
         ],
         "transitions": program.transitions,
-        "real": REAL[program.number],
-        "suffix": SUFFIX[program.number],
+        "real": C_REAL_TYPE[program.number_type],
+        "suffix": MATH_SUFFIX[program.number_type],
     }
 
 
-def _pace(program: Program) -> str:
+def _format_pace(program: Program) -> str:
     if program.period is None:
         return f"Major step: {program.major_step} s"
     return f"Period: {program.period} s"
 
 
-def _step(program: Program) -> str:
+def _describe_step(program: Program) -> str:
     if program.period is None:
         return (
             f"{program.major_step} s of flow under the inputs of the step before, then those of now"
@@ -170,123 +184,144 @@ def _step(program: Program) -> str:
     return f"One tick of {program.period} s"
 
 
-def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
+def _shared_work_variables(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
     inside = {name for names in local.values() for name in names}
     return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
 
 
-def _work_type(program: Program, page: Page, scratch: Scratch | None) -> str:
+def _work_type(program: Program, page_layout: PageLayout, scratch: Scratch | None) -> str:
     """Return the type of a step's values: where others see it, with the name of the module."""
-    is_seen = page.holds_solved and scratch is not None and scratch.is_in_instance
+    is_seen = page_layout.holds_solved and scratch is not None and scratch.is_in_instance
     return f"{program.name}_Work" if is_seen else "Work"
 
 
-def _scratch(program: Program, scratch: Scratch, kinds: Mapping[str, str]) -> dict[str, Any]:
+def _scratch_context(
+    program: Program, scratch: Scratch, kinds: Mapping[str, str]
+) -> dict[str, Any]:
     return {
         "block": scratch.block,
-        "begun": _begun(program, scratch, kinds),
+        "begun": _initial_assignments(program, scratch, kinds),
         "is_in_instance": scratch.is_in_instance,
     }
 
 
-def _begun(
+def _initial_assignments(
     program: Program, scratch: Scratch, kinds: Mapping[str, str]
 ) -> list[tuple[str, str]] | None:
     """Return what is set when a step begins, and to what; None where all of it is."""
-    if scratch.is_cleared:
+    if scratch.is_zeroed:
         return None
-    zero = {"bool": "false", REAL[program.number]: literal(0.0, program.number)}
-    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in scratch.early]
+    zero = {
+        "bool": "false",
+        C_REAL_TYPE[program.number_type]: format_literal(0.0, program.number_type),
+    }
+    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in scratch.initialised]
 
 
-def _blocks(
+def _emit_functions(
     program: Program,
     local: Mapping[str, frozenset[str]],
-    turned: Mapping[str, frozenset[str]],
-    used: Mapping[str, Usage],
+    loop_variables: Mapping[str, frozenset[str]],
+    usage_by_block: Mapping[str, Usage],
     kinds: Mapping[str, str],
-    page: Page,
+    page_layout: PageLayout,
     scratch: Scratch | None,
 ) -> list[dict[str, Any]]:
     """Return the functions of a module, those that are called first."""
-    own = apart(program)
+    noinline = select_noinline_blocks(program)
     modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
-    found = []
-    for name in _callees_first(program):
-        word = _keyword(name, own)
-        block = _block(program, name, local[name], turned[name], used, kinds, page, scratch, word)
-        found.append({**block, "purpose": purpose(name, modes, run_modes), "keyword": word})
-    return found
+    functions = []
+    for name in _order_callees_first(program):
+        keyword = _inline_keyword(name, noinline)
+        function = _emit_function(
+            program,
+            name,
+            local[name],
+            loop_variables[name],
+            usage_by_block,
+            kinds,
+            page_layout,
+            scratch,
+            keyword,
+        )
+        functions.append(
+            {**function, "purpose": describe_function(name, modes, run_modes), "keyword": keyword}
+        )
+    return functions
 
 
-def _block(
+def _emit_function(
     program: Program,
     name: str,
     local: frozenset[str],
-    turned: frozenset[str],
-    used: Mapping[str, Usage],
+    loop_variables: frozenset[str],
+    usage_by_block: Mapping[str, Usage],
     kinds: Mapping[str, str],
-    page: Page,
+    page_layout: PageLayout,
     scratch: Scratch | None,
     keyword: str,
 ) -> dict[str, Any]:
-    place = CNames(program, local, SOLVED_ON_PAGE if page.holds_solved else SOLVED_APART)
-    writer = Writer(program, used, local - turned, place, kinds)
-    declared = [f"{INDENT}{kinds[n]} {c_member(n)};" for n in sorted(turned)]
+    c_names = CNames(
+        program,
+        local,
+        SOLVED_PREFIX_ON_PAGE if page_layout.holds_solved else SOLVED_PREFIX_CONSTANT,
+    )
+    writer = StatementEmitter(program, usage_by_block, local - loop_variables, c_names, kinds)
+    declared = [f"{INDENT}{kinds[n]} {c_member(n)};" for n in sorted(loop_variables)]
     types = {
         "self": f"{program.name}_Self",
         "cal": f"{program.name}_Cal",
         "in": f"{program.name}_In",
-        "work": _work_type(program, page, scratch),
+        "work": _work_type(program, page_layout, scratch),
     }
-    qualifiers = dict.fromkeys(types, "const ") | {"cal": f"{page.qualifiers} "}
-    usage = used[name]
+    qualifiers = dict.fromkeys(types, "const ") | {"cal": f"{page_layout.qualifiers} "}
+    usage = usage_by_block[name]
     parameters = [
         f"{'' if pointer in usage.writes else qualifiers[pointer]}{types[pointer]} *{pointer}"
         for pointer in usage.parameters
     ]
     return {
         "name": name,
-        "parameters": _listed(f"static {keyword} void {name}(", parameters),
+        "parameters": _format_parameters(f"static {keyword} void {name}(", parameters),
         "needs": usage.needs,
         "lines": [
             *(declared and [*declared, ""]),
-            *(_in_derive(name, line) for line in writer.lines(program.blocks[name])),
+            *(_redirect_derived(name, line) for line in writer.emit_block(program.blocks[name])),
         ],
     }
 
 
-def _keyword(name: str, own: frozenset[str]) -> str:
-    if name.startswith(RARE):
+def _inline_keyword(name: str, noinline: frozenset[str]) -> str:
+    if name.startswith(COLD_BLOCKS):
         return "RARELY"
-    return "NOT_INLINED" if name in own else "inline"
+    return "NOT_INLINED" if name in noinline else "inline"
 
 
-def _listed(opening: str, parameters: Sequence[str]) -> str:
+def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
     """Return what stands between the parentheses of a function, in lines that are not too long."""
     lines = [""]
     for place, parameter in enumerate(parameters):
         text = parameter + ("," if place + 1 < len(parameters) else "")
         start = opening if len(lines) == 1 else INDENT
-        if lines[-1] and len(start) + len(lines[-1]) + len(text) + 2 > WIDTH:
+        if lines[-1] and len(start) + len(lines[-1]) + len(text) + 2 > MAX_LINE_WIDTH:
             lines.append("")
         lines[-1] += f" {text}" if lines[-1] else text
     return f"\n{INDENT}".join(lines) if parameters else "void"
 
 
-def _in_derive(block: str, line: str) -> str:
+def _redirect_derived(block: str, line: str) -> str:
     """`X_Derive` writes through its own pointer, not through an instance."""
     return line.replace("self->derived.", "derived->") if block == "derive" else line
 
 
-def _callees_first(program: Program) -> list[str]:
+def _order_callees_first(program: Program) -> list[str]:
     """Return the blocks so that each comes after those that it runs: no prototypes needed."""
     done: dict[str, None] = {}
 
     def visit(name: str) -> None:
         if name in done:
             return
-        for called in _runs(program, name):
+        for called in _called_blocks(program, name):
             visit(called)
         done[name] = None
 
@@ -295,5 +330,5 @@ def _callees_first(program: Program) -> list[str]:
     return list(done)
 
 
-def _runs(program: Program, name: str) -> list[str]:
-    return [op.block for op in walk(program.blocks[name]) if isinstance(op, Run)]
+def _called_blocks(program: Program, name: str) -> list[str]:
+    return [op.block for op in walk_ops(program.blocks[name]) if isinstance(op, RunBlock)]

@@ -9,16 +9,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from codegen.build import BuildError
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 
 ARM_COMPILER = "arm-none-eabi-gcc"
 ARM_SIZE = "arm-none-eabi-size"
 ARM_OBJECTS = "arm-none-eabi-objdump"
 ARM_LINES = "arm-none-eabi-addr2line"
 EMULATOR = "qemu-system-arm"
-SECONDS = 900
+TOOL_TIMEOUT = 900
 """Longest run of a tool before it is given up."""
-PACKAGES: Mapping[str, str] = {
+DEBIAN_PACKAGES: Mapping[str, str] = {
     "gcc": "gcc libc6-dev",
     "clang-19": "clang-19 libclang-rt-19-dev",
     ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
@@ -34,38 +34,40 @@ PACKAGES: Mapping[str, str] = {
 """Their Debian packages."""
 
 
-def needed(tool: str) -> str:
+def require_tool(tool: str) -> str:
     """Return the name of a tool that is installed. Raises ToolMissing."""
     if shutil.which(tool) is None:
-        package = PACKAGES.get(tool, tool)
-        raise ToolMissing(f"`{tool}` is missing: apt-get install {package}")
+        package = DEBIAN_PACKAGES.get(tool, tool)
+        raise MissingToolError(f"`{tool}` is missing: apt-get install {package}")
     return tool
 
 
-def told(
-    command: Sequence[str], folder: Path, more: Mapping[str, str] | None = None
+def run_tool(
+    command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a tool in a folder, with `more` in its environment. Raises ToolMissing, BuildError."""
+    """Run a tool in a folder, with `extra_environment` in its environment. Raises ToolMissing, BuildError."""
     tool, *words = command
     try:
         return subprocess.run(
-            [needed(tool), *words],
+            [require_tool(tool), *words],
             cwd=folder,
-            env={**os.environ, "PWD": str(folder), **(more or {})},
+            env={**os.environ, "PWD": str(folder), **(extra_environment or {})},
             capture_output=True,
             text=True,
-            timeout=SECONDS,
+            timeout=TOOL_TIMEOUT,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(f"{tool} was not done after {SECONDS} s") from None
+        raise BuildError(f"{tool} was not done after {TOOL_TIMEOUT} s") from None
 
 
-def output_of(command: Sequence[str], folder: Path, more: Mapping[str, str] | None = None) -> str:
-    """Return what a tool prints, with `more` in its environment. Raises ToolMissing; BuildError
+def output_of(
+    command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
+) -> str:
+    """Return what a tool prints, with `extra_environment` in its environment. Raises ToolMissing; BuildError
     with what it said.
     """
-    done = told(command, folder, more)
+    done = run_tool(command, folder, extra_environment)
     if done.returncode:
         raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
     return done.stdout

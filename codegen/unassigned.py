@@ -12,31 +12,31 @@ from language.operation import (
     Binary,
     Block,
     Branch,
-    Choose,
     Expr,
     Item,
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Store,
+    Switch,
     Value,
 )
-from language.program import MODE, Program
-from language.substitution import own_expressions, subexpressions
+from language.program import MODE_VARIABLE, Program
+from language.substitution import direct_expressions, walk_post_order
 
 WORK = "work."
-Set = frozenset[str]
+NameSet = frozenset[str]
 
 
-def unassigned(program: Program, entry: str, shared: frozenset[str]) -> frozenset[str]:
+def find_unassigned_reads(program: Program, entry: str, shared: frozenset[str]) -> frozenset[str]:
     """Return the shared work variables that an entry may read before it sets them."""
-    way = _Way(program, shared)
-    way.run(program.blocks[entry], frozenset())
-    return frozenset(way.found)
+    analysis = _AssignmentAnalysis(program, shared)
+    analysis.analyse_block(program.blocks[entry], frozenset())
+    return frozenset(analysis.unassigned_reads)
 
 
-class _Way:
+class _AssignmentAnalysis:
     """A way through the blocks of a Program, with what is set on every branch of it."""
 
     def __init__(self, program: Program, shared: frozenset[str]) -> None:
@@ -44,79 +44,79 @@ class _Way:
         self.shared = shared
         self.sizes = {v.name: v.size for v in program.variables if v.size}
         self.modes = {mode.number for mode in program.modes}
-        self.known: dict[tuple[str, Set, frozenset[tuple[str, int]]], Set] = {}
-        self.turn: dict[str, int] = {}
-        self.found: set[str] = set()
+        self.summaries: dict[tuple[str, NameSet, frozenset[tuple[str, int]]], NameSet] = {}
+        self.loop_indices: dict[str, int] = {}
+        self.unassigned_reads: set[str] = set()
 
-    def run(self, block: Block, done: Set) -> Set:
-        """Return what is set behind a block, of which `done` is set before it."""
+    def analyse_block(self, block: Block, assigned: NameSet) -> NameSet:
+        """Return what is set behind a block, of which `assigned` is set before it."""
         for op in block:
-            for expr in own_expressions(op):
-                self._read(expr, done)
-            done = self._behind(op, done)
-        return done
+            for expr in direct_expressions(op):
+                self._check_reads(expr, assigned)
+            assigned = self._analyse_op(op, assigned)
+        return assigned
 
-    def _behind(self, op: Op, done: Set) -> Set:
+    def _analyse_op(self, op: Op, assigned: NameSet) -> NameSet:
         match op:
             case Assign(target, _, _):
-                return done | {target}
+                return assigned | {target}
             case Store(array, index, _):
-                place = _number(index, self.turn)
-                return done if place is None else done | {f"{array}[{place}]"}
+                place = _index_value(index, self.loop_indices)
+                return assigned if place is None else assigned | {f"{array}[{place}]"}
             case Branch(_, then, other):
-                return self.run(then, done) & self.run(other, done)
-            case Choose(selector, cases):
-                self._read(Ref(selector), done)
-                ends = [self.run(case, done) for _, case in cases]
-                every = self.modes if selector == MODE else set()
+                return self.analyse_block(then, assigned) & self.analyse_block(other, assigned)
+            case Switch(selector, cases):
+                self._check_reads(Ref(selector), assigned)
+                ends = [self.analyse_block(case, assigned) for _, case in cases]
+                every = self.modes if selector == MODE_VARIABLE else set()
                 if every and {number for number, _ in cases} >= every:
                     return frozenset.intersection(*ends)
-                return done  # none of them may be taken
+                return assigned  # none of them may be taken
             case Loop(count, index, body) if count:
-                return self._loop(count, index, body, done | {index})
-            case Run(name):
-                key = name, done, frozenset(self.turn.items())
-                if key not in self.known:
-                    self.known[key] = self.run(self.program.blocks[name], done)
-                return self.known[key]
+                return self._analyse_loop(count, index, body, assigned | {index})
+            case RunBlock(name):
+                key = name, assigned, frozenset(self.loop_indices.items())
+                if key not in self.summaries:
+                    self.summaries[key] = self.analyse_block(self.program.blocks[name], assigned)
+                return self.summaries[key]
             case _:
-                return done
+                return assigned
 
-    def _loop(self, count: int, index: str, body: Block, done: Set) -> Set:
+    def _analyse_loop(self, count: int, index: str, body: Block, assigned: NameSet) -> NameSet:
         """Follow each turn of a loop that fills arrays, and the first of any other."""
         if not any(isinstance(op, Store) for op in body):
-            return self.run(body, done)
+            return self.analyse_block(body, assigned)
         for turn in range(count):
-            self.turn[index] = turn
-            done = self.run(body, done)
-        del self.turn[index]
-        return done
+            self.loop_indices[index] = turn
+            assigned = self.analyse_block(body, assigned)
+        del self.loop_indices[index]
+        return assigned
 
-    def _read(self, expr: Expr, done: Set) -> None:
-        for part in subexpressions(expr):
+    def _check_reads(self, expr: Expr, assigned: NameSet) -> None:
+        for part in walk_post_order(expr):
             if isinstance(part, Ref):
-                if part.name in self.shared and part.name not in done:
-                    self.found.add(part.name)
+                if part.name in self.shared and part.name not in assigned:
+                    self.unassigned_reads.add(part.name)
             elif isinstance(part, Item) and part.name in self.shared:
-                elements = set(_elements(part, self.sizes[part.name], self.turn))
-                self.found.update({part.name} if elements - done else ())
+                elements = set(_elements(part, self.sizes[part.name], self.loop_indices))
+                self.unassigned_reads.update({part.name} if elements - assigned else ())
 
 
-def _elements(item: Item, size: int, turn: Mapping[str, int]) -> Iterator[str]:
-    place = _number(item.index, turn)
+def _elements(item: Item, size: int, loop_indices: Mapping[str, int]) -> Iterator[str]:
+    place = _index_value(item.index, loop_indices)
     places = range(size) if place is None else (place,)
     yield from (f"{item.name}[{k}]" for k in places)
 
 
-def _number(index: Expr, turn: Mapping[str, int]) -> int | None:
+def _index_value(index: Expr, loop_indices: Mapping[str, int]) -> int | None:
     """Return what an index is in a turn of loops; None if that hangs on something else."""
     match index:
         case Value(value):
             return int(value)
         case Ref(name):
-            return turn.get(name)
+            return loop_indices.get(name)
         case Binary("+" | "-" as operator, left, right):
-            first, second = _number(left, turn), _number(right, turn)
+            first, second = _index_value(left, loop_indices), _index_value(right, loop_indices)
             if first is None or second is None:
                 return None
             return first + second if operator == "+" else first - second

@@ -6,20 +6,20 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.unassigned import unassigned
+from codegen.unassigned import find_unassigned_reads
 from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Loop,
-    Run,
+    RunBlock,
+    Switch,
 )
 from language.program import Program
-from language.stepping import BETWEEN
-from language.traversal import block_reads, block_writes, reached, walk
+from language.stepping import STEP_INTERFACE
+from language.traversal import block_reads, block_writes, reachable_blocks, walk_ops
 
-GROUP_OF = {
+POINTER_OF_GROUP = {
     "input": "in",
     "is_new": "in",
     "work": "work",
@@ -34,8 +34,8 @@ GROUP_OF = {
     "memory": "self",
     "derived": "self",
 }
-ON_PAGE = frozenset({"calibration"})
-ORDER = ("self", "cal", "in", "work")
+PAGE_GROUPS = frozenset({"calibration"})
+POINTER_ORDER = ("self", "cal", "in", "work")
 
 
 @dataclass(frozen=True)
@@ -48,85 +48,100 @@ class Usage:
     @property
     def parameters(self) -> tuple[str, ...]:
         """The pointers in the order in which functions take them."""
-        return tuple(name for name in ORDER if name in self.needs)
+        return tuple(name for name in POINTER_ORDER if name in self.needs)
 
 
-def usages(
-    program: Program, local: Mapping[str, frozenset[str]], on_page: frozenset[str] = ON_PAGE
+def block_usages(
+    program: Program, local: Mapping[str, frozenset[str]], page_groups: frozenset[str] = PAGE_GROUPS
 ) -> dict[str, Usage]:
     """Return the usage of every block; `local` are the variables that live inside a block,
-    `on_page` the groups of constants that the calibration page has.
+    `page_groups` the groups of constants that the calibration page has.
     """
-    groups = {**GROUP_OF, **dict.fromkeys(on_page, "cal")}
-    found: dict[str, Usage] = {}
+    groups = {**POINTER_OF_GROUP, **dict.fromkeys(page_groups, "cal")}
+    usage_by_block: dict[str, Usage] = {}
 
     def visit(name: str) -> Usage:
-        if name not in found:
+        if name not in usage_by_block:
             read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
             written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
             needs = {groups.get(n.partition(".")[0], "") for n in read | written} - {""}
             writes = {groups.get(n.partition(".")[0], "") for n in written} - {""}
-            for op in walk(program.blocks[name]):
-                if isinstance(op, Run):
+            for op in walk_ops(program.blocks[name]):
+                if isinstance(op, RunBlock):
                     inner = visit(op.block)
                     needs |= inner.needs
                     writes |= inner.writes
-            found[name] = Usage(frozenset(needs), frozenset(writes))
-        return found[name]
+            usage_by_block[name] = Usage(frozenset(needs), frozenset(writes))
+        return usage_by_block[name]
 
     for name in program.blocks:
         visit(name)
-    return found
+    return usage_by_block
 
 
 def locals_of(
-    program: Program, turned: Mapping[str, frozenset[str]] | None = None
+    program: Program, loop_variables: Mapping[str, frozenset[str]] | None = None
 ) -> dict[str, frozenset[str]]:
     """Return, per block, the work variables that live inside it: set once, then read there, or
-    those that have `turned` (see `turning`).
+    those that have `loop_variables` (see `turning`).
 
     A variable that some block reads without having set it is shared by the blocks.
     """
-    once = {name: _set_once(block) for name, block in program.blocks.items()}
+    assigned_once = {name: _assigned_once(block) for name, block in program.blocks.items()}
     shared = {variable.name for variable in program.variables if variable.size}
     for name, block in program.blocks.items():
         used = {n for n in (*block_reads(block), *block_writes(block)) if n.startswith("work.")}
-        shared |= used - once[name]
-    found, turned = {}, turning(program) if turned is None else turned
+        shared |= used - assigned_once[name]
+    local_variables, loop_variables = (
+        {},
+        loop_locals(program) if loop_variables is None else loop_variables,
+    )
     for name, block in program.blocks.items():
-        loops = {op.index for op in walk(block) if isinstance(op, Loop)}
-        found[name] = frozenset((once[name] - shared) | loops | turned[name])
-    return found
+        loops = {op.index for op in walk_ops(block) if isinstance(op, Loop)}
+        local_variables[name] = frozenset(
+            (assigned_once[name] - shared) | loops | loop_variables[name]
+        )
+    return local_variables
 
 
-def turning(program: Program) -> dict[str, frozenset[str]]:
+def loop_locals(program: Program) -> dict[str, frozenset[str]]:
     """Return, per block, the work variables that live inside it, and that its loops set.
 
     Every block that has one sets it before it reads it, and runs none that has it too.
     """
-    loops = [op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop)]
-    known = {n for op in loops for n in block_writes(op.body) if n.startswith("work.")}
-    known -= {*BETWEEN, *(op.index for op in loops), *(v.name for v in program.variables if v.size)}
-    if not known:
+    loops = [
+        op for block in program.blocks.values() for op in walk_ops(block) if isinstance(op, Loop)
+    ]
+    candidates = {n for op in loops for n in block_writes(op.body) if n.startswith("work.")}
+    candidates -= {
+        *STEP_INTERFACE,
+        *(op.index for op in loops),
+        *(v.name for v in program.variables if v.size),
+    }
+    if not candidates:
         return dict.fromkeys(program.blocks, frozenset())
-    has = {
-        name: (known & set(block_reads(block)), known & set(block_writes(block)))
+    accesses = {
+        name: (candidates & set(block_reads(block)), candidates & set(block_writes(block)))
         for name, block in program.blocks.items()
     }
-    for name, (read, written) in has.items():
-        known -= read ^ written
-        below = reached(name, program.blocks) - {name}
-        known -= read & {n for other in below for names in has[other] for n in names}
-        known -= unassigned(program, name, frozenset(read & known)) if read & known else set()
-    return {name: frozenset(read & known) for name, (read, _) in has.items()}
+    for name, (read, written) in accesses.items():
+        candidates -= read ^ written
+        below = reachable_blocks(name, program.blocks) - {name}
+        candidates -= read & {n for other in below for names in accesses[other] for n in names}
+        candidates -= (
+            find_unassigned_reads(program, name, frozenset(read & candidates))
+            if read & candidates
+            else set()
+        )
+    return {name: frozenset(read & candidates) for name, (read, _) in accesses.items()}
 
 
-def _set_once(block: Block) -> set[str]:
+def _assigned_once(block: Block) -> set[str]:
     """Work variables assigned exactly once, and read only in the same list of operations."""
-    counts = Counter(op.target for op in walk(block) if isinstance(op, Assign))
+    counts = Counter(op.target for op in walk_ops(block) if isinstance(op, Assign))
     outside = Counter(block_reads(block))
-    found: set[str] = set()
-    for ops in _lists(block):
+    names: set[str] = set()
+    for ops in _nested_blocks(block):
         inside: Counter[str] = Counter()
         assigned: set[str] = set()
         for op in ops:
@@ -134,21 +149,21 @@ def _set_once(block: Block) -> set[str]:
             inside.update(fresh)
             if isinstance(op, Assign) and counts[op.target] == 1 and not inside[op.target]:
                 assigned.add(op.target)
-        found |= {n for n in assigned if n.startswith("work.") and 0 < inside[n] == outside[n]}
-    return found
+        names |= {n for n in assigned if n.startswith("work.") and 0 < inside[n] == outside[n]}
+    return names
 
 
-def _lists(block: Block) -> Iterator[Block]:
+def _nested_blocks(block: Block) -> Iterator[Block]:
     yield block
     for op in block:
         match op:
             case Branch(_, then, other):
-                yield from _lists(then)
-                yield from _lists(other)
-            case Choose(_, cases):
+                yield from _nested_blocks(then)
+                yield from _nested_blocks(other)
+            case Switch(_, cases):
                 for _, case_block in cases:
-                    yield from _lists(case_block)
+                    yield from _nested_blocks(case_block)
             case Loop(_, _, body):
-                yield from _lists(body)
+                yield from _nested_blocks(body)
             case _:
                 pass

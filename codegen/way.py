@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from codegen.statement import opposite
+from codegen.statement import negate_condition
 from language.evaluate import evaluate
 from language.operation import (
     Assign,
@@ -14,40 +14,40 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Expr,
     FaultBit,
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
+    Switch,
     Unary,
     Value,
 )
 from language.program import Program, Variable
-from language.substitution import parts, with_expressions, with_parts
+from language.substitution import map_expressions, map_operands, operands
 from language.traversal import block_reads, block_writes, expr_names
 
-WORK, LEFT, CROSSED = "work.", "work.left", "work.crossed"
-LOOKS, PLACE = ("rates_", "guards_"), "work.at_"
+WORK, TIME_LEFT, CROSSED = "work.", "work.left", "work.crossed"
+EVALUATION_BLOCKS, POINT_STATE_PREFIX = ("rates_", "guards_"), "work.at_"
 """Blocks that look at a point of the step, and how the states there are called."""
 
 
 @dataclass(frozen=True)
-class Made:
+class PathValue:
     """One value of a `variable` of the Program, at a point of the step."""
 
     variable: Variable
     point: int
 
 
-class NotPlain(Exception):
+class NotSpecialisable(Exception):
     """What happens hangs on more than the guards of the mode."""
 
 
-class Way:
+class ExecutionPath:
     """A way without a crossing: `known` are the values of variables, `ops` what is done on it.
 
     What comes before the guards is in `first`; `quiet` is whether none of these changed. In `made`
@@ -58,92 +58,95 @@ class Way:
     def __init__(self, program: Program, known: dict[str, Expr]) -> None:
         self.program = program
         self.known = known
-        self.made: dict[str, Made] = {}
+        self.values: dict[str, PathValue] = {}
         self.points = 1
-        self.quiet: Expr = Value(True)
-        self.first: list[Op] = []
-        self.ops = self.first
-        self._of = {variable.name: variable for variable in program.variables}
+        self.is_event_free: Expr = Value(True)
+        self.prologue: list[Op] = []
+        self.ops = self.prologue
+        self._variable_by_name = {variable.name: variable for variable in program.variables}
         self._versions: Counter[str] = Counter()
-        self._numbers: dict[Hashable, int] = {}
-        self._number_of: dict[str, int | None] = {}
-        self._named: dict[int, str] = {}
-        self._has_looked = False
+        self._value_numbers: dict[Hashable, int] = {}
+        self._number_by_name: dict[str, int | None] = {}
+        self._name_by_number: dict[int, str] = {}
+        self._has_evaluated = False
 
     @property
-    def is_sure(self) -> bool:
+    def is_unconditional(self) -> bool:
         """Tell whether there are no guards."""
-        return self.quiet == Value(True)
+        return self.is_event_free == Value(True)
 
-    def keep(self, equations: Block, stays: tuple[str, ...]) -> None:
-        """Keep what equations were when the step before ended, if all that they read `stays` until
+    def reuse_equations(self, equations: Block, constant_groups: tuple[str, ...]) -> None:
+        """Keep what equations were when the step before ended, if all that they read `constant_groups` until
         this one begins: a page may turn between them.
         """
-        kept = set[str]()
+        reused = set[str]()
         for op in equations:
             if isinstance(op, Assign):
-                value = self._plainly(op.value)
-                if all(n in kept or n.startswith((*stays, "call ")) for n in expr_names(value)):
-                    kept.add(op.target)
-                    self._number_of[op.target] = number = self._number(value)
+                value = self._fold_constants(op.value)
+                if all(
+                    n in reused or n.startswith((*constant_groups, "call "))
+                    for n in expr_names(value)
+                ):
+                    reused.add(op.target)
+                    self._number_by_name[op.target] = number = self._value_number(value)
                     if number is not None and not op.target.startswith(WORK):
-                        self._named.setdefault(number, op.target)
+                        self._name_by_number.setdefault(number, op.target)
 
     def follow(self, block: Block) -> None:
         """Follow the operations of a block. Raises NotPlain."""
         for op in block:
             match op:
                 case Assign(target, value, key):
-                    self._assign(target, self._read(value), key)
+                    self._assign(target, self._resolve(value), key)
                 case Branch(condition, then, other):
-                    self._branch(self._read(condition), then, other)
-                case Choose(selector, cases):
-                    number = self._read(Ref(selector))
+                    self._branch(self._resolve(condition), then, other)
+                case Switch(selector, cases):
+                    number = self._resolve(Ref(selector))
                     if not isinstance(number, Value):
-                        raise NotPlain
+                        raise NotSpecialisable
                     self.follow(dict(cases).get(int(number.value), ()))
                 case Loop(count, _, body):
                     self._loop(count, body)
-                case Run(name):
+                case RunBlock(name):
                     self.follow(self.program.blocks[name])
-                    self._has_looked = self._has_looked or name.startswith(LOOKS)
+                    self._has_evaluated = self._has_evaluated or name.startswith(EVALUATION_BLOCKS)
                 case _:
-                    raise NotPlain
+                    raise NotSpecialisable
 
-    def end(self) -> None:
+    def follow_step_end(self) -> None:
         """Follow the end of a step: equations, unless what happened settles first."""
-        event, begin = self._read(Ref("work.event")), len(self.ops)
+        event, begin = self._resolve(Ref("work.event")), len(self.ops)
         try:
             self.follow(self.program.blocks["equations"])
-        except NotPlain:
-            self.ops[begin:] = [Run("equations")]
+        except NotSpecialisable:
+            self.ops[begin:] = [RunBlock("equations")]
         if event != Value(False):
             now = tuple(self.ops[begin:])
-            self.ops[begin:] = [Branch(event, (Run("settle"), Run("equations")), now)]
+            self.ops[begin:] = [Branch(event, (RunBlock("settle"), RunBlock("equations")), now)]
 
     def _assign(self, target: str, value: Expr, key: str) -> None:
-        if self._has_looked and target.startswith(PLACE):
-            self._has_looked = False
+        if self._has_evaluated and target.startswith(POINT_STATE_PREFIX):
+            self._has_evaluated = False
             self.points += 1
         if target == CROSSED:
-            self.quiet = Value(True) if value == Value(False) else opposite(value)
+            self.is_event_free = Value(True) if value == Value(False) else negate_condition(value)
             value = Value(False)
             self.ops = []
-        number = self._number(value)
-        if number in self._named and not isinstance(value, Value | Ref):
-            value = Ref(self._named[number])
+        number = self._value_number(value)
+        if number in self._name_by_number and not isinstance(value, Value | Ref):
+            value = Ref(self._name_by_number[number])
         self._versions[target] += 1
         if target.startswith(WORK) and not isinstance(value, Value | Ref):
             name = f"{target}_{self._versions[target]}"
-            self.made[name] = Made(self._of[target], self.points)
+            self.values[name] = PathValue(self._variable_by_name[target], self.points)
             self.ops.append(Assign(name, value, key))
-            self._name(name, number)
+            self._record_name(name, number)
             value = Ref(name)
         elif not target.startswith(WORK):
             if value != Ref(target):
                 self.ops.append(Assign(target, value, key))
-            self._forget(target)
-            self._name(target, number)
+            self._invalidate(target)
+            self._record_name(target, number)
         if isinstance(value, Value | Ref):
             self.known[target] = value
 
@@ -153,18 +156,18 @@ class Way:
         """
         if isinstance(condition, Value):
             return self.follow(then if condition.value else other)
-        if _sets_lasting(then) and _sets_lasting(other):
-            arms = (with_expressions(arm, self._read) for arm in (then, other))
+        if _writes_only_persistent(then) and _writes_only_persistent(other):
+            arms = (map_expressions(arm, self._resolve) for arm in (then, other))
             self.ops.append(Branch(condition, *arms))
             for name in block_writes((*then, *other)):
-                self._forget(name)
+                self._invalidate(name)
             return None
         before, ops, count = dict(self.known), self.ops, len(self.ops)
         self.follow(then)
         one, self.known = self.known, before
         self.follow(other)
         if self.known != one or self.ops is not ops or len(ops) != count:
-            raise NotPlain
+            raise NotSpecialisable
 
     def _loop(self, count: int, body: Block) -> None:
         """Follow each turn of a loop until one does nothing, and so all after it."""
@@ -173,39 +176,41 @@ class Way:
             self.follow(body)
             if self.known == before and len(self.ops) == done:
                 return
-        raise NotPlain
+        raise NotSpecialisable
 
-    def _read(self, expr: Expr) -> Expr:
+    def _resolve(self, expr: Expr) -> Expr:
         """Return an expression of what is known. Raises NotPlain for a value that is not."""
         if isinstance(expr, Ref):
             if expr.name not in self.known and expr.name.startswith(WORK):
-                raise NotPlain
+                raise NotSpecialisable
             return self.known.get(expr.name, expr)
-        return _simple(with_parts(expr, self._read), self.program)
+        return _simplify(map_operands(expr, self._resolve), self.program)
 
-    def _plainly(self, expr: Expr) -> Expr:
+    def _fold_constants(self, expr: Expr) -> Expr:
         """Return an expression with the numbers that are known."""
         if isinstance(expr, Ref):
             known = self.known.get(expr.name)
             return known if isinstance(known, Value) else expr
-        return _simple(with_parts(expr, self._plainly), self.program)
+        return _simplify(map_operands(expr, self._fold_constants), self.program)
 
-    def _forget(self, name: str) -> None:
+    def _invalidate(self, name: str) -> None:
         """A variable is another value from here."""
         self._versions[name] += 1
-        self._number_of.pop(name, None)
-        self._named = {number: held for number, held in self._named.items() if held != name}
+        self._number_by_name.pop(name, None)
+        self._name_by_number = {
+            number: held for number, held in self._name_by_number.items() if held != name
+        }
         self.known.pop(name, None)
         known = self.known.items()
         for other in [n for n, held in known if isinstance(held, Ref) and held.name == name]:
             del self.known[other]
 
-    def _name(self, name: str, number: int | None) -> None:
-        self._number_of[name] = number
+    def _record_name(self, name: str, number: int | None) -> None:
+        self._number_by_name[name] = number
         if number is not None:
-            self._named.setdefault(number, name)
+            self._name_by_number.setdefault(number, name)
 
-    def _number(self, value: Expr) -> int | None:
+    def _value_number(self, value: Expr) -> int | None:
         """Return the number of a value; equal operations on equal numbers have equal ones, as in
         language/common.py, and a name has that of its value.
         """
@@ -213,22 +218,22 @@ class Way:
         match value:
             case Value(known):
                 key = repr(known)
-            case Ref(name) if name in self._number_of:
-                return self._number_of[name]
+            case Ref(name) if name in self._number_by_name:
+                return self._number_by_name[name]
             case Ref(name):
                 key = name, self._versions[name]
             case Binary(operator, left, right) | Compare(operator, left, right):
-                key = operator, self._number(left), self._number(right)
+                key = operator, self._value_number(left), self._value_number(right)
             case Unary(operator, operand):
-                key = operator, self._number(operand)
+                key = operator, self._value_number(operand)
             case Call(function, arguments):
-                key = function, *(self._number(argument) for argument in arguments)
+                key = function, *(self._value_number(argument) for argument in arguments)
         if key is None or (isinstance(key, tuple) and None in key):
             return None
-        return self._numbers.setdefault(key, len(self._numbers))
+        return self._value_numbers.setdefault(key, len(self._value_numbers))
 
 
-def _sets_lasting(block: Block) -> bool:
+def _writes_only_persistent(block: Block) -> bool:
     """Tell whether all that a block does is to set what stays when the step ends, from other
     values.
     """
@@ -237,7 +242,7 @@ def _sets_lasting(block: Block) -> bool:
     return is_plain and not any(n.startswith(WORK) or n in set(block_reads(block)) for n in writes)
 
 
-def _simple(expr: Expr, program: Program) -> Expr:
+def _simplify(expr: Expr, program: Program) -> Expr:
     """Return an expression whose parts are simple as a simple one."""
     match expr:
         case Select(Value(condition), then, other):
@@ -246,7 +251,7 @@ def _simple(expr: Expr, program: Program) -> Expr:
             return rest if known else Value(False)
         case Binary("or", Value(known), rest) | Binary("or", rest, Value(known)):
             return Value(True) if known else rest
-    inner = parts(expr)
+    inner = operands(expr)
     if inner and all(isinstance(part, Value) for part in inner):
-        return Value(evaluate(expr, {}, program.number))
+        return Value(evaluate(expr, {}, program.number_type))
     return expr

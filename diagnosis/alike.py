@@ -8,38 +8,42 @@ from statistics import median
 
 import numpy as np
 
-from diagnosis.consistency import SMOOTH_GAIN, Relation, relation_of
-from diagnosis.disagreement import MOST, OFFSET_WARNING, SAME_CLOCK
+from diagnosis.consistency import GAIN_SMOOTHING_STD, OutputAgreement, compare_signals
+from diagnosis.disagreement import CLOCK_TOLERANCE, OFFSET_WARNING, SHARED_FRACTION
 from diagnosis.excitation import is_speed
 from diagnosis.finding import Finding, Severity
-from diagnosis.free_run import Compared
-from engine.recording import Channel, Recording, pieces
+from diagnosis.free_run import OutputComparison
+from engine.recording import Channel, Recording, split_by_windows
 
-ONE_MOTION = 0.9
+MIN_CORRELATION = 0.9
 """Correlation of the rates of change from which two speeds are taken for one motion."""
-LARGEST_OFFSET = 0.6
+MAX_OFFSET = 0.6
 """Larger ones [s] are periods of the motion rather than clocks."""
 
 
-def alike(recordings: Sequence[Recording]) -> list[Finding]:
+def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
     """Return what is to be told of speeds that go together but for a sign or a clock.
 
     What is so in most of several recordings is an error, in a single one a warning.
     """
-    found: dict[tuple[str, str], list[Relation]] = {}
+    found: dict[tuple[str, str], list[OutputAgreement]] = {}
     for recording in recordings:
         speeds = [channel for channel in recording.channels.values() if is_speed(channel)]
         for first, second in itertools.combinations(speeds, 2):
-            relation = _relation(recording, first, second)
-            if relation is not None and abs(relation.correlation) >= ONE_MOTION:
+            agreement = _compare_speeds(recording, first, second)
+            if agreement is not None and abs(agreement.correlation) >= MIN_CORRELATION:
                 key = first.column.name, second.column.name
-                found.setdefault(key, []).append(relation)
-    return [finding for pair, each in found.items() for finding in _told(*pair, each)]
+                found.setdefault(key, []).append(agreement)
+    return [
+        finding for pair, each in found.items() for finding in _redundancy_findings(*pair, each)
+    ]
 
 
-def _relation(recording: Recording, first: Channel, second: Channel) -> Relation | None:
+def _compare_speeds(
+    recording: Recording, first: Channel, second: Channel
+) -> OutputAgreement | None:
     """Return how the second speed goes with the first in the longest piece."""
-    piece = max(pieces(recording), key=lambda piece: piece.end - piece.start)
+    piece = max(split_by_windows(recording), key=lambda piece: piece.end - piece.start)
     one = piece.channels.get(first.column.name)
     other = piece.channels.get(second.column.name)
     if one is None or other is None:
@@ -51,19 +55,21 @@ def _relation(recording: Recording, first: Channel, second: Channel) -> Relation
         return None
     times = other.seconds[inside]
     same = np.interp(times, one.seconds, one.array)
-    compared = Compared(other.column.name, times, other.array[inside], same)
-    return relation_of(recording.name, other.column.name, compared, SMOOTH_GAIN)
+    compared = OutputComparison(other.column.name, times, other.array[inside], same)
+    return compare_signals(recording.name, other.column.name, compared, GAIN_SMOOTHING_STD)
 
 
-def _told(first: str, second: str, each: Sequence[Relation]) -> list[Finding]:
+def _redundancy_findings(
+    first: str, second: str, agreements: Sequence[OutputAgreement]
+) -> list[Finding]:
     both = f"`{first}` and `{second}` are one motion"
-    severity: Severity = "error" if len(each) > 1 else "warning"
-    where = each[0].recording if len(each) == 1 else ""
-    if sum(relation.gain < 0.0 for relation in each) > MOST * len(each):
+    severity: Severity = "error" if len(agreements) > 1 else "warning"
+    where = agreements[0].recording if len(agreements) == 1 else ""
+    if sum(agreement.gain < 0.0 for agreement in agreements) > SHARED_FRACTION * len(agreements):
         return [Finding("sign", where, second, f"{both} with opposite signs", severity)]
-    lag = median(relation.believed_lag for relation in each)
-    same = sum(abs(relation.believed_lag - lag) <= SAME_CLOCK for relation in each)
-    if OFFSET_WARNING <= abs(lag) <= LARGEST_OFFSET and same > MOST * len(each):
+    lag = median(agreement.significant_lag for agreement in agreements)
+    same = sum(abs(agreement.significant_lag - lag) <= CLOCK_TOLERANCE for agreement in agreements)
+    if OFFSET_WARNING <= abs(lag) <= MAX_OFFSET and same > SHARED_FRACTION * len(agreements):
         late = second if lag > 0.0 else first
         text = f"{both}, but the clock of `{late}` is {abs(lag):.2f} s late"
         return [Finding("clock_offset", where, late, text, severity)]

@@ -11,21 +11,27 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Predictor, built, columns_of
-from diagnosis.layers import DRIFT, Layer, automaton, fewest_steps, stepped
-from diagnosis.recipe import Recipe, kept, node_text, recipe_key
-from diagnosis.series import Series
-from diagnosis.uncertain import Uncertain, uncertain_of
+from codegen.predictor import Predictor, build_predictor, columns_of
+from diagnosis.layers import (
+    DISTURBANCE_STATE,
+    PlacedEffect,
+    automaton_with_effects,
+    lower_tunable_program,
+    minimum_substeps,
+)
+from diagnosis.recipe import CompiledModel, cache_key, load_or_compile, node_text
+from diagnosis.series import SampledRecording
+from diagnosis.uncertain import FreeParameter, free_parameters_of
 from language.declaration import Formula, Parameter
 from language.document import Document
-from language.effect import own_names
-from language.memory import applications
+from language.effect import added_names
+from language.memory import memory_calls_by_key
 from language.model import Automaton
 from language.project import Project
 from language.syntax import Name, names
 
 Reals = NDArray[np.float64]
-START = "start_of_{}"
+INITIAL_VALUE_NAME = "start_of_{}"
 """The tunable that the start value of a compared state becomes."""
 
 
@@ -36,156 +42,181 @@ class Candidate:
     `levels` are those of its noises, where a fit may move these beside its parameters.
     """
 
-    layers: tuple[Layer, ...]
-    recipe: Recipe
+    placed_effects: tuple[PlacedEffect, ...]
+    compiled: CompiledModel
     predictor: Predictor
-    levels: tuple[Uncertain, ...] = ()
+    noise_parameters: tuple[FreeParameter, ...] = ()
 
     @cached_property
-    def uncertain(self) -> tuple[Uncertain, ...]:
+    def free_parameters(self) -> tuple[FreeParameter, ...]:
         """What a fit may move: parameters, behind them levels."""
-        return self.recipe.uncertain + self.levels
+        return self.compiled.uncertain + self.noise_parameters
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of the uncertain parameters."""
-        return tuple(one.name for one in self.uncertain)
+        return tuple(one.name for one in self.free_parameters)
 
     @property
-    def drifts(self) -> tuple[str, ...]:
+    def disturbance_states(self) -> tuple[str, ...]:
         """The states that drift."""
-        return self.recipe.drifts
+        return self.compiled.drifts
 
     @cached_property
-    def spans(self) -> Reals:
+    def state_ranges(self) -> Reals:
         """The width of the range of each state (states,), 1 where it has none."""
-        return np.array(self.recipe.spans)
+        return np.array(self.compiled.spans)
 
     @cached_property
-    def brought(self) -> NDArray[np.bool_]:
+    def is_effect_state(self) -> NDArray[np.bool_]:
         """Which states effects have brought (states,)."""
-        return np.array(self.recipe.brought, dtype=np.bool_)
+        return np.array(self.compiled.brought, dtype=np.bool_)
 
     @cached_property
-    def own(self) -> NDArray[np.bool_]:
+    def is_per_recording(self) -> NDArray[np.bool_]:
         """Which parameters each recording has of its own (parameters,)."""
-        return np.array([one.per_recording for one in self.uncertain], dtype=np.bool_)
+        return np.array([one.per_recording for one in self.free_parameters], dtype=np.bool_)
 
     @cached_property
     def bounds(self) -> Reals:
         """The ranges as coordinates (parameters, 2)."""
-        ranges = [one.bounds for one in self.uncertain]
+        ranges = [one.bounds for one in self.free_parameters]
         return np.array(ranges, dtype=np.float64).reshape(-1, 2)
 
-    def page(self, values: Mapping[str, float], series: Series) -> Reals:
+    def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
         """Return the calibration for one recording: values, and where its states start."""
-        return np.asarray(self.pages([values], series.first[np.newaxis])[0], dtype=np.float64)
+        return np.asarray(
+            self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
+        )
 
-    def pages(self, values: Sequence[Mapping[str, float]], first: Reals) -> Reals:
+    def calibration_pages(
+        self, values: Sequence[Mapping[str, float]], first_measured: Reals
+    ) -> Reals:
         """Return the calibration for each recording (recordings, tunables) from its values.
 
-        `first` (recordings, seen) are the values that its signals start with, NaN if unknown.
+        `first_measured` (recordings, seen) are the values that its signals start with, NaN if unknown.
         """
-        alike = all(own is values[0] for own in values)
-        rows = [list({**self._known, **own}.values()) for own in (values[:1] if alike else values)]
-        width = len(self._known)
-        found = np.array([row[:width] for row in rows])
-        found = np.repeat(found, len(values), axis=0) if alike else found
-        columns, places = self._starts
-        begun = first[:, columns]
-        known = np.isfinite(begun)
-        found[:, places] = begun if known.all() else np.where(known, begun, found[:, places])
-        return found
+        is_shared = all(own is values[0] for own in values)
+        rows = [
+            list({**self._default_page, **own}.values())
+            for own in (values[:1] if is_shared else values)
+        ]
+        width = len(self._default_page)
+        pages = np.array([row[:width] for row in rows])
+        pages = np.repeat(pages, len(values), axis=0) if is_shared else pages
+        columns, places = self._initial_value_columns
+        initial_values = first_measured[:, columns]
+        known = np.isfinite(initial_values)
+        pages[:, places] = (
+            initial_values if known.all() else np.where(known, initial_values, pages[:, places])
+        )
+        return pages
 
     @cached_property
-    def _known(self) -> dict[str, float]:
+    def _default_page(self) -> dict[str, float]:
         return dict(self.predictor.page)
 
     @cached_property
-    def _starts(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _initial_value_columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The columns of compared signals, and of the page where each one's state starts."""
         places = {name: place for place, name in enumerate(self.predictor.page)}
-        fresh = [(k, START.format(name)) for k, name in enumerate(self.predictor.seen)]
+        fresh = [
+            (k, INITIAL_VALUE_NAME.format(name)) for k, name in enumerate(self.predictor.outputs)
+        ]
         known = [(k, places[name]) for k, name in fresh if name in places]
         columns, starts = np.array(known, dtype=np.intp).reshape(-1, 2).T
         return columns, starts
 
 
-def candidate(
+def compile_candidate(
     document: Document,
     project: Project,
-    layers: Sequence[Layer],
-    drifts: Sequence[Layer],
-    seen: Sequence[str],
+    placed_effects: Sequence[PlacedEffect],
+    disturbances: Sequence[PlacedEffect],
+    output_names: Sequence[str],
     period: Fraction,
 ) -> Candidate:
     """Return the base with layers and drifts, compiled for a period [s] between samples.
 
     Raises SpecError, ToolMissing.
     """
-    all_layers = [*layers, *drifts]
-    parts = [f"{layer.id} {layer.ending} {node_text(layer.effect.body)}" for layer in all_layers]
-    key = recipe_key(node_text(document.root), *parts, *seen, str(period))
+    all_layers = [*placed_effects, *disturbances]
+    parts = [
+        f"{placed_effect.id} {placed_effect.suffix} {node_text(placed_effect.effect.body)}"
+        for placed_effect in all_layers
+    ]
+    key = cache_key(node_text(document.root), *parts, *output_names, str(period))
 
-    def make() -> tuple[Recipe, bytes]:
-        made = automaton(document, project, all_layers)
-        return _compiled(made, layers, drifts, seen, period)
+    def make() -> tuple[CompiledModel, bytes]:
+        made = automaton_with_effects(document, project, all_layers)
+        return _compile(made, placed_effects, disturbances, output_names, period)
 
-    recipe, library = kept(key, make)
-    return Candidate(tuple(layers), recipe, Predictor(recipe.columns, library))
+    recipe, library = load_or_compile(key, make)
+    return Candidate(tuple(placed_effects), recipe, Predictor(recipe.columns, library))
 
 
-def _compiled(
-    made: Automaton,
-    layers: Sequence[Layer],
-    drifts: Sequence[Layer],
-    seen: Sequence[str],
+def _compile(
+    automaton: Automaton,
+    placed_effects: Sequence[PlacedEffect],
+    disturbances: Sequence[PlacedEffect],
+    output_names: Sequence[str],
     period: Fraction,
-) -> tuple[Recipe, bytes]:
-    brought = [layer.named(name) for layer in layers for name in own_names(layer.effect.body)]
-    uncertain = uncertain_of(made, brought)
-    started = _with_starts(made, seen)
-    starts = [name for name in started.parameters if name not in made.parameters]
-    names = [*(one.name for one in uncertain), *starts]
-    fewest = fewest_steps(made, layers, seen, period)
-    program, substeps = stepped(started, names, brought, period, fewest)
-    columns = columns_of(program, seen)
-    ranges = [made.states[name].range for name in columns.states]
-    recipe = Recipe(
+) -> tuple[CompiledModel, bytes]:
+    effect_parameters = [
+        placed_effect.qualified_name(name)
+        for placed_effect in placed_effects
+        for name in added_names(placed_effect.effect.body)
+    ]
+    uncertain = free_parameters_of(automaton, effect_parameters)
+    with_initial_values = _with_tunable_initial_values(automaton, output_names)
+    initial_value_names = [
+        name for name in with_initial_values.parameters if name not in automaton.parameters
+    ]
+    names = [*(one.name for one in uncertain), *initial_value_names]
+    min_count = minimum_substeps(automaton, placed_effects, output_names, period)
+    program, substeps = lower_tunable_program(
+        with_initial_values, names, effect_parameters, period, min_count
+    )
+    columns = columns_of(program, output_names)
+    ranges = [automaton.states[name].range for name in columns.states]
+    recipe = CompiledModel(
         columns,
         substeps,
         tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
         uncertain,
-        tuple(layer.named(DRIFT) for layer in drifts),
-        tuple(float(made.parameters[layer.named("memory")].value or 1) for layer in drifts),
-        _delays(made),
-        tuple(name in brought for name in columns.states),
+        tuple(placed_effect.qualified_name(DISTURBANCE_STATE) for placed_effect in disturbances),
+        tuple(
+            float(automaton.parameters[placed_effect.qualified_name("memory")].value or 1)
+            for placed_effect in disturbances
+        ),
+        _delay_parameters(automaton),
+        tuple(name in effect_parameters for name in columns.states),
     )
-    with built(program, columns) as library:
+    with build_predictor(program, columns) as library:
         return recipe, library.read_bytes()
 
 
-def _delays(made: Automaton) -> tuple[str, ...]:
+def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:
     """Return the uncertain parameters that are the time of a `delay`."""
-    times = [tree.arguments[1] for tree in applications(made, ("delay",)).values()]
+    times = [tree.arguments[1] for tree in memory_calls_by_key(automaton, ("delay",)).values()]
     read = {part.path for time in times for part in names(time)}
-    return tuple(name for name in made.parameters if name in read)
+    return tuple(name for name in automaton.parameters if name in read)
 
 
-def _with_starts(given: Automaton, seen: Sequence[str]) -> Automaton:
+def _with_tunable_initial_values(automaton: Automaton, output_names: Sequence[str]) -> Automaton:
     """Return an automaton in which each compared state starts at a tunable of its own.
 
     Also where an effect shows something else in its place: it starts near it.
     """
-    parameters, states = dict(given.parameters), dict(given.states)
-    for output in seen:
+    parameters, states = dict(automaton.parameters), dict(automaton.states)
+    for output in output_names:
         state = states.get(output)
         if state is not None:
-            fresh = START.format(output)
+            fresh = INITIAL_VALUE_NAME.format(output)
             key, span = f"parameters.{fresh}", state.span
             parameters[fresh] = Parameter(
                 fresh, "fixed", state.unit, Fraction(0), None, None, key, span
             )
             formula = Formula(Name(fresh, span), state.initial.key)
             states[output] = dataclasses.replace(state, initial=formula)
-    return dataclasses.replace(given, parameters=parameters, states=states)
+    return dataclasses.replace(automaton, parameters=parameters, states=states)

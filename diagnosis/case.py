@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from diagnosis.bench import Bench, balance_drifts
+from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.layers import shipped_effects
 from diagnosis.recipe import node_text
-from diagnosis.series import Series, pieces_of
-from diagnosis.shelf import Shelf, hash_of
-from diagnosis.threshold import EVERYWHERE, Thresholds
+from diagnosis.series import SampledRecording, sample_windows
+from diagnosis.shelf import FitCache, hash_of
+from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
 from engine.recording import Recording, read_recording
 from language.document import Document
 from language.effect import Effect
@@ -21,7 +21,7 @@ from language.experiment import RecordingMap
 from language.model import Automaton
 from language.project import Project
 
-Bootstrap = Literal["never", "kept", "made"]
+BootstrapMode = Literal["never", "kept", "made"]
 """Whether thresholds of a bootstrap are used: never, where one has left them, always."""
 
 
@@ -41,13 +41,13 @@ class Case:
     train: tuple[Path, ...]
     held_out: tuple[Path, ...] = ()
     effects: tuple[Effect, ...] | None = None
-    thresholds: Thresholds = EVERYWHERE
-    bootstrap: Bootstrap = "never"
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
+    bootstrap: BootstrapMode = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
-    read: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
-    opened: dict[Path, Recording] = field(default_factory=dict, repr=False)
-    stages: Path | None = None
-    before: Callable[[], None] = lambda: None
+    recordings: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
+    opened_recordings: dict[Path, Recording] = field(default_factory=dict, repr=False)
+    checkpoint_folder: Path | None = None
+    before_fit: Callable[[], None] = lambda: None
 
     def name_of(self, path: Path) -> str:
         """Return what a recording is called."""
@@ -55,8 +55,8 @@ class Case:
 
 
 def read_series(
-    path: Path, case: Case, automaton: Automaton, seen: Sequence[str]
-) -> tuple[Series, ...]:
+    path: Path, case: Case, automaton: Automaton, output_names: Sequence[str]
+) -> tuple[SampledRecording, ...]:
     """Return a recording of a case on its grid, a series for each window that is used of it.
 
     Raises SpecError, ValueError, ToolMissing.
@@ -64,23 +64,35 @@ def read_series(
     used = [
         column.name
         for column in case.mapping.columns.values()
-        if column.to in automaton.inputs or column.compare in seen
+        if column.to in automaton.inputs or column.compare in output_names
     ]
-    recording = case.read.get(path)
+    recording = case.recordings.get(path)
     if recording is None or not recording.channels.keys() >= set(used):
-        recording = case.opened[path] = read_recording(path, case.mapping, used)
+        recording = case.opened_recordings[path] = read_recording(path, case.mapping, used)
     named = dataclasses.replace(recording, name=case.name_of(path))
-    return pieces_of(named, case.mapping, automaton, seen)
+    return sample_windows(named, case.mapping, automaton, output_names)
 
 
-def case_bench(
-    case: Case, automaton: Automaton, series: Sequence[Series], seen: tuple[str, ...]
-) -> Bench:
+def build_model_set(
+    case: Case,
+    automaton: Automaton,
+    series: Sequence[SampledRecording],
+    output_names: tuple[str, ...],
+) -> ModelSet:
     """Return the bench of a case for some recordings as they were read."""
     effects = case.effects if case.effects is not None else shipped_effects()
-    drifts = balance_drifts(case.document, automaton)
+    drifts = balance_disturbances(case.document, automaton)
     bodies = [f"{one.name} {node_text(one.body)}" for one in effects]
-    shelf = Shelf(case.stages, hash_of(node_text(case.document.root), bodies), case.before)
-    return Bench(
-        case.document, case.project, automaton, effects, tuple(series), seen, drifts, shelf
+    fit_cache = FitCache(
+        case.checkpoint_folder, hash_of(node_text(case.document.root), bodies), case.before_fit
+    )
+    return ModelSet(
+        case.document,
+        case.project,
+        automaton,
+        effects,
+        tuple(series),
+        output_names,
+        drifts,
+        fit_cache,
     )

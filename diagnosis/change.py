@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from diagnosis.layers import Layer, laid
+from diagnosis.layers import PlacedEffect, overlay_effects
 from language.document import Document
-from language.provenance import differences
+from language.provenance import diff_specs
 
-SECTIONS = ("inputs", "states", "equations", "flow", "terms", "modes", "regions", "outputs")
+EQUATION_SECTIONS = (
+    "inputs",
+    "states",
+    "equations",
+    "flow",
+    "terms",
+    "modes",
+    "regions",
+    "outputs",
+)
 """What is told; parameters have a table of their own."""
 
 
 @dataclass(frozen=True)
-class Change:
+class EquationChange:
     """A line of the spec, by its key path, without and with the effects; empty where absent."""
 
     path: str
@@ -22,15 +31,17 @@ class Change:
     after: str
 
 
-def changes(document: Document, layers: Sequence[Layer]) -> list[Change]:
+def equation_changes(
+    document: Document, placed_effects: Sequence[PlacedEffect]
+) -> list[EquationChange]:
     """Return the lines of equations that layers alter in an expanded document. Raises SpecError."""
-    found = differences(document.root, laid(document, layers).root)
+    found = diff_specs(document.root, overlay_effects(document, placed_effects).root)
     return [
-        Change(one.path, one.old.value if one.old else "", one.new.value if one.new else "")
+        EquationChange(one.path, one.old.value if one.old else "", one.new.value if one.new else "")
         for one in found
-        if one.path.partition(".")[0] in SECTIONS and not _is_aside(one.path)
+        if one.path.partition(".")[0] in EQUATION_SECTIONS and not _is_metadata(one.path)
     ]
 
 
-def _is_aside(path: str) -> bool:
+def _is_metadata(path: str) -> bool:
     return path.endswith((".unit", ".about", ".range", ".initial"))

@@ -11,26 +11,26 @@ from numpy.typing import NDArray
 from diagnosis.finding import Finding
 from engine.recording import Channel, Recording
 
-Values = NDArray[np.float64]
+Reals = NDArray[np.float64]
 
-GAP = 1.5
+GAP_FACTOR = 1.5
 """A step of time above this many usual ones has lost samples."""
-LONG_GAP = 10.0
+LONG_GAP_FACTOR = 10.0
 """Usual steps of time from which a gap is told by its place."""
 MUCH_DROPPED, SOME_DROPPED = 0.10, 0.01
 """Shares of lost samples that are an error and a warning."""
-UNEVEN = 0.5
+JITTER_FRACTION = 0.5
 """Share of a usual step of time from which the spread of the steps is told."""
 MUCH_REPEATED = 0.08
 """Share of repeated values, beyond what quantisation explains, from which it is told."""
-LONGEST_HELD = 4
+MAX_REPETITIONS = 4
 """Repetitions in a row that count: more are a signal at rest."""
 STUCK_SAMPLES, STUCK_TIME = 25, 0.2
 """Samples and seconds for which a noisy signal has to keep one value to be stuck."""
-CLIPPED = 0.01
+CLIPPED_FRACTION = 0.01
 """Share of samples exactly at the largest or smallest value from which it may be a limit."""
-LEAST_SAMPLES = 10
-LATTICE = 0.02
+MIN_SAMPLES = 10
+QUANTUM_TOLERANCE = 0.02
 """How far steps of value may be from whole multiples of the quantum, in quanta: rounding."""
 
 
@@ -71,9 +71,9 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) else 0.0
     lost = np.maximum(np.round(steps / usual) - 1.0, 0.0) if usual else np.zeros(0)
-    lost[steps <= GAP * usual] = 0.0
-    even = steps[steps <= GAP * usual]
-    long = np.flatnonzero(steps > LONG_GAP * usual)
+    lost[steps <= GAP_FACTOR * usual] = 0.0
+    even = steps[steps <= GAP_FACTOR * usual]
+    long = np.flatnonzero(steps > LONG_GAP_FACTOR * usual)
     quantum = _quantum(values)
     noise = _noise(times, values, usual)
     return ChannelCheck(
@@ -93,101 +93,101 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
         noise=noise,
         low=float(values.min()),
         high=float(values.max()),
-        repeated=_repeated(values, quantum, noise),
-        clipped=_clipped(values, quantum, noise),
-        stuck=_stuck(times, values, quantum, noise),
+        repeated=_repeated_fraction(values, quantum, noise),
+        clipped=_clipped_fraction(values, quantum, noise),
+        stuck=_stuck_interval(times, values, quantum, noise),
     )
 
 
-def findings_of(check: ChannelCheck, is_compared: bool) -> list[Finding]:
+def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
     """Return what is to be told of a channel."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
 
-    def tell(
+    def report(
         kind: str, text: str, severity: str, window: tuple[float, float] | None = None
     ) -> None:
-        found.append(
+        findings.append(
             Finding(kind, check.recording, check.name, text, severity, window)  # type: ignore[arg-type]
         )
 
     if check.low == check.high and is_compared:
-        tell("no_signal", f"is {check.low:g} all the time: the signal is missing", "error")
+        report("no_signal", f"is {check.low:g} all the time: the signal is missing", "error")
     if check.dropped >= SOME_DROPPED:
         severity = "error" if check.dropped >= MUCH_DROPPED else "warning"
-        tell("dropped", f"{check.dropped:.0%} of its samples are missing", severity)
+        report("dropped", f"{check.dropped:.0%} of its samples are missing", severity)
     for start, end in check.gaps[:3]:
-        tell("gap", f"has no value for {end - start:.3g} s", "warning", (start, end))
-    if check.jitter * check.rate > UNEVEN:
-        tell("jitter", f"its steps of time vary by {check.jitter * 1e3:.2g} ms", "note")
+        report("gap", f"has no value for {end - start:.3g} s", "warning", (start, end))
+    if check.jitter * check.rate > JITTER_FRACTION:
+        report("jitter", f"its steps of time vary by {check.jitter * 1e3:.2g} ms", "note")
     if check.repeated >= MUCH_REPEATED:
         severity = "error" if check.repeated >= MUCH_DROPPED else "warning"
         text = f"{check.repeated:.0%} of its values repeat the one before, more than its step"
-        tell("repeated", f"{text} of {check.quantum:.3g} explains: samples were held", severity)
+        report("repeated", f"{text} of {check.quantum:.3g} explains: samples were held", severity)
     if check.stuck:
         start, end = check.stuck
         text = f"stands still for {end - start:.3g} s, from {start:.3g} s on, though it is noisy"
-        tell("stuck", text, "warning", check.stuck)
-    if check.clipped >= CLIPPED:
+        report("stuck", text, "warning", check.stuck)
+    if check.clipped >= CLIPPED_FRACTION:
         text = f"{check.clipped:.0%} of its values are exactly at its end: it may be clipped"
-        tell("clipped", text, "warning")
-    return found
+        report("clipped", text, "warning")
+    return findings
 
 
-def _quantum(values: Values) -> float:
+def _quantum(values: Reals) -> float:
     """Return the step of which nearly all changes are whole multiples; 0 without one."""
     changes = np.abs(np.diff(values))
     scale = float(np.abs(values).max())
     changes = changes[changes > 1e-9 * scale]
-    if len(changes) < LEAST_SAMPLES:
+    if len(changes) < MIN_SAMPLES:
         return 0.0
     least = float(np.percentile(changes, 0.1, method="lower"))
     multiples = changes / least
     off = np.abs(multiples - np.round(multiples))
-    small = multiples < 0.2 / LATTICE
-    fits = off[small] < LATTICE
-    return least if len(fits) >= LEAST_SAMPLES and float(fits.mean()) > 0.97 else 0.0
+    small = multiples < 0.2 / QUANTUM_TOLERANCE
+    fits = off[small] < QUANTUM_TOLERANCE
+    return least if len(fits) >= MIN_SAMPLES and float(fits.mean()) > 0.97 else 0.0
 
 
-def _noise(times: Values, values: Values, usual: float) -> float:
+def _noise(times: Reals, values: Reals, period: float) -> float:
     """Return the standard deviation of white noise, by the third differences of even stretches."""
-    if len(values) < LEAST_SAMPLES:
+    if len(values) < MIN_SAMPLES:
         return 0.0
     third = np.diff(values, 3)
-    even = np.abs(np.diff(times) / usual - 1.0) < 0.2
+    even = np.abs(np.diff(times) / period - 1.0) < 0.2
     whole = even[:-2] & even[1:-1] & even[2:]
-    kept = third[whole] if whole.sum() >= LEAST_SAMPLES else third
+    kept = third[whole] if whole.sum() >= MIN_SAMPLES else third
     spread = float(np.median(np.abs(kept)))
     return 1.4826 * spread / math.sqrt(20.0)
 
 
-def _repeated(values: Values, quantum: float, noise: float) -> float:
+def _repeated_fraction(values: Reals, quantum: float, noise: float) -> float:
     """Return the share of values equal to the one before, beyond what quantisation explains."""
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0.0]
-    if len(changes) < LEAST_SAMPLES:
+    if len(changes) < MIN_SAMPLES:
         return 0.0
     step = max(quantum, float(np.percentile(changes, 1.0)))  # rounding may hide the quantum
     if noise <= step:
         return 0.0
     by_chance = step / (2.0 * math.sqrt(math.pi) * noise)
-    runs = [last - first for first, last in _runs(np.diff(values) == 0.0)]
-    share = sum(run for run in runs if run <= LONGEST_HELD) / (len(values) - 1)
+    runs = [last - first for first, last in _runs_of_equal(np.diff(values) == 0.0)]
+    share = sum(run for run in runs if run <= MAX_REPETITIONS) / (len(values) - 1)
     return max(0.0, (share - by_chance) / (1.0 - by_chance))
 
 
-def _runs(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last index of each run of equal values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], equal.astype(int), [0]))))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _stuck(
-    times: Values, values: Values, quantum: float, noise: float
+def _stuck_interval(
+    times: Reals, values: Reals, quantum: float, noise: float
 ) -> tuple[float, float] | None:
     """Return where a channel that is noisy elsewhere keeps one value for long, other than 0."""
     if noise <= 0.5 * quantum or noise <= 0.0:
         return None
-    runs = [run for run in _runs(np.diff(values) == 0.0) if values[run[0]] != 0.0]
+    runs = [run for run in _runs_of_equal(np.diff(values) == 0.0) if values[run[0]] != 0.0]
     if not runs:
         return None
     first, last = max(runs, key=lambda run: run[1] - run[0])
@@ -195,14 +195,14 @@ def _stuck(
     return (float(times[first]), float(times[last])) if is_long else None
 
 
-def _clipped(values: Values, quantum: float, noise: float) -> float:
+def _clipped_fraction(values: Reals, quantum: float, noise: float) -> float:
     """Return the share of values exactly at an end that has no like beside it."""
     span = float(values.max() - values.min())
     shares = [0.0]
     for end in (float(values.max()), float(values.min())):
         at_end = np.abs(values - end) < 1e-9 * span
         beside = (np.abs(values - end) < 0.03 * span) & ~at_end
-        longest = max((b - a for a, b in _runs(at_end)), default=0)
+        longest = max((b - a for a, b in _runs_of_equal(at_end)), default=0)
         if end != 0.0 and longest >= 5 and noise > 0.3 * quantum and at_end.sum() > beside.sum():
             shares.append(float(at_end.mean()))
     return max(shares)

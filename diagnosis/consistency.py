@@ -14,35 +14,35 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.free_run import Compared
-from diagnosis.reference import Reference
-from engine.recording import Channel, Recording, cut, pieces
+from diagnosis.free_run import OutputComparison
+from diagnosis.reference import ReferenceModel
+from engine.recording import Channel, Recording, crop, split_by_windows
 
-Values = NDArray[np.float64]
+Reals = NDArray[np.float64]
 
-GRID = 0.01
+GRID_STEP = 0.01
 """Step of the grid on which rates of change are compared [s]."""
-SMOOTH = 0.04
+SMOOTHING_STD = 0.04
 """Standard deviation of the smoothing [s]: what is left is below about 4 Hz."""
-SMOOTH_GAIN = 0.15
+GAIN_SMOOTHING_STD = 0.15
 """The same for gains, which resonances shall not change: below about 1 Hz."""
-LARGEST_LAG = 1.0
+MAX_LAG = 1.0
 """Largest offset of clocks looked for [s]."""
-SETTLED = 0.8
+TRANSIENT_TIME = 0.8
 """Time after the start that is left out: start values are not those of the recording [s]."""
-ALIKE = 0.75
+MIN_CORRELATION = 0.75
 """Correlation from which two signals are taken for the same motion."""
-CLEARLY_AGAINST = 0.15
+REVERSAL_MARGIN = 0.15
 """How much better the reversed signal has to fit: half a period of a sweep looks alike."""
-CLEARER = 0.02
+LAG_MARGIN = 0.02
 """How much better than without a lag the correlation has to be, to believe in the lag."""
-LONGEST_PIECE, SHORTEST_PIECE = Fraction(10), Fraction(4)
-MOST_SIMULATED = Fraction(24)
+MAX_PIECE, MIN_PIECE = Fraction(10), Fraction(4)
+MAX_SIMULATED_TIME = Fraction(24)
 """Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
 
 
 @dataclass(frozen=True)
-class Relation:
+class OutputAgreement:
     """How a measured output goes with the simulated one: measured = gain * simulated(t - lag).
 
     Of the gain of fast and of slow motion that is taken which is nearer to 1. `level` is how large
@@ -60,53 +60,55 @@ class Relation:
     @property
     def is_clear(self) -> bool:
         """Tell whether both are the same motion."""
-        return abs(self.correlation) >= ALIKE
+        return abs(self.correlation) >= MIN_CORRELATION
 
     @property
-    def improvement(self) -> float:
+    def correlation_gain(self) -> float:
         """How much better the correlation is with the lag."""
         return abs(self.correlation) - abs(self.correlation_without_lag)
 
     @property
-    def believed_lag(self) -> float:
+    def significant_lag(self) -> float:
         """The lag [s], 0 where no lag would do as well."""
-        return self.lag if self.is_clear and self.improvement > CLEARER else 0.0
+        return self.lag if self.is_clear and self.correlation_gain > LAG_MARGIN else 0.0
 
 
-def relations(recordings: Sequence[Recording], reference: Reference) -> list[Relation]:
+def compare_with_simulation(
+    recordings: Sequence[Recording], reference: ReferenceModel
+) -> list[OutputAgreement]:
     """Return how the outputs of each piece go with a simulation under the recorded inputs."""
-    found: list[Relation] = []
-    left = MOST_SIMULATED
-    each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
+    agreements: list[OutputAgreement] = []
+    remaining_time = MAX_SIMULATED_TIME
+    piece_length = min(MAX_PIECE, max(MIN_PIECE, MAX_SIMULATED_TIME / max(1, len(recordings))))
     for recording in recordings:
-        for piece in pieces(recording):
-            if left <= 0:
-                return found
-            part = _thinned(lively(piece, each))
-            left -= part.end - part.start
-            for name, compared in reference.run(part).compared.items():
-                relation = relation_of(part.name, name, compared)
-                if relation:
-                    found.append(relation)
-    return found
+        for piece in split_by_windows(recording):
+            if remaining_time <= 0:
+                return agreements
+            part = _decimate_inputs(most_excited_piece(piece, piece_length))
+            remaining_time -= part.end - part.start
+            for name, compared in reference.simulate(part).comparisons.items():
+                agreement = compare_signals(part.name, name, compared)
+                if agreement:
+                    agreements.append(agreement)
+    return agreements
 
 
-def lively(piece: Recording, longest: Fraction) -> Recording:
-    """Return the most lively stretch of a piece that is no longer than `longest`."""
-    if piece.end - piece.start <= longest:
+def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
+    """Return the most lively stretch of a piece that is no longer than `max_length`."""
+    if piece.end - piece.start <= max_length:
         return piece
-    count = int(2 * (piece.end - piece.start) / longest)
-    starts = [piece.start + k * longest / 2 for k in range(count)]
-    best = max(starts, key=lambda start: _liveliness(piece, start, start + longest))
-    return cut(piece, (best, min(piece.end, best + longest)))
+    count = int(2 * (piece.end - piece.start) / max_length)
+    starts = [piece.start + k * max_length / 2 for k in range(count)]
+    best = max(starts, key=lambda start: _excitation_level(piece, start, start + max_length))
+    return crop(piece, (best, min(piece.end, best + max_length)))
 
 
-def _thinned(piece: Recording) -> Recording:
+def _decimate_inputs(piece: Recording) -> Recording:
     """Return a recording with every n-th sample of its inputs: 100 Hz are enough for this."""
     channels = dict(piece.channels)
     for name, channel in piece.channels.items():
         span = channel.times[-1] - channel.times[0]
-        every = int(len(channel.times) / (span / Fraction(GRID))) if span else 1
+        every = int(len(channel.times) / (span / Fraction(GRID_STEP))) if span else 1
         if channel.column.to is not None and every > 1:
             channels[name] = Channel(
                 channel.column, channel.times[::every], channel.values[::every]
@@ -114,7 +116,7 @@ def _thinned(piece: Recording) -> Recording:
     return dataclasses.replace(piece, channels=channels)
 
 
-def _liveliness(piece: Recording, start: Fraction, end: Fraction) -> float:
+def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
     total = 0.0
     for channel in piece.channels.values():
         inside = (channel.seconds >= float(start)) & (channel.seconds <= float(end))
@@ -124,77 +126,85 @@ def _liveliness(piece: Recording, start: Fraction, end: Fraction) -> float:
     return total
 
 
-def _rate(times: Values, values: Values, grid: Values, spread: float = SMOOTH) -> Values:
+def _smoothed_rate(
+    times: Reals, values: Reals, grid: Reals, spread: float = SMOOTHING_STD
+) -> Reals:
     """Return the smoothed rate of change on a grid."""
     width = _kernel_size(spread) // 2
-    kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID / spread) ** 2)
+    kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID_STEP / spread) ** 2)
     even = np.interp(grid, times, values)
     smooth = np.convolve(even, kernel / kernel.sum(), mode="valid")
-    return np.gradient(smooth, GRID)
+    return np.gradient(smooth, GRID_STEP)
 
 
 def _kernel_size(spread: float) -> int:
     """Return how many samples of a grid one smoothed value is made of."""
-    return 2 * math.ceil(4.0 * spread / GRID) + 1
+    return 2 * math.ceil(4.0 * spread / GRID_STEP) + 1
 
 
-def relation_of(
-    recording: str, name: str, compared: Compared, spread: float = SMOOTH
-) -> Relation | None:
+def compare_signals(
+    recording: str, name: str, comparison: OutputComparison, spread: float = SMOOTHING_STD
+) -> OutputAgreement | None:
     """Return how two signals, smoothed by `spread` [s], go together; None for too short ones."""
-    start, end = compared.times[0] + SETTLED, compared.times[-1]
-    if end - start < 1.0 or not np.all(np.isfinite(compared.simulated)):
+    start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
+    if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
         return None
-    grid = np.arange(start, end, GRID)
-    measured = _rate(compared.times, compared.measured, grid, spread)
-    simulated = _rate(compared.times, compared.simulated, grid, spread)
-    most = min(round(LARGEST_LAG / GRID), len(grid) // 4)
-    if len(measured) < 3 * most or not measured.std() or not simulated.std():
+    grid = np.arange(start, end, GRID_STEP)
+    measured = _smoothed_rate(comparison.times, comparison.measured, grid, spread)
+    simulated = _smoothed_rate(comparison.times, comparison.simulated, grid, spread)
+    max_shift = min(round(MAX_LAG / GRID_STEP), len(grid) // 4)
+    if len(measured) < 3 * max_shift or not measured.std() or not simulated.std():
         return None
-    lags = range(-most, most + 1)
+    lags = range(-max_shift, max_shift + 1)
     pairs = {lag: _overlap(measured, simulated, lag) for lag in lags}
     correlations = {lag: _correlation(*pair) for lag, pair in pairs.items()}
     best = max(lags, key=lambda lag: correlations[lag])
-    against = min(lags, key=lambda lag: correlations[lag])
-    if -correlations[against] > correlations[best] + CLEARLY_AGAINST:
-        best = against
-    gains = [_ratio(pair) for pair in (pairs[best], *_slow(compared, grid, best))]
+    reversed_lag = min(lags, key=lambda lag: correlations[lag])
+    if -correlations[reversed_lag] > correlations[best] + REVERSAL_MARGIN:
+        best = reversed_lag
+    gains = [
+        _spread_ratio(pair) for pair in (pairs[best], *_low_frequency_rates(comparison, grid, best))
+    ]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
-    late = compared.times > 0.5 * (start + end)
-    level = _size(compared.measured[late]) / max(_size(compared.simulated[late]), 1e-12)
+    late = comparison.times > 0.5 * (start + end)
+    level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
     both = correlations[best], correlations[0]
-    return Relation(recording, name, gain, best * GRID, *both, level)
+    return OutputAgreement(recording, name, gain, best * GRID_STEP, *both, level)
 
 
-def _slow(compared: Compared, grid: Values, lag: int) -> list[tuple[Values, Values]]:
+def _low_frequency_rates(
+    comparison: OutputComparison, grid: Reals, lag: int
+) -> list[tuple[Reals, Reals]]:
     """Return both rates below the resonances, or nothing where that takes more than there is.
 
     A fast sweep has little there but drift.
     """
-    shifted = grid + lag * GRID
+    shifted = grid + lag * GRID_STEP
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
-    if np.count_nonzero(kept) <= _kernel_size(SMOOTH_GAIN):
+    if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):
         return []
-    y = _rate(compared.times, compared.measured, shifted[kept], SMOOTH_GAIN)
-    return [(y, _rate(compared.times, compared.simulated, grid[kept], SMOOTH_GAIN))]
+    y = _smoothed_rate(comparison.times, comparison.measured, shifted[kept], GAIN_SMOOTHING_STD)
+    return [
+        (y, _smoothed_rate(comparison.times, comparison.simulated, grid[kept], GAIN_SMOOTHING_STD))
+    ]
 
 
-def _ratio(pair: tuple[Values, Values]) -> float:
+def _spread_ratio(pair: tuple[Reals, Reals]) -> float:
     """Return the ratio of the spreads, held within what any mistake of units makes."""
     return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
 
 
-def _size(values: Values) -> float:
+def _rms(values: Reals) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _overlap(measured: Values, simulated: Values, lag: int) -> tuple[Values, Values]:
+def _overlap(measured: Reals, simulated: Reals, lag: int) -> tuple[Reals, Reals]:
     if lag >= 0:
         return measured[lag:], simulated[: len(simulated) - lag]
     return measured[:lag], simulated[-lag:]
 
 
-def _correlation(y: Values, x: Values) -> float:
+def _correlation(y: Reals, x: Reals) -> float:
     y, x = y - y.mean(), x - x.mean()
     size = float(np.sqrt((y @ y) * (x @ x)))
     return float(y @ x) / size if size else 0.0

@@ -8,147 +8,159 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.bench import Bench
-from diagnosis.estimate import Estimate, looked_at
-from diagnosis.evidence import Evidence, evidence
-from diagnosis.excess import Excess, excess_at
-from diagnosis.formula import Formula, formula_of
-from diagnosis.level import settled
-from diagnosis.locus import Locus
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import Estimate, evaluate
+from diagnosis.evidence import LikelihoodGain, likelihood_gain
+from diagnosis.excess import EquationRegression, regression_at
+from diagnosis.formula import FormulaEffect, build_formula
+from diagnosis.level import fit_with_noise
+from diagnosis.locus import Location
 from diagnosis.naming import quantities_of
-from diagnosis.point import Point, point_of
-from diagnosis.regression import Columns, forward, ranking, weights
-from diagnosis.search import Tell
+from diagnosis.point import ParameterVector, vector_of
+from diagnosis.regression import TermColumns, coefficients_of, rank_terms, select_terms
+from diagnosis.search import LogCallback
 from language.problem import SpecError
 
-PLACES = 2
+MAX_LOCATIONS = 2
 """Places that are looked at, those whose freedom explains most."""
-FITTED = 3
+MAX_FITS = 3
 """Formulas that are fitted, the best of the regressions."""
-MOST_TERMS = 2
-LEADING_PART = 0.85
+MAX_TERMS = 2
+LEADING_FRACTION = 0.85
 """A formula at a place that asked for more of a freedom has to gain only this part."""
-FURTHER = 45.0
+MIN_SECOND_TERM_GAIN = 45.0
 """Nats that a second term has to gain."""
 
 
 @dataclass(frozen=True)
-class Description:
+class DiscoveredEquation:
     """A formula at a place with its fit; `text` tells it with its values."""
 
-    locus: Locus
-    formula: Formula
+    location: Location
+    formula: FormulaEffect
     estimate: Estimate = field(repr=False)
-    evidence: Evidence
+    likelihood_gain: LikelihoodGain
     text: str
 
 
-def described(
-    bench: Bench,
+def discover_equation(
+    model_set: ModelSet,
     base: Estimate,
-    loci: Sequence[Locus],
+    locations: Sequence[Location],
     units: Mapping[str, float],
     threshold: float,
-    tell: Tell = lambda text: None,
-) -> Description | None:
+    log: LogCallback = lambda text: None,
+) -> DiscoveredEquation | None:
     """Return the formula that explains most of what the base lacks; None where none gains."""
-    found: list[Description] = []
-    for formula, locus in _formulas(bench, base, loci):
-        starts = [base.values(0), _beside(base, locus)]
-        one = _described(bench, base, formula, locus, starts, units)
+    equations: list[DiscoveredEquation] = []
+    for formula, location in _propose_formulas(model_set, base, locations):
+        starts = [base.values(0), _values_beside_disturbance(base, location)]
+        one = _fit_formula(model_set, base, formula, location, starts, units)
         if one is not None:
-            tell(_line(one))
-            found.append(one)
-    best = max(found, key=_total, default=None)
-    if best is None or best.evidence.least <= threshold:
+            log(_format_equation(one))
+            equations.append(one)
+    best = max(equations, key=_total_gain, default=None)
+    if best is None or best.likelihood_gain.smaller <= threshold:
         return None
-    ranks = [locus.path for locus in loci]
-    for one in found:
-        is_before = ranks.index(one.locus.path) < ranks.index(best.locus.path)
+    ranks = [location.path for location in locations]
+    for one in equations:
+        is_before = ranks.index(one.location.path) < ranks.index(best.location.path)
         if is_before:
             starts = [best.estimate.values(0)]
-            again = _described(bench, base, one.formula, one.locus, starts, units)
-            if again is not None and _total(again) > LEADING_PART * _total(best):
-                tell(_line(again))
+            again = _fit_formula(model_set, base, one.formula, one.location, starts, units)
+            if again is not None and _total_gain(again) > LEADING_FRACTION * _total_gain(best):
+                log(_format_equation(again))
                 best = again
     return best
 
 
-def _total(one: Description) -> float:
-    total = one.evidence.total
+def _total_gain(equation: DiscoveredEquation) -> float:
+    total = equation.likelihood_gain.total
     return total if np.isfinite(total) else -np.inf
 
 
-def _line(one: Description) -> str:
-    known = one.evidence
-    gains = f"train {known.train:.0f}, left out {known.left_out:.0f} nats"
-    return f"{one.text} at {one.locus.path}: {gains}"
+def _format_equation(equation: DiscoveredEquation) -> str:
+    known = equation.likelihood_gain
+    gains = f"train {known.penalised:.0f}, left out {known.cross_validated:.0f} nats"
+    return f"{equation.text} at {equation.location.path}: {gains}"
 
 
-def _formulas(bench: Bench, base: Estimate, loci: Sequence[Locus]) -> list[tuple[Formula, Locus]]:
+def _propose_formulas(
+    model_set: ModelSet, base: Estimate, locations: Sequence[Location]
+) -> list[tuple[FormulaEffect, Location]]:
     """Return the formulas worth a fit: the best single terms, and the best one with a second."""
-    options: list[tuple[float, Locus, Excess, tuple[Columns, ...]]] = []
-    places = [one for one in loci if one.gain > 0.0 and not one.named][:PLACES]
-    for locus in places:
-        model = _model(bench, base, locus)
-        excess = excess_at(bench, model, locus.section, locus.place)
-        ranked = ranking(excess.problem, excess.columns)
-        options += [(gain, locus, excess, (one,)) for gain, one in ranked[:FITTED]]
-        chosen = forward(excess.problem, excess.columns, MOST_TERMS, FURTHER)
+    options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
+    places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
+    for location in places:
+        model = _choose_base(model_set, base, location)
+        excess = regression_at(model_set, model, location.section, location.place)
+        ranked = rank_terms(excess.problem, excess.columns)
+        options += [(gain, location, excess, (one,)) for gain, one in ranked[:MAX_FITS]]
+        chosen = select_terms(excess.problem, excess.columns, MAX_TERMS, MIN_SECOND_TERM_GAIN)
         if len(chosen) > 1:
             pair = tuple(one.columns for one in chosen)
-            options.append((sum(one.gain for one in chosen), locus, excess, pair))
+            options.append((sum(one.gain for one in chosen), location, excess, pair))
     options.sort(key=lambda option: -option[0])
     first = [max((o for o in options if o[1] is place), key=lambda o: o[0]) for place in places]
-    worth = [*first, *(option for option in options if option not in first)][:FITTED]
-    found = []
-    for number, (gain, locus, excess, columns) in enumerate(worth, 1):
+    best_options = [*first, *(option for option in options if option not in first)][:MAX_FITS]
+    formulas = []
+    for number, (gain, location, excess, columns) in enumerate(best_options, 1):
         if gain > 0.0:
             terms = [excess.terms[excess.columns.index(one)] for one in columns]
-            values = weights(excess.problem, columns)
+            values = coefficients_of(excess.problem, columns)
             with suppress(SpecError):
-                formula = formula_of(bench, locus.section, locus.place, terms, values, number)
-                found.append((formula, locus))
-    return found
+                formula = build_formula(
+                    model_set, location.section, location.place, terms, values, number
+                )
+                formulas.append((formula, location))
+    return formulas
 
 
-def _beside(base: Estimate, locus: Locus) -> dict[str, float]:
+def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
     """Return the parameters [SI] that were fitted beside the freedom of a place."""
-    return (locus.free or base).values(0)
+    return (location.free_model or base).values(0)
 
 
-def _model(bench: Bench, base: Estimate, locus: Locus) -> Estimate:
+def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
     """Return the base, or what it is with the parameters fitted beside the freedom of a place."""
-    point = point_of(base.candidate, len(bench.series), _beside(base, locus))
-    other = looked_at(base.candidate, bench.series, base.noises, point)
+    point = vector_of(
+        base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
+    )
+    other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
     return other if other.cost < base.cost else base
 
 
-def _described(
-    bench: Bench,
+def _fit_formula(
+    model_set: ModelSet,
     base: Estimate,
-    formula: Formula,
-    locus: Locus,
+    formula: FormulaEffect,
+    location: Location,
     starts: Sequence[Mapping[str, float]],
     units: Mapping[str, float],
-) -> Description | None:
+) -> DiscoveredEquation | None:
     """Return a formula fitted from the best of some values of the base's parameters."""
     try:
-        candidate = bench.candidate((formula.layer,))
+        candidate = model_set.compile_candidate((formula.placed_effect,))
     except SpecError:
         return None
-    looks = []
+    starting_fits = []
     for values in starts:
-        point = point_of(candidate, len(bench.series), {**values, **formula.start})
-        own = point.own.copy()
-        for k, one in enumerate(candidate.uncertain):
+        point = vector_of(candidate, len(model_set.series), {**values, **formula.initial_values})
+        own = point.per_recording.copy()
+        for k, one in enumerate(candidate.free_parameters):
             if one.name in formula.phases:
                 own[:, k] = [one.coordinate(value) for value in formula.phases[one.name]]
-        looks.append(looked_at(candidate, bench.series, base.noises, Point(point.shared, own)))
-    start = min(looks, key=lambda one: one.cost).point
-    found = settled(candidate, bench.series, base.noises, start, units)
-    if not np.isfinite(found.cost) or found.normal is None:
+        starting_fits.append(
+            evaluate(
+                candidate, model_set.series, base.noise_levels, ParameterVector(point.shared, own)
+            )
+        )
+    start = min(starting_fits, key=lambda one: one.cost).point
+    fitted = fit_with_noise(candidate, model_set.series, base.noise_levels, start, units)
+    if not np.isfinite(fitted.cost) or fitted.normal_equations is None:
         return None
-    each = [found.values(k) for k in range(len(bench.series))]
-    text = formula.told(quantities_of(found), each)
-    return Description(locus, formula, found, evidence(found, base, bench.series), text)
+    each = [fitted.values(k) for k in range(len(model_set.series))]
+    text = formula.format_fitted(quantities_of(fitted), each)
+    return DiscoveredEquation(
+        location, formula, fitted, likelihood_gain(fitted, base, model_set.series), text
+    )

@@ -15,36 +15,36 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.adaptation import adapted
-from diagnosis.bench import Bench
-from diagnosis.case import Case, case_bench, read_series
-from diagnosis.description import Description
+from diagnosis.adaptation import reestimate_per_recording
+from diagnosis.bench import ModelSet
+from diagnosis.case import Case, build_model_set, read_series
+from diagnosis.description import DiscoveredEquation
 from diagnosis.estimate import Estimate
-from diagnosis.judgement import judged
-from diagnosis.layers import Layer
-from diagnosis.location import led_by, likely
-from diagnosis.locus import Locus
-from diagnosis.naming import named, place_path, quantities_of, verdict_id
-from diagnosis.place_sentence import place_sentence
-from diagnosis.plan import Plan, planned
-from diagnosis.rival import nearest
-from diagnosis.search import Tell, Tried
+from diagnosis.judgement import decide
+from diagnosis.layers import PlacedEffect
+from diagnosis.location import rank_accepted_first, rank_causes_first
+from diagnosis.locus import Location
+from diagnosis.naming import named_effect_of, place_path, quantities_of, verdict_id
+from diagnosis.place_sentence import format_location
+from diagnosis.plan import ExperimentPlan, plan_experiment
+from diagnosis.rival import near_best
+from diagnosis.search import CandidateFit, LogCallback
 from diagnosis.selection import Selection
-from diagnosis.series import Series, compared, paced
-from diagnosis.shuffle import Shuffle, shuffle_of
-from diagnosis.simulation import misfits
-from diagnosis.starting import settled_at_start, started
-from diagnosis.threshold import EVERYWHERE, Thresholds
-from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
-from diagnosis.ways import ways_of
+from diagnosis.series import SampledRecording, compared_outputs, resample
+from diagnosis.shuffle import Oscillation, analyse_oscillation
+from diagnosis.simulation import compare_misfits
+from diagnosis.starting import average_initial_inputs, choose_initial_inputs
+from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
+from diagnosis.verdict import DecisionOutcome, Misfit, NamedEffect, RankedCandidate, Verdict
+from diagnosis.ways import recalibrate_by_hold
 from engine.recorded_part import file_of, overlap
 from language.load import automaton_of
 from language.model import Automaton
 from language.problem import SpecError
 
-LITTLE_MORE = 1.1
+MAX_WORSE_RATIO = 1.1
 """Part of the misfit of simulation from which on a signal is simulated worse."""
-MUCH_LESS = 0.8
+CONFIRMATION_RATIO = 0.8
 """Part of the misfit of simulation that is left at most where an effect is confirmed by it."""
 
 
@@ -59,60 +59,70 @@ class Diagnosis:
 
     verdict: Verdict
     selection: Selection = field(repr=False)
-    bench: Bench = field(repr=False)
-    held_out: tuple[Series, ...] = field(repr=False)
-    description: Description | None = field(default=None, repr=False)
-    thresholds: Thresholds = EVERYWHERE
-    plan: Plan | None = field(default=None, repr=False)
-    shuffles: tuple[Shuffle, ...] = field(default=(), repr=False)
+    model_set: ModelSet = field(repr=False)
+    held_out: tuple[SampledRecording, ...] = field(repr=False)
+    equation: DiscoveredEquation | None = field(default=None, repr=False)
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
+    plan: ExperimentPlan | None = field(default=None, repr=False)
+    oscillations: tuple[Oscillation, ...] = field(default=(), repr=False)
     unread: tuple[str, ...] = ()
 
 
-def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
+def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
     """Return the diagnosis of a case. Raises SpecError, ValueError, ToolMissing."""
-    begun = time.monotonic()
+    start_time = time.monotonic()
     automaton = automaton_of(case.document, case.project)
-    seen = compared(case.mapping, automaton)
+    seen = compared_outputs(case.mapping, automaton)
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
-    raw = case_bench(case, automaton, series, seen)
-    ways = ways_of(raw, tell)
-    found = judged(case, raw, ways, tell)
-    bench, selection, loci = found.bench, found.selection, found.loci
-    plan = planned(bench, _told_apart(selection, automaton))
+    raw = build_model_set(case, automaton, series, seen)
+    ways = recalibrate_by_hold(raw, log)
+    decision = decide(case, raw, ways, log)
+    model_set, selection, locations = decision.model_set, decision.selection, decision.locations
+    plan = plan_experiment(model_set, _models_to_discriminate(selection, automaton))
     if plan is not None:
-        tell(plan.sentence())
-    loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
-    if found.says == "unknown":
-        near = _near(selection, found.thresholds.usual)
-        selection = dataclasses.replace(selection, rivals=nearest(near))
-        loci = likely(loci, [place_path(one.layer) for one in near], bench)
-    fit = {"train": misfits(found.base, selection.model, bench.series)}
-    verdict = _verdict(found.says, selection, loci, automaton, fit)
-    hashes = {case.name_of(path): _digest(path) for path in case.train}
-    verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
-    held, unread = _held_out(case, automaton, seen, bench.series[0].is_linear)
-    for text in unread:
-        tell(text)
-    if held:
-        tell(
-            "held out: "
-            + ", ".join(f"{case.name_of(path)} {_digest(path)}" for path in case.held_out)
+        log(plan.format_sentence())
+    locations = rank_accepted_first(
+        locations, [place_path(tried.placed_effect) for tried in selection.accepted], model_set
+    )
+    if decision.outcome == "unknown":
+        candidates = _candidates_above(selection, decision.thresholds.default)
+        selection = dataclasses.replace(selection, rivals=near_best(candidates))
+        locations = rank_causes_first(
+            locations, [place_path(one.placed_effect) for one in candidates], model_set
         )
-        held = started(selection.base, [settled_at_start(one) for one in held])
-        verdict = _confirmed(verdict, selection, held)
-    verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
-    shuffles = _shuffles(selection, bench)
-    known = found.description, found.thresholds, plan, shuffles
-    return Diagnosis(verdict, selection, bench, held, *known, unread=unread)
+    fit = {"train": compare_misfits(decision.base, selection.model, model_set.series)}
+    verdict = _build_verdict(decision.outcome, selection, locations, automaton, fit)
+    hashes = {case.name_of(path): _file_digest(path) for path in case.train}
+    verdict = dataclasses.replace(
+        verdict, inputs=hashes, messages=(format_location(locations, model_set),)
+    )
+    held_out, unread = _read_held_out(
+        case, automaton, seen, model_set.series[0].is_first_order_hold
+    )
+    for text in unread:
+        log(text)
+    if held_out:
+        log(
+            "held out: "
+            + ", ".join(f"{case.name_of(path)} {_file_digest(path)}" for path in case.held_out)
+        )
+        held_out = choose_initial_inputs(
+            selection.base, [average_initial_inputs(one) for one in held_out]
+        )
+        verdict = _confirm(verdict, selection, held_out)
+    verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - start_time)
+    shuffles = _oscillations(selection, model_set)
+    details = decision.equation, decision.thresholds, plan, shuffles
+    return Diagnosis(verdict, selection, model_set, held_out, *details, unread=unread)
 
 
-def _held_out(
-    case: Case, automaton: Automaton, seen: Sequence[str], is_linear: bool
-) -> tuple[tuple[Series, ...], tuple[str, ...]]:
+def _read_held_out(
+    case: Case, automaton: Automaton, output_names: Sequence[str], is_first_order_hold: bool
+) -> tuple[tuple[SampledRecording, ...], tuple[str, ...]]:
     """Open what is held out; what cannot be read is told, for the verdict stands without it."""
-    held: list[Series] = []
+    recordings: list[SampledRecording] = []
     unread = []
     for k, path in enumerate(case.held_out):
         known = next((o for o in (*case.train, *case.held_out[:k]) if overlap(path, o)), None)
@@ -121,54 +131,66 @@ def _held_out(
             unread.append(f"{named}: it is a copy of {case.name_of(known)}")
             continue
         try:
-            held += paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
+            recordings += resample(
+                read_series(path, case, automaton, output_names),
+                automaton,
+                output_names,
+                is_first_order_hold,
+            )
         except (SpecError, ValueError) as error:
             why = error.problems[0].label if isinstance(error, SpecError) else str(error)
             unread.append(f"{case.name_of(path)} was held out and cannot be used: {why}")
-    return tuple(held), tuple(unread)
+    return tuple(recordings), tuple(unread)
 
 
-def _shuffles(selection: Selection, bench: Bench) -> tuple[Shuffle, ...]:
+def _oscillations(selection: Selection, model_set: ModelSet) -> tuple[Oscillation, ...]:
     models = [selection.base, *([selection.model] if selection.accepted else [])]
-    found = [shuffle_of(model, bench.series) for model in models]
+    found = [analyse_oscillation(model, model_set.series) for model in models]
     return tuple(one for one in found if one is not None) if found[0] is not None else ()
 
 
-def _near(selection: Selection, least: float) -> list[Tried]:
-    """Return the candidates that gain more than the `least` [nats], best first."""
+def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFit]:
+    """Return the candidates that gain more than the `min_gain` [nats], best first."""
     rounds = selection.first_round
-    near = [one for one in rounds if one.evidence and one.evidence.train > least]
+    near = [
+        one for one in rounds if one.likelihood_gain and one.likelihood_gain.penalised > min_gain
+    ]
     return sorted(near, key=lambda one: -one.score)
 
 
-def _told_apart(selection: Selection, automaton: Automaton) -> list[tuple[str, Estimate]]:
+def _models_to_discriminate(
+    selection: Selection, automaton: Automaton
+) -> list[tuple[str, Estimate]]:
     """Return the first accepted effect and its rivals, by name."""
     some = (*selection.accepted[:1], *selection.rivals)
     return [
-        ("@".join(_name(tried.layer, automaton)), tried.estimate)
+        ("@".join(_verdict_name(tried.placed_effect, automaton)), tried.estimate)
         for tried in some
-        if tried.estimate is not None and tried.estimate.normal is not None
+        if tried.estimate is not None and tried.estimate.normal_equations is not None
     ]
 
 
-def _verdict(
-    says: Says,
+def _build_verdict(
+    outcome: DecisionOutcome,
     selection: Selection,
-    loci: Sequence[Locus],
+    locations: Sequence[Location],
     automaton: Automaton,
     fit: dict[str, dict[str, Misfit]],
 ) -> Verdict:
-    effects = tuple(named(tried.layer, selection.model, automaton) for tried in selection.accepted)
-    rivals = _rivals(selection, automaton)
+    effects = tuple(
+        named_effect_of(tried.placed_effect, selection.model, automaton)
+        for tried in selection.accepted
+    )
+    rivals = _name_rivals(selection, automaton)
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     base = {name: (before[name], after.get(name, before[name])) for name in before}
     return Verdict(
-        says,
-        effects if says == "effect" else (),
-        _ranked(selection, automaton),
+        outcome,
+        effects if outcome == "effect" else (),
+        _rank_candidates(selection, automaton),
         selection.probabilities()["other"],
-        (*effects, *rivals) if says == "ambiguous" else rivals,
-        tuple(loci),
+        (*effects, *rivals) if outcome == "ambiguous" else rivals,
+        tuple(locations),
         fit,
         base,
         None,
@@ -176,21 +198,21 @@ def _verdict(
     )
 
 
-def _name(layer: Layer, automaton: Automaton) -> tuple[str, str]:
+def _verdict_name(placed_effect: PlacedEffect, automaton: Automaton) -> tuple[str, str]:
     """Return how verdicts name an effect, and its place."""
-    return verdict_id(layer, automaton), place_path(layer)
+    return verdict_id(placed_effect, automaton), place_path(placed_effect)
 
 
-def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
+def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[RankedCandidate, ...]:
     """Return the fitted candidates, best first: forms of one name at one place are one."""
     probabilities = selection.probabilities()
-    found: dict[tuple[str, str], Ranked] = {}
+    found: dict[tuple[str, str], RankedCandidate] = {}
     for tried in selection.first_round:
-        if tried.evidence is None:
+        if tried.likelihood_gain is None:
             continue
-        name, each = _name(tried.layer, automaton), tried.evidence
-        std = float(np.std(each.each) * np.sqrt(len(each.each)))
-        new = Ranked(*name, probabilities[tried.layer.id], each.train, std)
+        name, each = _verdict_name(tried.placed_effect, automaton), tried.likelihood_gain
+        std = float(np.std(each.by_recording) * np.sqrt(len(each.by_recording)))
+        new = RankedCandidate(*name, probabilities[tried.placed_effect.id], each.penalised, std)
         old = found.setdefault(name, new)
         if old is not new:
             both = old.probability + new.probability
@@ -198,33 +220,38 @@ def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
     return tuple(found.values())
 
 
-def _rivals(selection: Selection, automaton: Automaton) -> tuple[Named, ...]:
+def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffect, ...]:
     """Return the rivals as verdicts name them, but for other forms of what is named already."""
-    taken = [_name(one.layer, automaton) for one in selection.accepted]
-    found: dict[tuple[str, str], Named] = {}
+    taken = [_verdict_name(one.placed_effect, automaton) for one in selection.accepted]
+    found: dict[tuple[str, str], NamedEffect] = {}
     for tried in selection.rivals:
-        name = _name(tried.layer, automaton)
+        name = _verdict_name(tried.placed_effect, automaton)
         if name not in taken and tried.estimate is not None:
-            found.setdefault(name, named(tried.layer, tried.estimate, automaton))
+            found.setdefault(name, named_effect_of(tried.placed_effect, tried.estimate, automaton))
     return tuple(found.values())
 
 
-def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...]) -> Verdict:
+def _confirm(
+    verdict: Verdict, selection: Selection, held_out: tuple[SampledRecording, ...]
+) -> Verdict:
     """Return the verdict with what the held out recordings say of it.
 
     They confirm it where they are foreseen better and no signal is simulated worse, or each much
     better: a base that drifts may foresee as well without knowing why.
     """
-    base = adapted(selection.base, held)
-    model = adapted(selection.model, held)
-    shown = misfits(base, model, held)
+    base = reestimate_per_recording(selection.base, held_out)
+    model = reestimate_per_recording(selection.model, held_out)
+    shown = compare_misfits(base, model, held_out)
     fit = {**verdict.fit, "held_out": shown}
     left = [one.nrmse_after / one.nrmse_before for one in shown.values() if one.nrmse_before]
-    is_foreseen = model.likelihood < base.likelihood and max(left, default=0.0) < LITTLE_MORE
-    is_better = is_foreseen or max(left, default=1.0) < MUCH_LESS
+    is_foreseen = (
+        model.negative_log_likelihood < base.negative_log_likelihood
+        and max(left, default=0.0) < MAX_WORSE_RATIO
+    )
+    is_better = is_foreseen or max(left, default=1.0) < CONFIRMATION_RATIO
     confirmed = is_better if selection.accepted else None
     return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
 
 
-def _digest(path: Path) -> str:
+def _file_digest(path: Path) -> str:
     return hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]

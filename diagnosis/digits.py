@@ -6,13 +6,13 @@ import math
 
 from diagnosis.verdict import Quantity
 
-UNIT_LESS = ("1", "")
+DIMENSIONLESS = ("1", "")
 
 
-def with_spread(value: float, std: float) -> str:
+def format_with_std(value: float, std: float) -> str:
     """Return a value and its standard deviation: two digits of the latter, and as many places."""
     if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
-        return significant(value, 4)
+        return format_significant(value, 4)
     std = float(f"{std:.2g}")
     places = max(0, 1 - math.floor(math.log10(std)))
     if places > 8 or abs(value) >= 1e6:
@@ -23,13 +23,13 @@ def with_spread(value: float, std: float) -> str:
     return f"{value:.{places}f} ± {std:.{places}f}"
 
 
-def quantity_text(one: Quantity) -> str:
+def format_quantity(quantity: Quantity) -> str:
     """Return a fitted number as `3.77 ± 0.05 N*m`."""
-    text = with_spread(one.value, one.std)
-    return text if one.unit in UNIT_LESS else f"{text} {one.unit}"
+    text = format_with_std(quantity.value, quantity.std)
+    return text if quantity.unit in DIMENSIONLESS else f"{text} {quantity.unit}"
 
 
-def significant(value: float, digits: int = 3) -> str:
+def format_significant(value: float, digits: int = 3) -> str:
     """Return a number with so many digits that count, without an exponent where it can be read."""
     if not math.isfinite(value):
         return "-"
@@ -40,7 +40,7 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.{max(0, places)}f}"
 
 
-def per_cent(part: float) -> str:
+def format_percent(part: float) -> str:
     """Return a part as `0.96 %`, `3.2 %` or `45 %`."""
     value = 100.0 * part
     if not math.isfinite(value):
@@ -49,7 +49,7 @@ def per_cent(part: float) -> str:
     return f"{value:.{2 if size < 1.0 else 1 if size < 10.0 else 0}f} %"
 
 
-def change(before: float, after: float) -> str:
+def format_change(before: float, after: float) -> str:
     """Return how much a misfit has changed: `-52 %`, `+7 %`, `as before`."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return "-"
@@ -57,7 +57,7 @@ def change(before: float, after: float) -> str:
     return "as before" if abs(part) < 0.5 else f"{part:+.0f} %".replace("-", "\N{MINUS SIGN}")
 
 
-def probability(share: float) -> str:
+def format_probability(share: float) -> str:
     """Return a probability; what is beyond a tenth of a per cent is not told."""
     if share < 0.001:
         return "< 0.1 %"

@@ -11,7 +11,7 @@ from typing import Any
 
 from diagnosis.case import Case
 from diagnosis.diagnose import Diagnosis
-from diagnosis.finding import Finding, told
+from diagnosis.finding import Finding, format_findings
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict
 from engine.recorded_part import file_of
@@ -19,7 +19,7 @@ from language.model import Automaton
 
 
 @dataclass(frozen=True)
-class Dossier:
+class DiagnosisReport:
     """A verdict on `case`, with the check of its recordings.
 
     `diagnosis` is None where nothing was concluded: the recordings are not usable, or the
@@ -34,8 +34,8 @@ class Dossier:
     verdict: Verdict
     diagnosis: Diagnosis | None = field(default=None, repr=False)
     held_out: Mapping[str, str] = field(default_factory=dict)
-    left_out: tuple[str, ...] = ()
-    ended: str = ""
+    unused_recordings: tuple[str, ...] = ()
+    end_reason: str = ""
 
     @property
     def name(self) -> str:
@@ -48,52 +48,57 @@ class Dossier:
         return self.check.findings
 
 
-def verdict_json(verdict: Verdict) -> dict[str, Any]:
+def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict as JSON has it: a number that is not finite is null."""
-    found = finite(verdict.json())
+    found = replace_non_finite(verdict.to_json())
     assert isinstance(found, dict)
     return found
 
 
-def finite(value: Any) -> Any:
+def replace_non_finite(value: Any) -> Any:
     """Return plain data in which numbers that are not finite are None."""
     if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
+        return {key: replace_non_finite(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [finite(one) for one in value]
+        return [replace_non_finite(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def usable(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
+def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
     """Return the recordings to conclude from: none where half of them or more have an error.
 
     A mistake in a few is one of these files, which are left out; in many it is one of the map.
     """
-    bad = {finding.recording for finding in errors_of(check)}
+    bad = {finding.recording for finding in recording_errors(check)}
     kept = tuple(file for file in case.train if case.name_of(file) not in bad)
     if "" in bad or 2 * len(kept) <= len(case.train):
         return () if bad else case.train
     return kept
 
 
-def errors_of(check: RecordingCheck) -> list[Finding]:
+def recording_errors(check: RecordingCheck) -> list[Finding]:
     """Return what makes recordings worthless."""
     return [finding for finding in check.findings if finding.severity == "error"]
 
 
-def unusable(check: RecordingCheck) -> tuple[str, ...]:
+def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
     """Return why no conclusion can be drawn from recordings."""
-    return ("the recordings are not usable", *(text for _, text in told(errors_of(check))))
+    return (
+        "the recordings are not usable",
+        *(text for _, text in format_findings(recording_errors(check))),
+    )
 
 
-def undecided(messages: tuple[str, ...], train: Mapping[str, str], runtime_s: float) -> Verdict:
+def undecided_verdict(
+    messages: tuple[str, ...], train: Mapping[str, str], runtime_s: float
+) -> Verdict:
     """Return the verdict where nothing was concluded, for the reasons in its messages."""
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )
 
 
-def hashes(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
+def file_digests(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
     """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
     return {
         case.name_of(path): hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]

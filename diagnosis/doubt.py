@@ -9,95 +9,112 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from diagnosis.actor import acting
-from diagnosis.bench import Bench
-from diagnosis.description import Description
-from diagnosis.excess import excess_at
+from diagnosis.actor import balance_of
+from diagnosis.bench import ModelSet
+from diagnosis.description import DiscoveredEquation
+from diagnosis.excess import regression_at
 from diagnosis.naming import place_path
-from diagnosis.regression import ranking
-from diagnosis.search import Tried
+from diagnosis.regression import rank_terms
+from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
-from diagnosis.share import ranked
-from diagnosis.verdict import Says
+from diagnosis.share import ranking_gain
+from diagnosis.verdict import DecisionOutcome
 from language.problem import SpecError
 
-UNEXPLAINED = 2.5
+UNEXPLAINED_FACTOR = 2.5
 """Times the threshold that the freedom of a place gains where a formula is tried."""
-LEFT = 2.0
+REMAINDER_FACTOR = 2.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
-LEFT_PART = 0.3
+REMAINDER_FRACTION = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""
-MUCH_OVER = 0.8
+LARGE_REMAINDER_FRACTION = 0.8
 """Part of what accepted effects gained that a term at their place gains beside them, from which on
 they are something else: the right ones left a third of it at most."""
-STILL = 0.5
+MAX_DISTURBANCE_LEVEL = 0.5
 """Units of its drifts below which a model with what was accepted needs none."""
-MORE = 1.5
+EQUATION_GAIN_FACTOR = 1.5
 """A formula is the verdict where it gains so many times as much as what was accepted."""
 
 
-def is_doubtful(
-    says: Says, selection: Selection, left: float, over: float, threshold: float
+def triggers_discovery(
+    outcome: DecisionOutcome,
+    selection: Selection,
+    unexplained: float,
+    remaining_gain: float,
+    threshold: float,
 ) -> bool:
     """Tell whether a formula might say more than the verdict does.
 
-    `left` is what the base leaves unexplained [nats], `over` what accepted effects leave.
+    `unexplained` is what the base leaves unexplained [nats], `remaining_gain` what accepted effects leave.
     """
-    if says in ("unknown", "ambiguous"):
+    if outcome in ("unknown", "ambiguous"):
         return True
-    if says == "nothing_missing":
-        return left > UNEXPLAINED * threshold
-    return over > max(LEFT * threshold, LEFT_PART * _gained(selection))
+    if outcome == "nothing_missing":
+        return unexplained > UNEXPLAINED_FACTOR * threshold
+    return remaining_gain > max(
+        REMAINDER_FACTOR * threshold, REMAINDER_FRACTION * _gained(selection)
+    )
 
 
-def leaves_much(selection: Selection, over: float, threshold: float) -> bool:
+def has_large_remainder(selection: Selection, remaining_gain: float, threshold: float) -> bool:
     """Tell whether accepted effects leave over much of what they gained: they are not what is
     missing, whether or not a formula is found that says more.
     """
-    return over > max(threshold, MUCH_OVER * _gained(selection))
+    return remaining_gain > max(threshold, LARGE_REMAINDER_FRACTION * _gained(selection))
 
 
 def _gained(selection: Selection) -> float:
-    return sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
+    return sum(
+        tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
+    )
 
 
-def is_still(selection: Selection, units: Mapping[str, float]) -> bool:
+def needs_no_disturbance(selection: Selection, units: Mapping[str, float]) -> bool:
     """Tell whether a model with what was accepted needs no drift."""
-    drifts = selection.model.noises.drifts
-    return all(drifts.get(name, 0.0) < STILL * unit for name, unit in units.items())
+    drifts = selection.model.noise_levels.process
+    return all(drifts.get(name, 0.0) < MAX_DISTURBANCE_LEVEL * unit for name, unit in units.items())
 
 
-def left_over(bench: Bench, selection: Selection, units: Mapping[str, float]) -> float:
+def remaining_term_gain(
+    model_set: ModelSet, selection: Selection, units: Mapping[str, float]
+) -> float:
     """Return what the best term gains [nats] where effects were accepted, beside them; nothing
     where the model needs no drift.
     """
     most, model = 0.0, selection.model
-    if is_still(selection, units):
+    if needs_no_disturbance(selection, units):
         return most
-    paths = [place_path(tried.layer).partition(".") for tried in selection.accepted]
-    for path in {acting(bench, section, place) for section, _, place in paths}:
+    paths = [place_path(tried.placed_effect).partition(".") for tried in selection.accepted]
+    for path in {balance_of(model_set, section, place) for section, _, place in paths}:
         section, _, place = path.partition(".")
         try:
-            excess = excess_at(bench, model, section, place)
+            excess = regression_at(model_set, model, section, place)
         except SpecError:
             continue
-        most = max(most, ranking(excess.problem, excess.columns)[0][0])
+        most = max(most, rank_terms(excess.problem, excess.columns)[0][0])
     return most
 
 
-def explains_more(found: Description, selection: Selection) -> bool:
+def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> bool:
     """Tell whether a formula gains clearly more than all that was accepted."""
-    gains = [ranked(tried.evidence) for tried in selection.accepted if tried.evidence]
-    return ranked(found.evidence) > MORE * sum(gains)
+    gains = [
+        ranking_gain(tried.likelihood_gain) for tried in selection.accepted if tried.likelihood_gain
+    ]
+    return ranking_gain(equation.likelihood_gain) > EQUATION_GAIN_FACTOR * sum(gains)
 
 
-def selected_formula(selection: Selection, found: Description) -> Selection:
+def select_equation(selection: Selection, equation: DiscoveredEquation) -> Selection:
     """Return a selection in which a formula is what was accepted, and no candidate is likely."""
-    tried = Tried(found.formula.layer, found.evidence.train, found.estimate, found.evidence)
+    tried = CandidateFit(
+        equation.formula.placed_effect,
+        equation.likelihood_gain.penalised,
+        equation.estimate,
+        equation.likelihood_gain,
+    )
     return dataclasses.replace(
         selection,
-        model=found.estimate,
+        model=equation.estimate,
         accepted=(tried,),
         rivals=(),
-        other=max(selection.other, found.evidence.total),
+        other=max(selection.other, equation.likelihood_gain.total),
     )

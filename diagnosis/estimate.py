@@ -9,24 +9,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.gains import gains_of
-from diagnosis.likeness import seen_like
-from diagnosis.normal import Normal, normal_of
-from diagnosis.point import Point, all_values_at, values_at
+from diagnosis.gains import kalman_gains
+from diagnosis.likeness import share_operating_points
+from diagnosis.normal import NormalEquations, normal_equations_of
+from diagnosis.point import ParameterVector, all_values_at, values_at
 from diagnosis.prediction import (
-    Gains,
     Innovations,
-    Noises,
-    Outcome,
-    foreseen_at,
-    foreseen_with,
-    noises_at,
-    predicted,
+    KalmanGains,
+    NoiseLevels,
+    PredictionResult,
+    noise_levels_at,
+    predict,
+    predict_at_points,
+    predict_with_gains,
 )
-from diagnosis.series import Series
-from diagnosis.slopes import Columns, columns_of
+from diagnosis.series import SampledRecording
+from diagnosis.slopes import Jacobian, difference_jacobian
 
-LEVEL_STEP = 0.05
+LOG_LEVEL_STEP = 0.05
 """Change of the logarithm of a level for a difference."""
 
 
@@ -40,137 +40,165 @@ class Estimate:
     """
 
     candidate: Candidate
-    point: Point
+    point: ParameterVector
     cost: float
-    outcome: Outcome = field(repr=False)
-    gains: Gains = field(repr=False)
-    noises: Noises = field(repr=False)
-    normal: Normal | None = field(default=None, repr=False)
-    columns: Columns = field(default_factory=dict, repr=False)
-    in_vain: Columns | None = field(default=None, repr=False)
+    prediction: PredictionResult = field(repr=False)
+    gains: KalmanGains = field(repr=False)
+    noise_levels: NoiseLevels = field(repr=False)
+    normal_equations: NormalEquations | None = field(default=None, repr=False)
+    jacobian: Jacobian = field(default_factory=dict, repr=False)
+    exhausted_jacobian: Jacobian | None = field(default=None, repr=False)
 
     @property
-    def likelihood(self) -> float:
+    def negative_log_likelihood(self) -> float:
         """The cost without priors [nats]."""
-        return self.outcome.cost()
+        return self.prediction.negative_log_likelihood()
 
     def values(self, recording: int) -> dict[str, float]:
         """Return the parameters [SI] of a recording."""
         return values_at(self.candidate, self.point, recording)
 
 
-def looked_at(
+def evaluate(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    point: Point,
-    near: Outcome | None = None,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    point: ParameterVector,
+    nearby: PredictionResult | None = None,
 ) -> Estimate:
     """Return a candidate at a point, with gains made where its modes were seen.
 
-    `near` is where they were seen at a point near it, if that is known.
+    `nearby` is where they were seen at a point near it, if that is known.
     """
     values = values_at(candidate, point, 0)
-    gains = gains_of(candidate, series, values, noises, near)
-    outcome = run_at(candidate, series, point, gains, noises)
-    if near is None and outcome.is_whole:
-        gains = gains_of(candidate, series, values, noises, outcome)
-        outcome = run_at(candidate, series, point, gains, noises)
-    cost = outcome.cost() + point.prior(candidate)
-    return Estimate(candidate, point, cost, outcome, gains, noises)
+    gains = kalman_gains(candidate, series, values, noise_levels, nearby)
+    prediction = predict_at(candidate, series, point, gains, noise_levels)
+    if nearby is None and prediction.is_complete:
+        gains = kalman_gains(candidate, series, values, noise_levels, prediction)
+        prediction = predict_at(candidate, series, point, gains, noise_levels)
+    cost = prediction.negative_log_likelihood() + point.prior_cost(candidate)
+    return Estimate(candidate, point, cost, prediction, gains, noise_levels)
 
 
-def looked_like(
+def evaluate_near(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    point: Point,
-    like: Estimate | None,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    point: ParameterVector,
+    nearby: Estimate | None,
 ) -> Estimate:
     """Return a candidate at a point, with gains made where its modes were seen: where it had them
-    itself, or where a model `like` it had them, whichever foresees better.
+    itself, or where a model `nearby` it had them, whichever foresees better.
     """
-    if like is None:
-        return looked_at(candidate, series, noises, point)
-    gains = gains_of(candidate, series, values_at(candidate, point, 0), noises)
-    own = run_at(candidate, series, point, gains, noises)
-    if not own.is_whole:
-        return Estimate(candidate, point, np.inf, own, gains, noises)
-    near = seen_like(candidate, own, like.candidate, like.outcome)
-    first = looked_at(candidate, series, noises, point, own)
+    if nearby is None:
+        return evaluate(candidate, series, noise_levels, point)
+    gains = kalman_gains(candidate, series, values_at(candidate, point, 0), noise_levels)
+    own = predict_at(candidate, series, point, gains, noise_levels)
+    if not own.is_complete:
+        return Estimate(candidate, point, np.inf, own, gains, noise_levels)
+    near = share_operating_points(candidate, own, nearby.candidate, nearby.prediction)
+    first = evaluate(candidate, series, noise_levels, point, own)
     if near is own:
         return first
-    return min(first, looked_at(candidate, series, noises, point, near), key=lambda one: one.cost)
+    return min(
+        first, evaluate(candidate, series, noise_levels, point, near), key=lambda one: one.cost
+    )
 
 
-def with_normal(
-    estimate: Estimate, series: Sequence[Series], known: Columns | None = None
+def with_normal_equations(
+    estimate: Estimate, series: Sequence[SampledRecording], jacobian: Jacobian | None = None
 ) -> Estimate:
     """Return an estimate with the normal equations at its point.
 
-    `known` are columns of a model near it, which are not looked for again.
+    `jacobian` are columns of a model near it, which are not looked for again.
     """
 
-    def run(points: Sequence[Point]) -> list[Innovations]:
+    def run(points: Sequence[ParameterVector]) -> list[Innovations]:
         return innovations_at(estimate, series, points)
 
-    candidate, outcome = estimate.candidate, estimate.outcome
-    known = known or {}
-    fresh = [one.name for one in candidate.recipe.uncertain if one.name not in known]
-    columns = {**known, **columns_of(candidate, estimate.point, outcome, run, fresh)}
-    columns |= _of_levels(
-        estimate, series, [o.name for o in candidate.levels if o.name not in known]
+    candidate, prediction = estimate.candidate, estimate.prediction
+    jacobian = jacobian or {}
+    fresh = [one.name for one in candidate.compiled.uncertain if one.name not in jacobian]
+    columns = {**jacobian, **difference_jacobian(candidate, estimate.point, prediction, run, fresh)}
+    columns |= _noise_parameter_jacobian(
+        estimate, series, [o.name for o in candidate.noise_parameters if o.name not in jacobian]
     )
-    normal = normal_of(candidate, outcome, columns)
-    return dataclasses.replace(estimate, normal=normal, columns=columns)
+    normal = normal_equations_of(candidate, prediction, columns)
+    return dataclasses.replace(estimate, normal_equations=normal, jacobian=columns)
 
 
-def _of_levels(now: Estimate, series: Sequence[Series], names: Sequence[str]) -> Columns:
+def _noise_parameter_jacobian(
+    estimate: Estimate, series: Sequence[SampledRecording], names: Sequence[str]
+) -> Jacobian:
     """Return how innovations change with levels: with the gains that are made with these."""
-    candidate, found = now.candidate, {}
+    candidate, jacobian = estimate.candidate, {}
     places = [candidate.names.index(name) for name in names]
-    moved = [now.point.moved(candidate, k, LEVEL_STEP / candidate.uncertain[k].sd) for k in places]
-    gains = [gains_there(now, series, there) for there in moved]
-    values = all_values_at(candidate, now.point)[: len(series)]
-    runs = foreseen_with(candidate, series, values, gains, now.noises.limits)
+    moved = [
+        estimate.point.perturb(candidate, k, LOG_LEVEL_STEP / candidate.free_parameters[k].sd)
+        for k in places
+    ]
+    gains = [gains_at(estimate, series, there) for there in moved]
+    values = all_values_at(candidate, estimate.point)[: len(series)]
+    runs = predict_with_gains(candidate, series, values, gains, estimate.noise_levels.huber_limits)
     for name, k, there, run in zip(names, places, moved, runs, strict=True):
-        changes = (run.joined - now.outcome.joined) / (there.shared[k] - now.point.shared[k])
-        found[name] = np.where(np.isfinite(changes), changes, 0.0)
-    return found
+        changes = (run.stacked - estimate.prediction.stacked) / (
+            there.shared[k] - estimate.point.shared[k]
+        )
+        jacobian[name] = np.where(np.isfinite(changes), changes, 0.0)
+    return jacobian
 
 
-def gains_there(now: Estimate, series: Sequence[Series], point: Point) -> Gains:
+def gains_at(
+    estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
+) -> KalmanGains:
     """Return the gains of an estimate with the levels that its candidate has at a point."""
-    if not now.candidate.levels:
-        return now.gains
-    noises, values = noises_at(now.candidate, point, now.noises), now.values(0)
-    return gains_of(now.candidate, series, values, noises, now.outcome)
+    if not estimate.candidate.noise_parameters:
+        return estimate.gains
+    noise_levels, values = (
+        noise_levels_at(estimate.candidate, point, estimate.noise_levels),
+        estimate.values(0),
+    )
+    return kalman_gains(estimate.candidate, series, values, noise_levels, estimate.prediction)
 
 
-def run_at(
-    candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains, noises: Noises
-) -> Outcome:
+def predict_at(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    point: ParameterVector,
+    gains: KalmanGains,
+    noise_levels: NoiseLevels,
+) -> PredictionResult:
     """Return how a candidate foresees recordings at a point with some gains."""
     values = all_values_at(candidate, point)[: len(series)]
-    return predicted(candidate, series, values, gains, noises.limits)
+    return predict(candidate, series, values, gains, noise_levels.huber_limits)
 
 
-def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
+def predict_with_gains_of(
+    estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
+) -> PredictionResult:
     """Return how a model foresees some recordings at a point, with the gains of the estimate."""
-    return run_at(estimate.candidate, series, point, estimate.gains, estimate.noises)
+    return predict_at(estimate.candidate, series, point, estimate.gains, estimate.noise_levels)
 
 
 def innovations_at(
-    estimate: Estimate, series: Sequence[Series], points: Sequence[Point]
+    estimate: Estimate, series: Sequence[SampledRecording], points: Sequence[ParameterVector]
 ) -> list[Innovations]:
     """Return what a model does not foresee at some points, with the gains of the estimate."""
     candidate, gains = estimate.candidate, estimate.gains
     values = [all_values_at(candidate, point)[: len(series)] for point in points]
-    return foreseen_at(candidate, series, values, gains, estimate.noises.limits) if points else []
+    return (
+        predict_at_points(candidate, series, values, gains, estimate.noise_levels.huber_limits)
+        if points
+        else []
+    )
 
 
-def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estimate:
+def evaluate_with_gains_of(
+    estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
+) -> Estimate:
     """Return an estimate at a point for some recordings, with the gains that it has."""
-    outcome = outcome_at(estimate, series, point)
-    cost = outcome.cost() + point.prior(estimate.candidate)
-    return Estimate(estimate.candidate, point, cost, outcome, estimate.gains, estimate.noises)
+    prediction = predict_with_gains_of(estimate, series, point)
+    cost = prediction.negative_log_likelihood() + point.prior_cost(estimate.candidate)
+    return Estimate(
+        estimate.candidate, point, cost, prediction, estimate.gains, estimate.noise_levels
+    )

@@ -16,216 +16,255 @@ import numpy as np
 from diagnosis.candidate import Candidate
 from diagnosis.estimate import (
     Estimate,
-    gains_there,
-    looked_at,
-    looked_like,
-    run_at,
-    with_normal,
+    evaluate,
+    evaluate_near,
+    gains_at,
+    predict_at,
+    with_normal_equations,
 )
-from diagnosis.normal import foreseen, stepped
-from diagnosis.point import Point, point_of
-from diagnosis.prediction import Noises, noises_at
-from diagnosis.series import Series
-from diagnosis.slopes import Columns, carried
+from diagnosis.normal import damped_step, predicted_gain
+from diagnosis.point import ParameterVector, vector_of
+from diagnosis.prediction import NoiseLevels, noise_levels_at
+from diagnosis.series import SampledRecording
+from diagnosis.slopes import Jacobian, broyden_update
 
-MOST_ROUNDS = 15
-ENOUGH = 0.3
+MAX_ITERATIONS = 15
+MIN_GAIN = 0.3
 """A round that gains less than this [nats] is the last."""
-ENOUGH_CARRIED = 2.0
+MIN_GAIN_BROYDEN = 2.0
 """The same where slopes were carried along steps from where they were looked for."""
-WORTH_ANEW = 1.0
+MIN_GAIN_NEW_JACOBIAN = 1.0
 """Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
-COMPLETIONS = 12
+MAX_REFINEMENTS = 12
 """How often they are at most: a tyre's mode had not come to rest after three."""
-NOTHING = 0.05
+MIN_PREDICTED_GAIN = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
-LITTLE = 1.0
+MIN_PREDICTED_SCREENING_GAIN = 1.0
 """The same while candidates are screened."""
-FIRST_DAMPING = 1e-3
-LARGEST_DAMPING = 1e5
-SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
+INITIAL_DAMPING = 1e-3
+MAX_DAMPING = 1e5
+SCREENING_ITERATIONS, SINGLE_RECORDING_ITERATIONS = 8, 4
 """Most rounds while candidates are screened, and those after which, on a single recording, which
 cannot tell chance from physics, a further one has to gain much."""
-LATE_PART = 0.1
+LATE_GAIN_FRACTION = 0.1
 """What is much: part of all that was gained."""
-WORTH_A_ROUND = 3.0
+MIN_ITERATION_GAIN = 3.0
 """A round of screening that gains less [nats] is the last."""
 
 
-def estimated(
+def estimate_parameters(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
-    rounds: int = MOST_ROUNDS,
-    known: Columns | None = None,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    max_iterations: int = MAX_ITERATIONS,
+    jacobian: Jacobian | None = None,
 ) -> Estimate:
     """Return the point that foresees the recordings best, from `start` [SI].
 
-    `known` are slopes of the candidate near the start, if there are such.
+    `jacobian` are slopes of the candidate near the start, if there are such.
     """
-    return completed(led(candidate, series, noises, start, rounds, known), series, rounds)
+    return refine(
+        iterate(candidate, series, noise_levels, start, max_iterations, jacobian),
+        series,
+        max_iterations,
+    )
 
 
-def followed(
+def iterate_broyden(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
-    rounds: int = MOST_ROUNDS,
-    known: Columns | None = None,
-    like: Estimate | None = None,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    max_iterations: int = MAX_ITERATIONS,
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
 ) -> Estimate:
     """Return where steps lead with slopes that are looked for once, and carried along them.
 
-    A model `like` it may tell where the modes are at the start.
+    A model `nearby` it may tell where the modes are at the start.
     """
-    return _walked_from(candidate, series, noises, start, rounds, known, like).ended(series)
+    return _iterate_from(
+        candidate, series, noise_levels, start, max_iterations, jacobian, nearby
+    ).with_jacobian(series)
 
 
-def led(
+def iterate(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
-    rounds: int = MOST_ROUNDS,
-    known: Columns | None = None,
-    like: Estimate | None = None,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    max_iterations: int = MAX_ITERATIONS,
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
 ) -> Estimate:
     """Return what `followed` does, without slopes at its end: those are looked for anew."""
-    return _walked_from(candidate, series, noises, start, rounds, known, like).there
+    return _iterate_from(
+        candidate, series, noise_levels, start, max_iterations, jacobian, nearby
+    ).estimate
 
 
-def _walked_from(
+def _iterate_from(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
-    rounds: int,
-    known: Columns | None,
-    like: Estimate | None,
-) -> _Walk:
-    point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
-    now = looked_like(candidate, series, noises, point, like)
-    if not _is_known(now):
-        return _Walk(now)
-    return _walked(with_normal(now, series, known), series, rounds)
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    max_iterations: int,
+    jacobian: Jacobian | None,
+    nearby: Estimate | None,
+) -> _IterationResult:
+    point = (
+        start if isinstance(start, ParameterVector) else vector_of(candidate, len(series), start)
+    )
+    now = evaluate_near(candidate, series, noise_levels, point, nearby)
+    if not _is_finite(now):
+        return _IterationResult(now)
+    return _iterate_steps(with_normal_equations(now, series, jacobian), series, max_iterations)
 
 
-def completed(now: Estimate, series: Sequence[Series], rounds: int = MOST_ROUNDS) -> Estimate:
+def refine(
+    estimate: Estimate, series: Sequence[SampledRecording], max_iterations: int = MAX_ITERATIONS
+) -> Estimate:
     """Return a fit that is done: slopes are looked for at its end, and steps sought with these."""
-    if not _is_known(now):
-        return now
-    for _ in range(COMPLETIONS):
-        now = with_normal(now, series)
-        further = _walked(now, series, rounds, least=ENOUGH)
-        if now.cost - further.there.cost < WORTH_ANEW:
-            return further.ended(series)
-        now = further.there
-    return with_normal(now, series)
+    if not _is_finite(estimate):
+        return estimate
+    for _ in range(MAX_REFINEMENTS):
+        estimate = with_normal_equations(estimate, series)
+        further = _iterate_steps(estimate, series, max_iterations, min_gain=MIN_GAIN)
+        if estimate.cost - further.estimate.cost < MIN_GAIN_NEW_JACOBIAN:
+            return further.with_jacobian(series)
+        estimate = further.estimate
+    return with_normal_equations(estimate, series)
 
 
-def _is_known(now: Estimate) -> bool:
-    return bool(np.isfinite(now.cost))
+def _is_finite(estimate: Estimate) -> bool:
+    return bool(np.isfinite(estimate.cost))
 
 
 @dataclass(frozen=True)
-class _Walk:
+class _IterationResult:
     """Where steps led: `there`, and the ends of the last one, along which slopes are to be carried
     to it; None where it has them.
     """
 
-    there: Estimate
-    step: tuple[Estimate, Estimate] | None = None
+    estimate: Estimate
+    last_step: tuple[Estimate, Estimate] | None = None
 
-    def ended(self, series: Sequence[Series]) -> Estimate:
+    def with_jacobian(self, series: Sequence[SampledRecording]) -> Estimate:
         """Return where the steps led, with its slopes."""
-        return _moved(*self.step, self.there, series) if self.step else self.there
+        return (
+            _update_jacobian(*self.last_step, self.estimate, series)
+            if self.last_step
+            else self.estimate
+        )
 
 
-def _walked(
-    now: Estimate, series: Sequence[Series], rounds: int, least: float = ENOUGH_CARRIED
-) -> _Walk:
-    """Return where steps lead until one gains less than the `least` [nats]."""
-    damping, walk = FIRST_DAMPING, _Walk(now)
-    for _ in range(rounds):
-        now = walk.ended(series)
-        better, damping = improved(now, series, damping)
+def _iterate_steps(
+    estimate: Estimate,
+    series: Sequence[SampledRecording],
+    max_iterations: int,
+    min_gain: float = MIN_GAIN_BROYDEN,
+) -> _IterationResult:
+    """Return where steps lead until one gains less than the `min_gain` [nats]."""
+    damping, result = INITIAL_DAMPING, _IterationResult(estimate)
+    for _ in range(max_iterations):
+        estimate = result.with_jacobian(series)
+        better, damping = search_damping(estimate, series, damping)
         if better is None:
-            return _Walk(now)
-        renewed = looked_at(now.candidate, series, better.noises, better.point, better.outcome)
-        best = renewed if renewed.cost < better.cost + ENOUGH else better
-        walk = _Walk(best, (now, better))
-        if now.cost - better.cost < least:
+            return _IterationResult(estimate)
+        reevaluated = evaluate(
+            estimate.candidate, series, better.noise_levels, better.point, better.prediction
+        )
+        best = reevaluated if reevaluated.cost < better.cost + MIN_GAIN else better
+        result = _IterationResult(best, (estimate, better))
+        if estimate.cost - better.cost < min_gain:
             break
-    return walk
+    return result
 
 
-def _moved(
-    before: Estimate, after: Estimate, there: Estimate, series: Sequence[Series]
+def _update_jacobian(
+    before: Estimate, after: Estimate, estimate: Estimate, series: Sequence[SampledRecording]
 ) -> Estimate:
-    """Return an estimate `there` with the slopes of the one `before`, carried along the step after
+    """Return an estimate `estimate` with the slopes of the one `before`, carried along the step after
     which it is. The gains there may be others than those of the step.
     """
     first, last = before.point, after.point
-    step = Point(last.shared - first.shared, last.own - first.own)
-    columns = carried(before.candidate, before.columns, before.outcome, after.outcome, step)
-    return with_normal(there, series, columns)
+    step = ParameterVector(last.shared - first.shared, last.per_recording - first.per_recording)
+    columns = broyden_update(
+        before.candidate, before.jacobian, before.prediction, after.prediction, step
+    )
+    return with_normal_equations(estimate, series, columns)
 
 
-def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds: int) -> Estimate:
-    """Return where some steps lead for which `known` columns of a model near it are good enough.
+def iterate_with_jacobian(
+    estimate: Estimate, series: Sequence[SampledRecording], jacobian: Jacobian, max_iterations: int
+) -> Estimate:
+    """Return where some steps lead for which `jacobian` columns of a model near it are good enough.
 
     Slopes of what the other model has not are looked for at each step: carried ones did not find
     unequal shafts, which begin far from where they fit.
     """
-    if not _is_known(estimate) or estimate.in_vain is known:
+    if not _is_finite(estimate) or estimate.exhausted_jacobian is jacobian:
         return estimate
-    now, damping = estimate, FIRST_DAMPING
-    early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
-    for done in range(1, rounds + 1):
+    current, damping = estimate, INITIAL_DAMPING
+    early = SINGLE_RECORDING_ITERATIONS if len(series) == 1 else SCREENING_ITERATIONS
+    for iteration in range(1, max_iterations + 1):
         least_damping = damping
-        better, damping = improved(with_normal(now, series, known), series, damping, least=LITTLE)
+        better, damping = search_damping(
+            with_normal_equations(current, series, jacobian),
+            series,
+            damping,
+            min_gain=MIN_PREDICTED_SCREENING_GAIN,
+        )
         if better is None:
-            is_all = least_damping <= FIRST_DAMPING
-            return dataclasses.replace(now, in_vain=known) if is_all else now
-        gained, now = now.cost - better.cost, better
-        late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
-        if gained < max(WORTH_A_ROUND, late):
+            is_all = least_damping <= INITIAL_DAMPING
+            return dataclasses.replace(current, exhausted_jacobian=jacobian) if is_all else current
+        gained, current = current.cost - better.cost, better
+        late = LATE_GAIN_FRACTION * (estimate.cost - current.cost) if iteration >= early else 0.0
+        if gained < max(MIN_ITERATION_GAIN, late):
             break
-    return now
+    return current
 
 
-def regained(now: Estimate, series: Sequence[Series]) -> Estimate:
+def refresh_gains(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
     """Return an estimate with gains made where it is, if they are better than those it has."""
-    again = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
-    return min(now, again, key=lambda one: one.cost)
+    refreshed = evaluate(
+        estimate.candidate, series, estimate.noise_levels, estimate.point, estimate.prediction
+    )
+    return min(estimate, refreshed, key=lambda one: one.cost)
 
 
-def improved(
-    now: Estimate,
-    series: Sequence[Series],
+def search_damping(
+    estimate: Estimate,
+    series: Sequence[SampledRecording],
     damping: float,
     own_only: bool = False,
-    least: float = NOTHING,
+    min_gain: float = MIN_PREDICTED_GAIN,
 ) -> tuple[Estimate | None, float]:
     """Return a better point and the damping that led there; None where there is none.
 
-    A step that is foreseen to gain less than the `least` [nats] is not tried.
+    A step that is foreseen to gain less than the `min_gain` [nats] is not tried.
     """
-    assert now.normal is not None
-    while damping < LARGEST_DAMPING:
-        point = stepped(now.candidate, now.point, now.normal, damping, own_only)
-        if foreseen(now.candidate, now.point, now.normal, point) < least:
+    assert estimate.normal_equations is not None
+    while damping < MAX_DAMPING:
+        point = damped_step(
+            estimate.candidate, estimate.point, estimate.normal_equations, damping, own_only
+        )
+        if (
+            predicted_gain(estimate.candidate, estimate.point, estimate.normal_equations, point)
+            < min_gain
+        ):
             damping *= 10.0
             continue
-        gains = gains_there(now, series, point)
-        outcome = run_at(now.candidate, series, point, gains, now.noises)
-        cost = outcome.cost() + point.prior(now.candidate)
-        if cost < now.cost:
-            noises = noises_at(now.candidate, point, now.noises)
-            better = Estimate(now.candidate, point, cost, outcome, gains, noises)
-            better = dataclasses.replace(better, normal=now.normal, columns=now.columns)
+        gains = gains_at(estimate, series, point)
+        prediction = predict_at(estimate.candidate, series, point, gains, estimate.noise_levels)
+        cost = prediction.negative_log_likelihood() + point.prior_cost(estimate.candidate)
+        if cost < estimate.cost:
+            noise_levels = noise_levels_at(estimate.candidate, point, estimate.noise_levels)
+            better = Estimate(estimate.candidate, point, cost, prediction, gains, noise_levels)
+            better = dataclasses.replace(
+                better, normal_equations=estimate.normal_equations, jacobian=estimate.jacobian
+            )
             return better, max(damping / 10.0, 1e-9)
         damping *= 10.0
     return None, damping

@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channel_check import ChannelCheck, check_channel
-from diagnosis.needs import EFFECTS, NEEDS
+from diagnosis.needs import EFFECT_NEEDS, NEED_DESCRIPTIONS
 from diagnosis.spectrum import spectrum
-from engine.recording import Channel, Recording, pieces
+from engine.recording import Channel, Recording, split_by_windows
 from language.map import column_dimension
-from language.units import NUMBER, fits, parse_unit
+from language.units import PURE_NUMBER, are_compatible, parse_unit
 
-Values = NDArray[np.float64]
+Reals = NDArray[np.float64]
 
 STEP_TIME = 0.06
 """A change made within this time is a step [s]."""
 STEP_SIZE = 0.15
 """Least size of a step, in the range of the signal."""
-REVERSED = 0.02
+REVERSAL_FRACTION = 0.02
 """How far beyond 0 a signal has to go on both sides to reverse, in its largest value."""
-LONGEST_WINDOW = 512
+MAX_WINDOW = 512
 """Samples of a window of a spectrum."""
-ABOVE_NOISE = 10.0
+MIN_POWER_RATIO = 10.0
 """Power over that of the noise from which a frequency is excited."""
 SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
 
@@ -45,7 +45,7 @@ class SignalExcitation:
 
 
 @dataclass(frozen=True)
-class Testable:
+class EffectTestability:
     """Whether the recordings can show an effect; `lacking` are the needs that are not met."""
 
     effect: str
@@ -64,41 +64,49 @@ class Excitation:
     duration: float
     inputs: tuple[SignalExcitation, ...]
     speeds: tuple[SignalExcitation, ...]
-    effects: tuple[Testable, ...]
+    effects: tuple[EffectTestability, ...]
 
     @property
-    def is_dead(self) -> bool:
+    def is_absent(self) -> bool:
         """Tell whether no input does anything."""
         idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
         return bool(idle) and all(idle)
 
 
-def excitation(recordings: Sequence[Recording], checks: Sequence[ChannelCheck]) -> Excitation:
+def analyse_excitation(
+    recordings: Sequence[Recording], checks: Sequence[ChannelCheck]
+) -> Excitation:
     """Return what the recordings excite."""
-    used = [_with_speeds(piece) for recording in recordings for piece in pieces(recording)]
+    used = [
+        _with_derived_speeds(piece)
+        for recording in recordings
+        for piece in split_by_windows(recording)
+    ]
     noise = {(check.recording, check.name): check for check in checks}
     names = dict.fromkeys(name for piece in used for name in piece.channels)
     inputs, speeds = [], []
     for name in names:
         channels = [(piece, piece.channels[name]) for piece in used if name in piece.channels]
         column = channels[0][1].column
-        found = _excited(name, channels, noise)
+        found = _signal_excitation(name, channels, noise)
         if is_speed(channels[0][1]):
             speeds.append(found)
         elif column.to is not None:
             inputs.append(found)
     if not inputs:  # a speed that is fed is all that drives
         inputs = [s for s in speeds if used[0].channels[s.name].column.to is not None]
-    met = _met(used, inputs, speeds, checks)
+    met = _met_needs(used, inputs, speeds, checks)
     effects = [
-        Testable(effect, tuple(NEEDS[need] for need in needs if need not in met))
-        for effect, needs in EFFECTS.items()
+        EffectTestability(
+            effect, tuple(NEED_DESCRIPTIONS[need] for need in needs if need not in met)
+        )
+        for effect, needs in EFFECT_NEEDS.items()
     ]
     total = sum(float(piece.end - piece.start) for piece in used)
     return Excitation(total, tuple(inputs), tuple(speeds), tuple(effects))
 
 
-def _with_speeds(piece: Recording) -> Recording:
+def _with_derived_speeds(piece: Recording) -> Recording:
     """Return a recording with the rates of its positions as channels if it has no speed."""
     if any(is_speed(channel) for channel in piece.channels.values()):
         return piece
@@ -107,10 +115,10 @@ def _with_speeds(piece: Recording) -> Recording:
         per = [
             parse_unit(f"{text}/s")
             for text in POSITIONS
-            if fits(column_dimension(channel.column), parse_unit(text).dimension)
+            if are_compatible(column_dimension(channel.column), parse_unit(text).dimension)
         ]
         if per and len(channel.values) > 2:
-            column = replace(channel.column, unit=per[0], to=None, scale=(Fraction(1), NUMBER))
+            column = replace(channel.column, unit=per[0], to=None, scale=(Fraction(1), PURE_NUMBER))
             rate = np.gradient(channel.array, channel.seconds)
             found[f"rate of {name}"] = Channel(column, channel.times, tuple(rate.tolist()))
     return replace(piece, channels=found)
@@ -119,10 +127,10 @@ def _with_speeds(piece: Recording) -> Recording:
 def is_speed(channel: Channel) -> bool:
     """Tell whether a channel is a speed, turning or straight."""
     dimension = column_dimension(channel.column)
-    return any(fits(dimension, parse_unit(text).dimension) for text in SPEEDS)
+    return any(are_compatible(dimension, parse_unit(text).dimension) for text in SPEEDS)
 
 
-def _excited(
+def _signal_excitation(
     name: str,
     channels: Sequence[tuple[Recording, Channel]],
     checks: Mapping[tuple[str, str], ChannelCheck],
@@ -134,15 +142,15 @@ def _excited(
     for recording, channel in channels:
         check = checks.get((recording.name, name)) or check_channel(recording, channel)
         floor = max(check.noise, check.quantum / np.sqrt(12.0), 1e-9 * max(abs(low), abs(high)))
-        steps += _steps(channel.seconds, channel.array, high - low, floor)
-        changes += _sign_changes(channel.array, max(abs(low), abs(high)), floor)
-        band = max(band, _band(channel.array, check.rate, floor))
+        steps += _step_sizes(channel.seconds, channel.array, high - low, floor)
+        changes += _count_sign_changes(channel.array, max(abs(low), abs(high)), floor)
+        band = max(band, _excited_bandwidth(channel.array, check.rate, floor))
     return SignalExcitation(
         name, channels[0][1].column.unit.text, low, high, changes, tuple(steps), band
     )
 
 
-def _steps(times: Values, values: Values, span: float, floor: float) -> list[float]:
+def _step_sizes(times: Reals, values: Reals, span: float, floor: float) -> list[float]:
     """Return the sizes of steps: changes within `STEP_TIME` that stand out of the noise."""
     if len(values) < 3 or span <= 6.0 * floor:
         return []
@@ -158,23 +166,23 @@ def _steps(times: Values, values: Values, span: float, floor: float) -> list[flo
     return found
 
 
-def _sign_changes(values: Values, largest: float, floor: float) -> int:
+def _count_sign_changes(values: Reals, largest: float, floor: float) -> int:
     """Return how often the sign changes, beyond noise."""
-    bound = max(REVERSED * largest, 4.0 * floor)
+    bound = max(REVERSAL_FRACTION * largest, 4.0 * floor)
     signs = np.sign(values[np.abs(values) > bound])
     return int(np.sum(np.diff(signs) != 0.0))
 
 
-def _band(values: Values, rate: float, floor: float) -> float:
+def _excited_bandwidth(values: Reals, rate: float, floor: float) -> float:
     """Return the highest frequency [Hz] at which there is clearly more than noise."""
     if len(values) < 64 or not rate:
         return 0.0
-    frequencies, power = spectrum(values, rate, LONGEST_WINDOW)
-    excited = frequencies[1:][power[1:] > ABOVE_NOISE * 2.0 * floor**2 / rate]
+    frequencies, power = spectrum(values, rate, MAX_WINDOW)
+    excited = frequencies[1:][power[1:] > MIN_POWER_RATIO * 2.0 * floor**2 / rate]
     return float(excited.max()) if len(excited) else 0.0
 
 
-def _met(
+def _met_needs(
     used: Sequence[Recording],
     inputs: Sequence[SignalExcitation],
     speeds: Sequence[SignalExcitation],
@@ -192,24 +200,28 @@ def _met(
             for signal in speeds
         ),
         "long": any(piece.end - piece.start >= 8 for piece in used),
-        "turns": any(_turns(used, signal) >= 5.0 for signal in speeds),
+        "turns": any(_revolutions(used, signal) >= 5.0 for signal in speeds),
         "moves": any(_time_moving(used, signal) >= 2.0 for signal in speeds),
         "brakes": any(_is_brake(signal) for signal in inputs),
     }
     met = {need for need, is_met in tests.items() if is_met}
-    if any(_both_signs(used, i, s) for i in inputs for s in speeds):
+    if any(_has_both_signs_at_one_speed(used, i, s) for i in inputs for s in speeds):
         met.add("both_signs")
-    if any(_power(used, i, s) for i in inputs for s in speeds):
+    if any(_has_power_range(used, i, s) for i in inputs for s in speeds):
         met.add("power")
     return met
 
 
 def _is_brake(signal: SignalExcitation) -> bool:
     """An input that is never negative and comes and goes."""
-    return signal.high > 0.0 and signal.low >= -REVERSED * signal.high and len(signal.steps) >= 2
+    return (
+        signal.high > 0.0
+        and signal.low >= -REVERSAL_FRACTION * signal.high
+        and len(signal.steps) >= 2
+    )
 
 
-def _turns(used: Sequence[Recording], signal: SignalExcitation) -> float:
+def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:
     angle = 0.0
     for piece in used:
         channel = piece.channels.get(signal.name)
@@ -229,9 +241,9 @@ def _time_moving(used: Sequence[Recording], signal: SignalExcitation) -> float:
     return time
 
 
-def _pairs(
+def _paired_samples(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
-) -> tuple[Values, Values]:
+) -> tuple[Reals, Reals]:
     """Return an input and a speed at the same times, all pieces in a row."""
     one, two = [], []
     for piece in used:
@@ -242,11 +254,11 @@ def _pairs(
     return np.concatenate(one or [np.zeros(0)]), np.concatenate(two or [np.zeros(0)])
 
 
-def _both_signs(
+def _has_both_signs_at_one_speed(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> bool:
     """Tell whether the input has both signs at one speed: in one of eight classes of it."""
-    torque, speed = _pairs(used, first, second)
+    torque, speed = _paired_samples(used, first, second)
     if not len(torque) or second.low == second.high:
         return False
     bound = 0.1 * max(abs(first.low), abs(first.high))
@@ -259,9 +271,11 @@ def _both_signs(
     return max(shares) > 0.1
 
 
-def _power(used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation) -> bool:
+def _has_power_range(
+    used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
+) -> bool:
     """Tell whether more than 60 per cent of the largest input occur at high and at low speed."""
-    torque, speed = _pairs(used, first, second)
+    torque, speed = _paired_samples(used, first, second)
     largest = max(abs(second.low), abs(second.high))
     strong = np.abs(torque) > 0.6 * max(abs(first.low), abs(first.high))
     fast = np.abs(speed) > 0.6 * largest

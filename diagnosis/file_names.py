@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 
-def file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
+def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
     """Return a name for each path: the bare one, or with as many folders as tell all apart."""
     absolute = {path: path.absolute().parts for path in paths}
     names: dict[Path, str] = {}
@@ -17,10 +17,10 @@ def file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
     return names
 
 
-def names_of(train: Sequence[Path], held_out: Sequence[Path]) -> Mapping[Path, str]:
+def recording_names(train: Sequence[Path], held_out: Sequence[Path]) -> Mapping[Path, str]:
     """Return a name for each recording: none that is held out has that of one to learn from."""
-    learnt, own = file_names(train), file_names(held_out)
+    learnt, own = distinguish_file_names(train), distinguish_file_names(held_out)
     if set(learnt.values()) & set(own.values()):
-        together = file_names([*train, *held_out])
+        together = distinguish_file_names([*train, *held_out])
         own = {path: together[path] for path in held_out}
     return {**learnt, **own}

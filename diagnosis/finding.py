@@ -8,8 +8,8 @@ from typing import Literal
 
 Severity = Literal["error", "warning", "note"]
 """An error makes a verdict about physics worthless, a warning may, a note does not."""
-ORDER: tuple[Severity, ...] = ("error", "warning", "note")
-ONE_BY_ONE = ("no_signal", "outlier", "leap")
+SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
+UNGROUPED_KINDS = ("no_signal", "outlier", "leap")
 """Kinds whose findings share a line only where they say the same."""
 
 
@@ -29,30 +29,30 @@ class Finding:
     window: tuple[float, float] | None = None
 
 
-def by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+def sort_by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return findings without repetitions, the worst first."""
     unique = dict.fromkeys(findings)
-    return tuple(sorted(unique, key=lambda finding: ORDER.index(finding.severity)))
+    return tuple(sorted(unique, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
-def told(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
+def format_findings(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
     """Return findings as lines, those of one kind together, the worst first.
 
     Values and reasons that are not the same are told in another line for each.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
-    for finding in by_severity(findings):
-        why = finding.text if finding.kind in ONE_BY_ONE else ""
+    for finding in sort_by_severity(findings):
+        why = finding.text if finding.kind in UNGROUPED_KINDS else ""
         groups.setdefault((finding.severity, finding.kind, why), []).append(finding)
-    return [(severity, _line(group)) for (severity, _, _), group in groups.items()]
+    return [(severity, _format_group(group)) for (severity, _, _), group in groups.items()]
 
 
-def _line(group: Sequence[Finding]) -> str:
-    first = group[0]
-    channels = ", ".join(f"`{name}`" for name in dict.fromkeys(f.channel for f in group) if name)
-    files = ", ".join(name for name in dict.fromkeys(f.recording for f in group) if name)
+def _format_group(findings: Sequence[Finding]) -> str:
+    first = findings[0]
+    channels = ", ".join(f"`{name}`" for name in dict.fromkeys(f.channel for f in findings) if name)
+    files = ", ".join(name for name in dict.fromkeys(f.recording for f in findings) if name)
     if "`" in first.text:  # it names the channel itself
-        others = len(group) - 1 if first.kind != "no_signal" else 0
+        others = len(findings) - 1 if first.kind != "no_signal" else 0
         more = f", and {others} more like that" if others else ""
         return first.text + more + (f" ({files})" if files else "")
     channels += f" ({files})" if files and channels else files

@@ -12,34 +12,34 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.case import Case, case_bench, read_series
-from diagnosis.dossier import hashes
-from diagnosis.estimate import Estimate, looked_at
+from diagnosis.case import Case, build_model_set, read_series
+from diagnosis.dossier import file_digests
+from diagnosis.estimate import Estimate, evaluate
 from diagnosis.naming import correlations_of, quantities_of
-from diagnosis.point import point_of
-from diagnosis.search import Tell
-from diagnosis.series import compared
-from diagnosis.simulation import misfits
-from diagnosis.uncertain import Uncertain
-from diagnosis.variant import value_text
+from diagnosis.point import vector_of
+from diagnosis.search import LogCallback
+from diagnosis.series import compared_outputs
+from diagnosis.simulation import compare_misfits
+from diagnosis.uncertain import FreeParameter
+from diagnosis.variant import format_value
 from diagnosis.verdict import Misfit, Quantity
-from diagnosis.ways import better_way, ways_of
-from language.document import Document, Table
+from diagnosis.ways import best_hold, recalibrate_by_hold
+from language.document import Document, MappingNode
 from language.load import automaton_of
 from language.model import Automaton
-from language.problem import Problems, Source, Span, nearest
-from language.tree import put
+from language.problem import Problems, Source, Span, suggest_name
+from language.tree import put_node
 
-AT_THE_END = 1e-3
+BOUND_TOLERANCE = 1e-3
 """Part of its range from an end within which a parameter is at it."""
-UNDETERMINED = 0.8
+UNDETERMINED_RATIO = 0.8
 """Part of the prior's standard deviation that is left where data say next to nothing."""
-STRONG = 0.9
+STRONG_CORRELATION = 0.9
 """Correlation from which two parameters are hardly told apart."""
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedParameter:
     """A fitted parameter: what was declared, its value [SI], and how far data determine it.
 
     `left` is its standard deviation as a part of its prior's: 1 where data say nothing. `strongest`
@@ -49,9 +49,9 @@ class Fitted:
     name: str
     declared: float
     quantity: Quantity
-    left: float
+    prior_ratio: float
     note: str
-    strongest: tuple[str, float] | None = None
+    strongest_correlation: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Fit:
     """
 
     automaton: Automaton
-    parameters: tuple[Fitted, ...]
+    parameters: tuple[FittedParameter, ...]
     correlations: Mapping[tuple[str, str], float]
     misfits: Mapping[str, Misfit]
     inputs: Mapping[str, str]
@@ -71,7 +71,9 @@ class Fit:
     @property
     def undetermined(self) -> tuple[str, ...]:
         """The parameters of which these data say next to nothing."""
-        return tuple(one.name for one in self.parameters if not one.left <= UNDETERMINED)
+        return tuple(
+            one.name for one in self.parameters if not one.prior_ratio <= UNDETERMINED_RATIO
+        )
 
     def calibration(self, name: str, date: str = "") -> str:
         """Return the fit as a calibration file, values in SI."""
@@ -80,7 +82,7 @@ class Fit:
         lines += [f"date: {date}"] if date else []
         lines.append("parameters:")
         for one in self.parameters:
-            value = value_text(one.quantity.value, self.automaton.parameters[one.name])
+            value = format_value(one.quantity.value, self.automaton.parameters[one.name])
             unit = "" if one.quantity.unit == "1" else f" {one.quantity.unit}"
             note = f"  # {one.note}" if one.note else ""
             std = f", std: {one.quantity.std:.3g}{unit}" if math.isfinite(one.quantity.std) else ""
@@ -89,92 +91,100 @@ class Fit:
         return "\n".join(lines) + "\n"
 
 
-def fit(case: Case, parameters: Sequence[str] | None = None, tell: Tell = lambda text: None) -> Fit:
+def fit(
+    case: Case, parameters: Sequence[str] | None = None, log: LogCallback = lambda text: None
+) -> Fit:
     """Return a case's parameters (all that have a range, or those named) fitted to its recordings.
 
     Raises SpecError, ValueError, ToolMissing.
     """
     automaton = automaton_of(case.document, case.project)
     if parameters is not None:
-        document = only(case.document, automaton, parameters)
+        document = restrict_free_parameters(case.document, automaton, parameters)
         case = dataclasses.replace(case, document=document)
         automaton = automaton_of(document, case.project)
-    seen = compared(case.mapping, automaton)
+    seen = compared_outputs(case.mapping, automaton)
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     case = dataclasses.replace(case, effects=())
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
-    bench, found = better_way(ways_of(case_bench(case, automaton, series, seen), tell))
-    if not found.candidate.uncertain:
+    model_set, estimate = best_hold(
+        recalibrate_by_hold(build_model_set(case, automaton, series, seen), log)
+    )
+    if not estimate.candidate.free_parameters:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
-    start = point_of(found.candidate, len(bench.series), {})
-    declared = looked_at(found.candidate, bench.series, found.noises, start)
+    start = vector_of(estimate.candidate, len(model_set.series), {})
+    declared = evaluate(estimate.candidate, model_set.series, estimate.noise_levels, start)
     return Fit(
         automaton,
-        _fitted(automaton, found),
-        correlations_of(found),
-        misfits(declared, found, bench.series),
-        hashes(case, case.train),
-        found,
+        _fitted_parameters(automaton, estimate),
+        correlations_of(estimate),
+        compare_misfits(declared, estimate, model_set.series),
+        file_digests(case, case.train),
+        estimate,
     )
 
 
-def only(document: Document, automaton: Automaton, names: Sequence[str]) -> Document:
+def restrict_free_parameters(
+    document: Document, automaton: Automaton, names: Sequence[str]
+) -> Document:
     """Return an expanded document in which no other parameters have a range. Raises SpecError."""
     problems = Problems()
     for name in names:
         parameter = automaton.parameters.get(name)
         if parameter is None:
             label = f"`{automaton.name}` has no parameter `{name}`"
-            hint = nearest(name, automaton.parameters)
+            hint = suggest_name(name, automaton.parameters)
             asked = Source("command line", (name,))
             problems.error("name", Span(asked, 1, 1, max(1, len(name))), label, hint)
         elif parameter.range is None or parameter.value is None:
             label = f"`{name}` has no range to be fitted in"
             problems.error("range", parameter.span, label, "`range: [low, high]` beside its value")
-    problems.stop_if_any()
+    problems.raise_if_errors()
     root = document.root
     for name in automaton.parameters:
-        table = _parameter(root, name)
+        table = _parameter_table(root, name)
         if name not in names and table is not None and "range" in table.entries:
             rest = {key: entry for key, entry in table.entries.items() if key != "range"}
-            root = put(root, ("parameters", name), Table(rest, table.span))
+            root = put_node(root, ("parameters", name), MappingNode(rest, table.span))
     return dataclasses.replace(document, root=root)
 
 
-def _parameter(root: Table, name: str) -> Table | None:
+def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:
     section = root.get("parameters")
-    node = section.get(name) if isinstance(section, Table) else None
-    return node if isinstance(node, Table) else None
+    node = section.get(name) if isinstance(section, MappingNode) else None
+    return node if isinstance(node, MappingNode) else None
 
 
-def _fitted(automaton: Automaton, found: Estimate) -> tuple[Fitted, ...]:
+def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[FittedParameter, ...]:
     strongest: dict[str, tuple[str, float]] = {}
-    for (first, second), together in correlations_of(found).items():
+    for (first, second), together in correlations_of(estimate).items():
         strongest.setdefault(first, (second, together))
         strongest.setdefault(second, (first, together))
-    coordinates = {one.name: one for one in found.candidate.uncertain}
+    coordinates = {one.name: one for one in estimate.candidate.free_parameters}
     fitted = []
-    for name, quantity in quantities_of(found).items():
+    for name, quantity in quantities_of(estimate).items():
         value = automaton.parameters[name].value
         assert value is not None
         one = coordinates[name]
-        left, note = spread_of(quantity, one), note_of(quantity, one)
-        fitted.append(Fitted(name, float(value), quantity, left, note, strongest.get(name)))
+        left, note = prior_std_ratio(quantity, one), parameter_note(quantity, one)
+        fitted.append(
+            FittedParameter(name, float(value), quantity, left, note, strongest.get(name))
+        )
     return tuple(fitted)
 
 
-def note_of(now: Quantity, coordinate: Uncertain) -> str:
+def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
     """Return what is to be said of a fitted parameter; empty where there is nothing."""
-    width = AT_THE_END * (coordinate.high - coordinate.low)
-    if min(now.value - coordinate.low, coordinate.high - now.value) < width:
+    width = BOUND_TOLERANCE * (coordinate.high - coordinate.low)
+    if min(fitted_value.value - coordinate.low, coordinate.high - fitted_value.value) < width:
         return "at the end of its range"
-    if not spread_of(now, coordinate) <= UNDETERMINED:
+    if not prior_std_ratio(fitted_value, coordinate) <= UNDETERMINED_RATIO:
         return "these data do not determine it"
     return ""
 
 
-def spread_of(now: Quantity, coordinate: Uncertain) -> float:
+def prior_std_ratio(fitted_value: Quantity, coordinate: FreeParameter) -> float:
     """Return the standard deviation of a fitted parameter as a part of its prior's."""
-    slope = coordinate.sd * (now.value if coordinate.is_log else 1.0)
-    return now.std / abs(slope) if slope else 1.0
+    slope = coordinate.sd * (fitted_value.value if coordinate.is_log else 1.0)
+    return fitted_value.std / abs(slope) if slope else 1.0

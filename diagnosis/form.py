@@ -9,91 +9,121 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.candidate import Candidate
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import evidence, inflation
-from diagnosis.layers import Layer
-from diagnosis.level import settled
-from diagnosis.naming import brought_by, place_path
-from diagnosis.plainer import PLAINER_PART, has_plain
-from diagnosis.point import Point, extended
-from diagnosis.screening import starts_of
-from diagnosis.search import Tried
+from diagnosis.evidence import integrated_autocorrelation, likelihood_gain
+from diagnosis.layers import PlacedEffect
+from diagnosis.level import fit_with_noise
+from diagnosis.naming import effect_names, place_path
+from diagnosis.plainer import MIN_RESTRICTED_FRACTION, has_restricted_form
+from diagnosis.point import ParameterVector, extend_vector
+from diagnosis.screening import start_values
+from diagnosis.search import CandidateFit
 
-SHOWN = 4.0
+MIN_FORM_GAIN = 4.0
 """Nats by which the fuller form must fit better, no price counted: where the plainer one is right
 it does by 2.6 at most, where it is not by 5.2 at least (63 dry frictions of two studies)."""
 
 
-def shown_form(
-    bench: Bench, base: Estimate, units: Mapping[str, float], best: Tried, tried: Sequence[Tried]
-) -> Tried:
+def choose_form(
+    model_set: ModelSet,
+    base: Estimate,
+    units: Mapping[str, float],
+    best: CandidateFit,
+    candidate_fits: Sequence[CandidateFit],
+) -> CandidateFit:
     """Return the best candidate, or its plainer or fuller form where the recordings show that one.
 
     Each is fitted from where the other is as well: which one fits better is not to be an accident.
     """
-    for other in tried:
-        if best.estimate is None or not _is_form_of(other, best):
+    for other in candidate_fits:
+        if best.estimate is None or not _is_nested_with(other, best):
             continue
-        new = _from(bench, base, units, other, best.estimate)
+        new = _fit_from(model_set, base, units, other, best.estimate)
         if new is not None and new.estimate is not None:
-            old = _from(bench, base, units, best, new.estimate) or best
-            plain, full = sorted((old, new), key=_numbers)
-            return full if _is_shown(bench, plain, full) else plain
+            old = _fit_from(model_set, base, units, best, new.estimate) or best
+            plain, full = sorted((old, new), key=_parameter_count)
+            return full if _rejects_restriction(model_set, plain, full) else plain
     return best
 
 
-def _is_form_of(other: Tried, best: Tried) -> bool:
+def _is_nested_with(other: CandidateFit, best: CandidateFit) -> bool:
     """Tell whether a candidate may be another form of the best one: at its place, with more or
     fewer numbers, some of them the same; one that was fitted gained nearly as much.
     """
-    plain, full = sorted((other, best), key=_numbers)
-    is_beside = place_path(other.layer) == place_path(best.layer)
-    if not is_beside or _numbers(plain) == _numbers(full) or not has_plain(full.layer):
+    plain, full = sorted((other, best), key=_parameter_count)
+    is_beside = place_path(other.placed_effect) == place_path(best.placed_effect)
+    if (
+        not is_beside
+        or _parameter_count(plain) == _parameter_count(full)
+        or not has_restricted_form(full.placed_effect)
+    ):
         return False
-    if not brought_by(plain.layer).keys() & brought_by(full.layer).keys():
+    if not effect_names(plain.placed_effect).keys() & effect_names(full.placed_effect).keys():
         return False
-    if other.evidence is None or best.evidence is None:
+    if other.likelihood_gain is None or best.likelihood_gain is None:
         return True
-    return other.evidence.train > PLAINER_PART * best.evidence.train
+    return (
+        other.likelihood_gain.penalised > MIN_RESTRICTED_FRACTION * best.likelihood_gain.penalised
+    )
 
 
-def _from(
-    bench: Bench, base: Estimate, units: Mapping[str, float], tried: Tried, other: Estimate
-) -> Tried | None:
+def _fit_from(
+    model_set: ModelSet,
+    base: Estimate,
+    units: Mapping[str, float],
+    candidate_fit: CandidateFit,
+    neighbour: Estimate,
+) -> CandidateFit | None:
     """Return a candidate fitted from where another one is as well, what that does not have from
     where it was and from each of its starts; None where it cannot be laid on the base.
     """
-    candidate = _candidate(bench, base, tried.layer, tried.estimate)
+    candidate = _candidate_of(model_set, base, candidate_fit.placed_effect, candidate_fit.estimate)
     if candidate is None:
         return None
-    own: list[Mapping[str, float] | Point] = [*starts_of(candidate, other.values(0))]
-    own += [tried.estimate.point] if tried.estimate else []
-    found = [tried.estimate] if tried.estimate else []
-    for start in (extended(candidate, other.candidate, other.point, one) for one in own):
-        given = (other.noises, start, units)
-        make = partial(settled, candidate, bench.series, *given, like=other)
-        found.append(bench.kept("settled", candidate, (*given, other.gains), make))
+    own: list[Mapping[str, float] | ParameterVector] = [
+        *start_values(candidate, neighbour.values(0))
+    ]
+    own += [candidate_fit.estimate.point] if candidate_fit.estimate else []
+    found = [candidate_fit.estimate] if candidate_fit.estimate else []
+    for start in (
+        extend_vector(candidate, neighbour.candidate, neighbour.point, one) for one in own
+    ):
+        given = (neighbour.noise_levels, start, units)
+        make = partial(fit_with_noise, candidate, model_set.series, *given, nearby=neighbour)
+        found.append(model_set.load_or_fit("settled", candidate, (*given, neighbour.gains), make))
     model = min(found, key=lambda one: one.cost)
-    if model is tried.estimate:
-        return tried
-    return dataclasses.replace(tried, estimate=model, evidence=evidence(model, base, bench.series))
+    if model is candidate_fit.estimate:
+        return candidate_fit
+    return dataclasses.replace(
+        candidate_fit,
+        estimate=model,
+        likelihood_gain=likelihood_gain(model, base, model_set.series),
+    )
 
 
-def _candidate(
-    bench: Bench, base: Estimate, layer: Layer, fitted: Estimate | None
+def _candidate_of(
+    model_set: ModelSet, base: Estimate, placed_effect: PlacedEffect, estimate: Estimate | None
 ) -> Candidate | None:
-    return fitted.candidate if fitted else bench.possible([*base.candidate.layers, layer])
+    return (
+        estimate.candidate
+        if estimate
+        else model_set.try_compile([*base.candidate.placed_effects, placed_effect])
+    )
 
 
-def _is_shown(bench: Bench, plain: Tried, full: Tried) -> bool:
+def _rejects_restriction(
+    model_set: ModelSet, restricted: CandidateFit, unrestricted: CandidateFit
+) -> bool:
     """Tell whether recordings show the fuller form of an effect."""
-    assert plain.estimate is not None
-    assert full.estimate is not None
-    apart = plain.estimate.cost - full.estimate.cost
-    return apart / inflation(full.estimate, bench.series) > SHOWN
+    assert restricted.estimate is not None
+    assert unrestricted.estimate is not None
+    apart = restricted.estimate.cost - unrestricted.estimate.cost
+    return (
+        apart / integrated_autocorrelation(unrestricted.estimate, model_set.series) > MIN_FORM_GAIN
+    )
 
 
-def _numbers(tried: Tried) -> int:
-    return len(brought_by(tried.layer))
+def _parameter_count(candidate_fit: CandidateFit) -> int:
+    return len(effect_names(candidate_fit.placed_effect))

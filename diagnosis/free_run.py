@@ -21,23 +21,23 @@ from language.experiment import RecordingMap, Scenario, System
 from language.model import Automaton
 from language.problem import Problems, SpecError
 from language.program import Program
-from language.signal import Piece, Stimulus
+from language.signal import Stimulus, StimulusPiece
 from language.syntax import Name
-from language.system import around
+from language.system import single_instance_system
 
-Values = NDArray[np.float64]
-START = "recorded_start_of_{}"
+Reals = NDArray[np.float64]
+INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """The input at whose value a state starts."""
 
 
 @dataclass(frozen=True)
-class Compared:
+class OutputComparison:
     """A recorded output and the simulated one at its stamps [s], in SI, all (n_samples,)."""
 
     output: str
-    times: Values
-    measured: Values
-    simulated: Values
+    times: Reals
+    measured: Reals
+    simulated: Reals
 
     @property
     def rms(self) -> float:
@@ -56,86 +56,96 @@ class FreeRun:
 
     trajectory: Trajectory
     start: Fraction
-    compared: Mapping[str, Compared]
+    comparisons: Mapping[str, OutputComparison]
 
 
-Programs = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
+ProgramCache = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
 """Programs made for free runs, by the inputs, those of start values as well, and which vary."""
 
 
-Run = Callable[[System, Scenario, Mapping[str, Program]], Trajectory]
+RunFunction = Callable[[System, Scenario, Mapping[str, Program]], Trajectory]
 """What carries out a run of Programs."""
 
 
-def interpreted(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Trajectory:
+def run_interpreter(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> Trajectory:
     """Return a run by the interpreter."""
     return simulate(system, scenario, programs=programs)
 
 
-def free_run(
+def simulate_free_run(
     automaton: Automaton,
     recording: Recording,
     mapping: RecordingMap,
-    run: Run = interpreted,
-    made: Programs | None = None,
+    run_program: RunFunction = run_interpreter,
+    programs: ProgramCache | None = None,
 ) -> FreeRun:
     """Simulate from the first measured values of the states on, with nothing fed back.
 
     The simulation's rows are one major step apart; between them it is taken as linear. Programs
-    `made` for other recordings of the same automaton are not made again.
+    `programs` for other recordings of the same automaton are not made again.
     """
-    fed = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
+    input_channels = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]
-    start = max((c.times[0] for c in fed), default=recording.start)
-    end = max(c.times[-1] for c in (*fed, *outputs))
+    start = max((c.times[0] for c in input_channels), default=recording.start)
+    end = max(c.times[-1] for c in (*input_channels, *outputs))
     if end <= start:
         problems = Problems()
         label = f"recording `{recording.name}` ends before every input has a value"
         problems.error("range", mapping.span, label)
-        raise SpecError(problems.found)
-    known = {
+        raise SpecError(problems.reported)
+    initial_values = {
         source: _value_at(channel, start)
         for channel in outputs
-        if (source := automaton.source_of(channel.column.compare or "")) in automaton.states
+        if (source := automaton.output_source(channel.column.compare or "")) in automaton.states
     }
-    begins = {START.format(name): Stimulus((Piece(Fraction(0), known[name]),)) for name in known}
+    initial_inputs = {
+        INITIAL_INPUT_NAME.format(name): Stimulus(
+            (StimulusPiece(Fraction(0), initial_values[name]),)
+        )
+        for name in initial_values
+    }
     scenario = Scenario(
         name=recording.name,
         of=automaton.name,
         horizon=end - start,
         initial={},
-        inputs={**_inputs(automaton, fed, mapping, start), **begins},
+        inputs={**_recorded_inputs(automaton, input_channels, mapping, start), **initial_inputs},
         every=automaton.step,
         span=mapping.span,
     )
-    trajectory = _simulated(_startable(automaton, known), scenario, run, made)
+    trajectory = _simulate(
+        _with_initial_state_inputs(automaton, initial_values), scenario, run_program, programs
+    )
     compared = {
-        channel.column.name: _compared(automaton, channel, trajectory, start) for channel in outputs
+        channel.column.name: _compare_output(automaton, channel, trajectory, start)
+        for channel in outputs
     }
     return FreeRun(trajectory, start, compared)
 
 
-def _simulated(
+def _simulate(
     automaton: Automaton,
     scenario: Scenario,
-    run: Run,
-    made: Programs | None,
+    run_program: RunFunction,
+    programs: ProgramCache | None,
 ) -> Trajectory:
-    """Return what an automaton does, by Programs that were `made` before if there are such."""
-    system = around(automaton)
+    """Return what an automaton does, by Programs that were `programs` before if there are such."""
+    system = single_instance_system(automaton)
     varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
     kind = (tuple(automaton.inputs), tuple(varying))
-    made = {} if made is None else made
-    if kind not in made:
-        made[kind] = programs_of(system, scenario)
-    return run(system, scenario, made[kind])
+    programs = {} if programs is None else programs
+    if kind not in programs:
+        programs[kind] = programs_of(system, scenario)
+    return run_program(system, scenario, programs[kind])
 
 
-def _startable(automaton: Automaton, names: Collection[str]) -> Automaton:
+def _with_initial_state_inputs(automaton: Automaton, names: Collection[str]) -> Automaton:
     """Return an automaton some states of which start at the value of an input of their own."""
     inputs, states = dict(automaton.inputs), dict(automaton.states)
     for name in names:
-        state, own = states[name], START.format(name)
+        state, own = states[name], INITIAL_INPUT_NAME.format(name)
         key = f"states.{name}.initial"
         inputs[own] = Input(own, state.unit, "real", None, None, key, state.span)
         formula = Formula(Name(own, state.span), key)
@@ -143,18 +153,18 @@ def _startable(automaton: Automaton, names: Collection[str]) -> Automaton:
     return dataclasses.replace(automaton, inputs=inputs, states=states)
 
 
-def _inputs(
-    automaton: Automaton, fed: list[Channel], mapping: RecordingMap, start: Fraction
+def _recorded_inputs(
+    automaton: Automaton, input_channels: list[Channel], mapping: RecordingMap, start: Fraction
 ) -> dict[str, Stimulus]:
     found = {}
     for name, thing in automaton.inputs.items():
         value = thing.default if thing.default is not None else Fraction(0)
         if name in mapping.constants:
             value = mapping.constants[name][0]
-        found[name] = Stimulus((Piece(Fraction(0), value),), truth=thing.truth)
-    for channel in fed:
+        found[name] = Stimulus((StimulusPiece(Fraction(0), value),), is_bool=thing.is_bool)
+    for channel in input_channels:
         name = channel.column.to or ""
-        found[name] = stimulus_of(channel, start, automaton.inputs[name].truth)
+        found[name] = stimulus_of(channel, start, automaton.inputs[name].is_bool)
     return found
 
 
@@ -162,15 +172,15 @@ def _value_at(channel: Channel, start: Fraction) -> Fraction:
     return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
 
 
-def _compared(
+def _compare_output(
     automaton: Automaton, channel: Channel, trajectory: Trajectory, start: Fraction
-) -> Compared:
+) -> OutputComparison:
     output = channel.column.compare or ""
     first = bisect_left(channel.times, start)
     times = channel.seconds[first:] - float(start)
     until = int(np.searchsorted(times, trajectory.times[-1], side="right"))
     signal = trajectory.signals[f"{automaton.name}.{output}"]
-    return Compared(
+    return OutputComparison(
         output,
         times[:until] + float(start),
         np.array(channel.values[first : first + until]),

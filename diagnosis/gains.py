@@ -9,105 +9,120 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
-from diagnosis.joined import burnt
-from diagnosis.linear import Linear
-from diagnosis.modes import models_of
-from diagnosis.prediction import Gains, Noises, Outcome
-from diagnosis.series import Series
+from diagnosis.joined import burn_in_samples
+from diagnosis.linear import LinearModel
+from diagnosis.modes import linearise_modes
+from diagnosis.prediction import KalmanGains, NoiseLevels, PredictionResult
+from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]
-START_PART = 0.01
+INITIAL_STD_FRACTION = 0.01
 """Standard deviation of a state at the start, as a part of its range."""
-KEPT = 0.999
+MIN_INTEGRATOR_EIGENVALUE = 0.999
 """Part of itself that an integral keeps over a sample, and what decays does not."""
-MODEL_NOISE = 1e-7
+MODEL_NOISE_FRACTION = 1e-7
 """Process noise of every state per sample, as a part of its range: no gain is ever quite 0."""
 
 
 @dataclass(frozen=True)
-class Local:
+class LocalModel:
     """A candidate in one mode near where that was seen: `linear` over one sample with its process
     noise `q` (states, states), the standard deviations `start` (states,) that its states begin
     with, and the usual `stay` in it [samples].
     """
 
-    linear: Linear
+    linear: LinearModel
     q: Reals
-    start: Reals
-    stay: int
+    initial_std: Reals
+    dwell_samples: int
 
 
-def gains_of(
+def kalman_gains(
     candidate: Candidate,
-    series: Sequence[Series],
+    series: Sequence[SampledRecording],
     values: Mapping[str, float],
-    noises: Noises,
-    outcome: Outcome | None = None,
-) -> Gains:
-    """Return the gains of a candidate at `values`, near where `outcome` saw each mode.
+    noise_levels: NoiseLevels,
+    prediction: PredictionResult | None = None,
+) -> KalmanGains:
+    """Return the gains of a candidate at `values`, near where `prediction` saw each mode.
 
     In another mode than the one that lasts longest the gain is that at the usual length of a stay,
     which began with what was known before: in a gap it would never be steady.
     """
-    count = burnt(series[0])
-    found: dict[int, Reals] = {}
-    first = np.zeros((0, len(candidate.spans), len(noises.seen)))
-    before = np.zeros(0)
-    for mode, local in locals_of(candidate, series, values, noises, outcome).items():
-        given = local.linear.phi, local.linear.c, local.q, noises.seen**2
-        if found:
-            gains = candidate.predictor.gains(*given, before, 0, local.stay)
+    count = burn_in_samples(series[0])
+    steady_by_mode: dict[int, Reals] = {}
+    first = np.zeros((0, len(candidate.state_ranges), len(noise_levels.outputs)))
+    covariance = np.zeros(0)
+    for mode, local in local_models(candidate, series, values, noise_levels, prediction).items():
+        model_terms = local.linear.phi, local.linear.c, local.q, noise_levels.outputs**2
+        if steady_by_mode:
+            gains = candidate.predictor.compute_gains(
+                *model_terms, covariance, 0, local.dwell_samples
+            )
         else:
-            gains = candidate.predictor.gains(*given, np.diag(local.start**2), count)
+            gains = candidate.predictor.compute_gains(
+                *model_terms, np.diag(local.initial_std**2), count
+            )
         if gains is not None:
-            first, before = (first, before) if found else (gains[0], gains[2])
-            found[mode] = gains[1]
-    nothing = np.zeros((len(candidate.spans), len(noises.seen)))
-    usual = next(iter(found.values()), nothing)
+            first, covariance = (first, covariance) if steady_by_mode else (gains[0], gains[2])
+            steady_by_mode[mode] = gains[1]
+    zero_gain = np.zeros((len(candidate.state_ranges), len(noise_levels.outputs)))
+    default_gain = next(iter(steady_by_mode.values()), zero_gain)
     modes = candidate.predictor.modes
-    steady = np.array([nothing if noises.is_alone else found.get(mode, usual) for mode in modes])
-    return Gains(first, np.ascontiguousarray(steady))
+    steady = np.array(
+        [
+            zero_gain if noise_levels.is_output_error else steady_by_mode.get(mode, default_gain)
+            for mode in modes
+        ]
+    )
+    return KalmanGains(first, np.ascontiguousarray(steady))
 
 
-def locals_of(
+def local_models(
     candidate: Candidate,
-    series: Sequence[Series],
+    series: Sequence[SampledRecording],
     values: Mapping[str, float],
-    noises: Noises,
-    outcome: Outcome | None = None,
-) -> dict[int, Local]:
-    """Return a candidate at `values` near where `outcome` saw each mode, the longest stay first.
+    noise_levels: NoiseLevels,
+    prediction: PredictionResult | None = None,
+) -> dict[int, LocalModel]:
+    """Return a candidate at `values` near where `prediction` saw each mode, the longest stay first.
 
     Its process noise is that of the inputs, of the drifts, and next to none of what is unsure.
     Delays are left out of it: what is shown late would seem to know nothing of the states.
     """
-    prompt = dict.fromkeys(candidate.recipe.delays, 0.0)
-    page = candidate.page({**values, **prompt}, series[0])
-    pushed, found = np.diag(noises.inputs**2), {}
-    moved = _drift_noise(candidate, noises, float(series[0].period))
-    for mode, (linear, stay) in models_of(candidate, series, page, outcome).items():
-        unsure = np.where(_turns(candidate, linear), 0.0, candidate.spans)
-        q = linear.b @ pushed @ linear.b.T + np.diag((MODEL_NOISE * unsure) ** 2)
-        for place, variance in moved.items():
+    zero_delays = dict.fromkeys(candidate.compiled.delays, 0.0)
+    page = candidate.calibration_page({**values, **zero_delays}, series[0])
+    input_covariance, models = np.diag(noise_levels.inputs**2), {}
+    disturbance_variances = _disturbance_variances(candidate, noise_levels, float(series[0].period))
+    for mode, (linear, stay) in linearise_modes(candidate, series, page, prediction).items():
+        uncertain_ranges = np.where(
+            _is_effect_integrator(candidate, linear), 0.0, candidate.state_ranges
+        )
+        q = linear.b @ input_covariance @ linear.b.T + np.diag(
+            (MODEL_NOISE_FRACTION * uncertain_ranges) ** 2
+        )
+        for place, variance in disturbance_variances.items():
             q[place, place] = variance
-        found[mode] = Local(linear, q, START_PART * unsure, stay)
-    return found
+        models[mode] = LocalModel(linear, q, INITIAL_STD_FRACTION * uncertain_ranges, stay)
+    return models
 
 
-def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:
+def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[np.bool_]:
     """Tell which states (states,) are an effect's integrals, such as an angle.
 
     What such a one shows changes its sign as it turns: a gain made at one angle would be wrong.
     """
-    keeps = linear.phi.diagonal() > KEPT
-    return np.asarray(keeps & candidate.brought, dtype=np.bool_)
+    keeps = linear.phi.diagonal() > MIN_INTEGRATOR_EIGENVALUE
+    return np.asarray(keeps & candidate.is_effect_state, dtype=np.bool_)
 
 
-def _drift_noise(candidate: Candidate, noises: Noises, period: float) -> dict[int, float]:
+def _disturbance_variances(
+    candidate: Candidate, noise_levels: NoiseLevels, period: float
+) -> dict[int, float]:
     """Return the process noise of each state that drifts, by its place."""
-    found = {}
-    for name, memory in zip(candidate.drifts, candidate.recipe.memories, strict=True):
-        kept = np.exp(-period / memory)
+    variances = {}
+    for name, memory in zip(candidate.disturbance_states, candidate.compiled.memories, strict=True):
+        decay = np.exp(-period / memory)
         place = candidate.predictor.states.index(name)
-        found[place] = noises.drifts.get(name, 0.0) ** 2 * (1.0 - kept**2)
-    return found
+        variances[place] = noise_levels.process.get(name, 0.0) ** 2 * (1.0 - decay**2)
+    return variances

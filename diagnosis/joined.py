@@ -9,58 +9,58 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Recorded
-from diagnosis.series import Series
+from codegen.runs import StackedRecordings
+from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]
 BURN_IN = 0.5
 """Seconds at the start of a recording that do not count: the states are being found."""
-MOST_KEPT = 24
+CACHE_SIZE = 24
 """Sets of recordings that are kept joined, the latest ones."""
 
 
 @dataclass(frozen=True)
-class Joined:
+class StackedExperiments:
     """A set of recordings in joined arrays, with the values that they start with.
 
     `first` (recordings, seen) are the first known values of the compared signals.
     """
 
-    series: tuple[Series, ...]
-    recorded: Recorded
-    first: Reals
+    series: tuple[SampledRecording, ...]
+    recorded: StackedRecordings
+    first_measured: Reals
 
 
-_kept: OrderedDict[tuple[int, ...], Joined] = OrderedDict()
+_cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
-def burnt(series: Series) -> int:
+def burn_in_samples(series: SampledRecording) -> int:
     """Return how many samples at the start of a recording do not count."""
     return max(1, round(BURN_IN / float(series.period)))
 
 
-def joined(series: Sequence[Series]) -> Joined:
+def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:
     """Return recordings joined, as they were kept or joined now.
 
     They are known by their identity: what is kept holds them, so no other one has it meanwhile.
     """
     key = tuple(id(one) for one in series)
-    found = _kept.get(key)
-    if found is None:
-        found = _kept[key] = _joined(tuple(series))
-        if len(_kept) > MOST_KEPT:
-            _kept.popitem(last=False)
-    _kept.move_to_end(key)
-    return found
+    stacked = _cache.get(key)
+    if stacked is None:
+        stacked = _cache[key] = _stack(tuple(series))
+        if len(_cache) > CACHE_SIZE:
+            _cache.popitem(last=False)
+    _cache.move_to_end(key)
+    return stacked
 
 
-def _joined(series: tuple[Series, ...]) -> Joined:
+def _stack(series: tuple[SampledRecording, ...]) -> StackedExperiments:
     counts = [one.count for one in series]
-    recorded = Recorded(
+    recorded = StackedRecordings(
         np.concatenate([one.inputs for one in series]),
         np.concatenate([one.measured for one in series]),
         np.cumsum([0, *counts], dtype=np.int64),
-        np.array([min(burnt(one), one.count) for one in series], dtype=np.int64),
-        np.array([one.is_linear for one in series], dtype=np.int64),
+        np.array([min(burn_in_samples(one), one.count) for one in series], dtype=np.int64),
+        np.array([one.is_first_order_hold for one in series], dtype=np.int64),
     )
-    return Joined(series, recorded, np.array([one.first for one in series]))
+    return StackedExperiments(series, recorded, np.array([one.first_measured for one in series]))

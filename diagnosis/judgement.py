@@ -7,199 +7,231 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.adequacy import (
-    hardly_shows,
+    has_autocorrelated_residuals_in_most,
+    has_stacked_effects,
     is_inadequate,
-    piles_up,
-    refused,
-    remembers_mostly,
+    lacks_simulation_improvement,
+    reject_effects,
 )
-from diagnosis.alone import LEFT_OUT, PROMISED, SIMULATED, alone, forgets
-from diagnosis.bench import Bench
-from diagnosis.bootstrap import bootstrapped, kept_thresholds
+from diagnosis.alone import (
+    CROSS_VALIDATED_FRACTION,
+    OUTPUT_ERROR_SCREENING_FRACTION,
+    OUTPUT_ERROR_THRESHOLDS,
+    fit_output_error,
+    has_fading_memory,
+)
+from diagnosis.bench import ModelSet
+from diagnosis.bootstrap import bootstrap_thresholds, cached_thresholds
 from diagnosis.case import Case
-from diagnosis.constancy import differs
-from diagnosis.description import Description, described
+from diagnosis.constancy import rejects_constancy
+from diagnosis.description import DiscoveredEquation, discover_equation
 from diagnosis.doubt import (
-    explains_more,
-    is_doubtful,
-    is_still,
-    leaves_much,
-    left_over,
-    selected_formula,
+    has_large_remainder,
+    needs_no_disturbance,
+    outperforms_effects,
+    remaining_term_gain,
+    select_equation,
+    triggers_discovery,
 )
 from diagnosis.estimate import Estimate
-from diagnosis.hidden import with_hidden
-from diagnosis.level import units_of
-from diagnosis.location import located, unexplained
-from diagnosis.locus import Locus
+from diagnosis.hidden import detect_unknown_input
+from diagnosis.level import disturbance_units
+from diagnosis.location import localise, unexplained_gain
+from diagnosis.locus import Location
 from diagnosis.naming import verdict_id
-from diagnosis.place_sentence import place_sentence
-from diagnosis.plainer import may_be_plainer, plainer_ones
-from diagnosis.pressed import is_opposed
-from diagnosis.search import Tell
-from diagnosis.selection import Selection, selected
-from diagnosis.series import Series
-from diagnosis.strain import is_at_limit, is_strained
-from diagnosis.sureness import less_sure
-from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
-from diagnosis.verdict import Says
-from diagnosis.ways import Way, better_way, chosen
+from diagnosis.place_sentence import format_location
+from diagnosis.plainer import accepts_restriction, restricted_candidates
+from diagnosis.pressed import has_opposing_active_bound
+from diagnosis.search import LogCallback
+from diagnosis.selection import Selection, select_effects
+from diagnosis.series import SampledRecording
+from diagnosis.strain import is_at_bound, rejects_bounds
+from diagnosis.sureness import cap_probability
+from diagnosis.threshold import DEFAULT_THRESHOLD, DEFAULT_THRESHOLDS, Thresholds
+from diagnosis.verdict import DecisionOutcome
+from diagnosis.ways import RecalibratedSet, best_hold, select_hold
 
-CLEAR = 1.0
+AMBIGUITY_GAIN = 1.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
-HIDDEN = 6.0
+UNKNOWN_INPUT_FACTOR = 6.0
 """Times the threshold that an input must gain that acts in windows."""
-FREEDOM = 4.0
+FREE_DISTURBANCE_FACTOR = 4.0
 """Times the threshold that free drifts must gain where effects are to be something else."""
-UNKNOWN = 8.0
+UNKNOWN_FACTOR = 8.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
 
 @dataclass(frozen=True)
-class Judgement:
+class DiagnosisDecision:
     """What selection has come to; `bench` has the recordings as they were judged."""
 
-    bench: Bench
+    model_set: ModelSet
     base: Estimate
     selection: Selection
-    loci: tuple[Locus, ...]
-    says: Says
+    locations: tuple[Location, ...]
+    outcome: DecisionOutcome
     thresholds: Thresholds
-    description: Description | None = None
+    equation: DiscoveredEquation | None = None
 
 
-def judged(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> Judgement:
+def decide(
+    case: Case, full_rate_set: ModelSet, recalibrated: Sequence[RecalibratedSet], log: LogCallback
+) -> DiagnosisDecision:
     """Return what is accepted of a case, for the ways that its recordings can be read in.
 
     A model that forgets is judged by whole simulations, every other by what its observer foresees.
     """
-    bench, base = better_way(ways)
-    if forgets(base, bench.series):
-        return _judged_by_simulation(case, raw, bench, base, tell)
-    return _judged_by_observer(case, raw, ways, tell)
+    model_set, base = best_hold(recalibrated)
+    if has_fading_memory(base, model_set.series):
+        return _decide_by_output_error(case, full_rate_set, model_set, base, log)
+    return _decide_by_prediction_error(case, full_rate_set, recalibrated, log)
 
 
-def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> Judgement:
+def _decide_by_prediction_error(
+    case: Case, full_rate_set: ModelSet, recalibrated: Sequence[RecalibratedSet], log: LogCallback
+) -> DiagnosisDecision:
     """Judge models by what an observer foresees from sample to sample."""
-    thresholds = _thresholds(case, *better_way(ways), raw.series, tell)
-    most = max(USUAL, thresholds.most)
-    bench, base, selection = chosen(ways, thresholds, tell)
-    units = units_of(base.candidate, bench.series, base.values(0))
-    loci = located(bench, base)
-    tell(place_sentence(loci, bench))
-    selection, loci = with_hidden(bench, selection, loci, HIDDEN * most, tell)
-    left = unexplained(bench, selection.base, loci)
-    says = _says(selection, left, bench, most)
+    thresholds = _choose_thresholds(case, *best_hold(recalibrated), full_rate_set.series, log)
+    most = max(DEFAULT_THRESHOLD, thresholds.largest)
+    model_set, base, selection = select_hold(recalibrated, thresholds, log)
+    units = disturbance_units(base.candidate, model_set.series, base.values(0))
+    locations = localise(model_set, base)
+    log(format_location(locations, model_set))
+    selection, locations = detect_unknown_input(
+        model_set, selection, locations, UNKNOWN_INPUT_FACTOR * most, log
+    )
+    left = unexplained_gain(model_set, selection.base, locations)
+    says = _outcome_of(selection, left, model_set, most)
     formula = None
-    over = left_over(bench, selection, units) if says == "effect" else 0.0
-    if is_doubtful(says, selection, left, over, most):
-        formula = described(bench, selection.base, loci, units, most, tell)
-    if formula is not None and explains_more(formula, selection):
-        says, selection = "unknown", selected_formula(selection, formula)
+    over = remaining_term_gain(model_set, selection, units) if says == "effect" else 0.0
+    if triggers_discovery(says, selection, left, over, most):
+        formula = discover_equation(model_set, selection.base, locations, units, most, log)
+    if formula is not None and outperforms_effects(formula, selection):
+        says, selection = "unknown", select_equation(selection, formula)
     else:
         formula = None
-        is_free = says == "effect" and not selection.has_hidden
-        is_other = is_free and leaves_much(selection, over, most)
-        says, selection = _adequate(bench, selection, says, FREEDOM * most, units, is_other, tell)
-    return Judgement(bench, base, selection, loci, says, thresholds, formula)
+        is_free = says == "effect" and not selection.has_unknown_input
+        is_other = is_free and has_large_remainder(selection, over, most)
+        says, selection = _check_adequacy(
+            model_set, selection, says, FREE_DISTURBANCE_FACTOR * most, units, is_other, log
+        )
+    return DiagnosisDecision(model_set, base, selection, locations, says, thresholds, formula)
 
 
-def _adequate(
-    bench: Bench,
+def _check_adequacy(
+    model_set: ModelSet,
     selection: Selection,
-    says: Says,
-    needed: float,
+    outcome: DecisionOutcome,
+    min_gain: float,
     units: Mapping[str, float],
-    is_other: bool,
-    tell: Tell,
-) -> tuple[Says, Selection]:
+    has_large_remainder: bool,
+    log: LogCallback,
+) -> tuple[DecisionOutcome, Selection]:
     """Return a verdict, or `unknown` without effects that leave much of it unexplained.
 
-    `is_other` where what they leave over at their places is known to be much.
+    `has_large_remainder` where what they leave over at their places is known to be much.
     """
     if not selection.accepted:
-        return says, selection
-    is_free = says == "effect" and not is_still(selection, units) and not selection.has_hidden
-    why = "terms at their places explain much beside them" if is_other else ""
-    why = why or _why_not(selection, bench)
-    if not why and is_free and is_inadequate(bench, selection, needed):
+        return outcome, selection
+    is_free = (
+        outcome == "effect"
+        and not needs_no_disturbance(selection, units)
+        and not selection.has_unknown_input
+    )
+    why = "terms at their places explain much beside them" if has_large_remainder else ""
+    why = why or _rejection_reason(selection, model_set)
+    if not why and is_free and is_inadequate(model_set, selection, min_gain):
         why = "free drifts explain much beside them"
     if not why:
-        return says, less_sure(bench, selection, tell) if says == "effect" else selection
-    names = ", ".join(tried.layer.id for tried in selection.accepted)
-    tell(f"taken back: {names}: {why}, so it is something else")
-    return "unknown", refused(selection)
+        return outcome, cap_probability(
+            model_set, selection, log
+        ) if outcome == "effect" else selection
+    names = ", ".join(tried.placed_effect.id for tried in selection.accepted)
+    log(f"taken back: {names}: {why}, so it is something else")
+    return "unknown", reject_effects(selection)
 
 
-def _why_not(selection: Selection, bench: Bench) -> str:
+def _rejection_reason(selection: Selection, model_set: ModelSet) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right.
 
     Beside a hidden input, which takes up anything at all, only ends of ranges are looked at.
     """
     first = selection.accepted[0]
-    if is_at_limit(selection.model, first.layer):
+    if is_at_bound(selection.model, first.placed_effect):
         return "the first is at the end of a range"
-    if selection.has_hidden:
+    if selection.has_unknown_input:
         return ""
-    if is_strained(selection.model, selection.accepted):
+    if rejects_bounds(selection.model, selection.accepted):
         return "they are pulled out of their ranges"
-    if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
+    if rejects_constancy(selection.model, first, model_set.series, len(selection.accepted) == 1):
         return "the parameters of the first differ from recording to recording"
-    if is_opposed(selection.model, first.layer, bench.automaton):
+    if has_opposing_active_bound(selection.model, first.placed_effect, model_set.automaton):
         return "the first is more than what its balance can give up for it"
-    if piles_up(selection):
+    if has_stacked_effects(selection):
         return "two at one place gain alike"
-    if remembers_mostly(bench, selection):
+    if has_autocorrelated_residuals_in_most(model_set, selection):
         return "most recordings remember what is left"
-    if hardly_shows(bench, selection):
+    if lacks_simulation_improvement(model_set, selection):
         return "simulations hardly show them"
-    is_known = any(plainer_ones(first, selection.first_round))
-    if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
+    is_known = any(restricted_candidates(first, selection.first_round))
+    if not is_known and accepts_restriction(selection.model, first.placed_effect, model_set.series):
         return "the first may as well be a plainer one"
     return ""
 
 
-def _judged_by_simulation(
-    case: Case, raw: Bench, bench: Bench, base: Estimate, tell: Tell
-) -> Judgement:
+def _decide_by_output_error(
+    case: Case, full_rate_set: ModelSet, model_set: ModelSet, base: Estimate, log: LogCallback
+) -> DiagnosisDecision:
     """Judge models by simulations of whole recordings, in which nothing is fed back."""
-    loci = located(bench, base)
-    tell(place_sentence(loci, bench))
-    left = unexplained(bench, base, loci)
-    tell("what happened long ago does not matter here: whole simulations are judged")
-    thresholds = SIMULATED if case.thresholds == EVERYWHERE else case.thresholds
-    found = alone(raw, base)
-    selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT, hope=PROMISED)
-    says = _says(selection, left, found.bench, max(USUAL, thresholds.most))
-    bench = dataclasses.replace(bench, series=found.bench.series)
-    return Judgement(bench, found.base, selection, loci, says, thresholds)
+    locations = localise(model_set, base)
+    log(format_location(locations, model_set))
+    left = unexplained_gain(model_set, base, locations)
+    log("what happened long ago does not matter here: whole simulations are judged")
+    thresholds = (
+        OUTPUT_ERROR_THRESHOLDS if case.thresholds == DEFAULT_THRESHOLDS else case.thresholds
+    )
+    found = fit_output_error(full_rate_set, base)
+    selection = select_effects(
+        found.model_set,
+        found.base,
+        {},
+        thresholds,
+        log,
+        CROSS_VALIDATED_FRACTION,
+        screening_fraction=OUTPUT_ERROR_SCREENING_FRACTION,
+    )
+    says = _outcome_of(selection, left, found.model_set, max(DEFAULT_THRESHOLD, thresholds.largest))
+    model_set = dataclasses.replace(model_set, series=found.model_set.series)
+    return DiagnosisDecision(model_set, found.base, selection, locations, says, thresholds)
 
 
-def _thresholds(
+def _choose_thresholds(
     case: Case,
-    bench: Bench,
+    model_set: ModelSet,
     base: Estimate,
-    raw: Sequence[Series],
-    tell: Tell,
+    full_rate_series: Sequence[SampledRecording],
+    log: LogCallback,
 ) -> Thresholds:
     """Return the thresholds of a case: given, kept from an earlier bootstrap, or made by one."""
     if case.bootstrap == "never":
         return case.thresholds
-    kept = kept_thresholds(bench, raw)
+    kept = cached_thresholds(model_set, full_rate_series)
     if kept is None and case.bootstrap == "made":
-        units = units_of(base.candidate, bench.series, base.values(0))
-        kept = bootstrapped(bench, base, units, raw, tell)
+        units = disturbance_units(base.candidate, model_set.series, base.values(0))
+        kept = bootstrap_thresholds(model_set, base, units, full_rate_series, log)
     found = kept or case.thresholds
-    tell(f"thresholds of {found.text} nats, {found.origin}")
+    log(f"thresholds of {found.text} nats, {found.origin}")
     return found
 
 
-def _says(selection: Selection, left: float, bench: Bench, needed: float) -> Says:
-    """Return the verdict of a selection; `left` is what the base leaves unexplained [nats]."""
+def _outcome_of(
+    selection: Selection, unexplained: float, model_set: ModelSet, min_gain: float
+) -> DecisionOutcome:
+    """Return the verdict of a selection; `unexplained` is what the base leaves unexplained [nats]."""
     if not selection.accepted:
-        return "unknown" if left > UNKNOWN * needed else "nothing_missing"
-    best, automaton = selection.accepted[0], bench.automaton
-    name = verdict_id(best.layer, automaton)
-    others = (one for one in selection.rivals if verdict_id(one.layer, automaton) != name)
-    is_open = any(one.score > best.score - CLEAR for one in others)
+        return "unknown" if unexplained > UNKNOWN_FACTOR * min_gain else "nothing_missing"
+    best, automaton = selection.accepted[0], model_set.automaton
+    name = verdict_id(best.placed_effect, automaton)
+    others = (one for one in selection.rivals if verdict_id(one.placed_effect, automaton) != name)
+    is_open = any(one.score > best.score - AMBIGUITY_GAIN for one in others)
     return "ambiguous" if is_open else "effect"

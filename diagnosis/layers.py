@@ -14,199 +14,218 @@ from fractions import Fraction
 from importlib import resources
 from pathlib import Path
 
-from diagnosis.series import shows_inputs
-from language.continuous import step_limits
-from language.document import Document, Scalar, Table
-from language.effect import Effect, Laying, read_effect
-from language.known import entries_of
-from language.laying import lay_effect
+from diagnosis.series import has_feedthrough
+from language.continuous import stable_step_limits
+from language.document import Document, MappingNode, ScalarNode
+from language.effect import Effect, EffectApplication, read_effect
+from language.known import formula_entries
+from language.laying import apply_effect
 from language.load import automaton_of, program_of
-from language.memory import applications, applies
+from language.memory import memory_calls_by_key, uses_function
 from language.model import Automaton
-from language.place import Misfit, place_of
+from language.place import PlaceMismatch, find_effect_place
 from language.problem import Problems, Source, Span
 from language.program import Program
 from language.project import Project, read_document
 from language.units import parse_unit
 
-DRIFT = "drift"
-WALKS = ("constant_or_random_walk",)
+DISTURBANCE_STATE = "drift"
+SLOWLY_VARYING_FORMS = ("constant_or_random_walk",)
 """Forms of an effect's parameter that may change along a recording."""
-SECONDS = parse_unit("s").dimension.powers
+TIME_DIMENSION = parse_unit("s").dimension.powers
 KINDS = ("balance", "element", "output")
-SECTIONS = {"flow": "balance", "inputs": "input", "elements": "element", "outputs": "output"}
+PLACE_KIND_BY_SECTION = {
+    "flow": "balance",
+    "inputs": "input",
+    "elements": "element",
+    "outputs": "output",
+}
 """The kind of place that the names of a section are."""
-LONGEST_STEP = Fraction(5, 1000)
+MAX_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside it are located."""
-STABLE_PART = Fraction(1, 2)
+STABLE_FRACTION = Fraction(1, 2)
 """A step is at most this part of the largest stable one: parameters move while they are fitted."""
-FAR = Fraction(4)
+PARAMETER_FACTOR = Fraction(4)
 """How far an effect's parameter may move while it is fitted, as a factor."""
-DELAYED_STEPS = 4
+MIN_DELAY_STEPS = 4
 """Fewest major steps between two samples of a model with a delay: none is shorter than a step."""
-TURNING_STEP = Fraction(1, 1000)
+MAX_ANGLE_STEP = Fraction(1, 1000)
 """Longest major step [s] of one with an input that goes along with an angle: motors turn by much in
 a sample. A tone of 12 periods a turn at 100 rad/s then has five steps a period."""
-MOST_STEPS = 40
+MAX_STEPS = 40
 """Most major steps between two samples."""
 
 
 @dataclass(frozen=True)
-class Layer:
+class PlacedEffect:
     """An effect at a place; `ending` is what its names end with."""
 
     effect: Effect
     place: str
-    ending: str
+    suffix: str
 
     @property
     def id(self) -> str:
         """`effect@place`, as it stands in a variant."""
         return f"{self.effect.name}@{self.place}"
 
-    def named(self, name: str) -> str:
+    def qualified_name(self, name: str) -> str:
         """Return the name that one of the effect's own names has in the automaton."""
-        return f"{name}_{self.ending}"
+        return f"{name}_{self.suffix}"
 
 
-def has_parameters(layer: Layer) -> bool:
+def has_parameters(placed_effect: PlacedEffect) -> bool:
     """Tell whether an effect has numbers to fit; one that has none follows anything at all."""
-    return layer.effect.body.get("parameters") is not None
+    return placed_effect.effect.body.get("parameters") is not None
 
 
-def walks(layer: Layer) -> bool:
+def varies_slowly(placed_effect: PlacedEffect) -> bool:
     """Tell whether a number of an effect may change slowly along a recording."""
-    known = layer.effect.body.get("parameters")
-    entries = known if isinstance(known, Table) else ()
-    forms = [one.node.get("form") for one in entries if isinstance(one.node, Table)]
-    return any(isinstance(one, Scalar) and one.text in WALKS for one in forms)
+    known = placed_effect.effect.body.get("parameters")
+    entries = known if isinstance(known, MappingNode) else ()
+    forms = [one.node.get("form") for one in entries if isinstance(one.node, MappingNode)]
+    return any(isinstance(one, ScalarNode) and one.text in SLOWLY_VARYING_FORMS for one in forms)
 
 
-def effects_in(folder: Path) -> tuple[Effect, ...]:
+def read_effects(folder: Path) -> tuple[Effect, ...]:
     """Return the effects of a folder, by name. Raises SpecError."""
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
-    problems.stop_if_any()
+    problems.raise_if_errors()
     return tuple(found)
 
 
 def shipped_effects() -> tuple[Effect, ...]:
     """Return the effects that come with the product."""
-    return effects_in(Path(str(resources.files("spec"))) / "effects")
+    return read_effects(Path(str(resources.files("spec"))) / "effects")
 
 
-def drift(kind: str, place: str) -> Layer:
+def disturbance_effect(kind: str, place: str) -> PlacedEffect:
     """Return the drift of a balance, an element or an output."""
     path = Path(str(resources.files("diagnosis"))) / "drifts" / f"drift_of_{kind}.yaml"
-    return Layer(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
+    return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
-def fitting(document: Document, effect: Effect) -> tuple[Layer, ...]:
+def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
     """Return an effect at every place of an automaton where it can be laid."""
-    root, kinds = document.root, {fit.kind for fit in effect.fits}
-    fits = [
+    root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
+    names = [
         name
-        for name, own in _places(document).items()
-        if own & kinds and not isinstance(place_of(root, effect, name), Misfit)
+        for name, own in _place_kinds(document).items()
+        if own & kinds and not isinstance(find_effect_place(root, effect, name), PlaceMismatch)
     ]
-    return tuple(Layer(effect, name, name) for name in fits)
+    return tuple(PlacedEffect(effect, name, name) for name in names)
 
 
-def laid(document: Document, layers: Sequence[Layer]) -> Document:
+def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
     """Return an expanded document with layers laid over it, in their order. Raises SpecError."""
     problems = Problems()
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
-    for layer in layers:
-        laying = Laying(layer.effect, layer.place, layer.ending, {}, {}, span)
-        root = lay_effect(root, laying, problems)
-        problems.stop_if_any()
+    for placed_effect in placed_effects:
+        laying = EffectApplication(
+            placed_effect.effect, placed_effect.place, placed_effect.suffix, {}, {}, span
+        )
+        root = apply_effect(root, laying, problems)
+        problems.raise_if_errors()
     return dataclasses.replace(document, root=root)
 
 
-def automaton(document: Document, project: Project, layers: Sequence[Layer]) -> Automaton:
+def automaton_with_effects(
+    document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
+) -> Automaton:
     """Return the checked automaton with layers laid over it. Raises SpecError."""
-    return automaton_of(laid(document, layers), project)
+    return automaton_of(overlay_effects(document, placed_effects), project)
 
 
-def stepped(
-    given: Automaton,
+def lower_tunable_program(
+    automaton: Automaton,
     names: Sequence[str],
-    brought: Sequence[str],
+    effect_parameters: Sequence[str],
     period: Fraction,
-    fewest: int = 1,
+    at_least: int = 1,
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and its steps in a period [s].
 
-    The step is a whole part of the period, one of at least `fewest`; it is stable for parameters
-    that effects `brought` at a quarter and at four times their value, and no longer than a time
+    The step is a whole part of the period, one of at least `at_least`; it is stable for parameters
+    that effects `effect_parameters` at a quarter and at four times their value, and no longer than a time
     that they brought: where a rate is limited, stability is not known beforehand.
     """
-    moved = [_scaled(given, brought, factor) for factor in (FAR, 1 / FAR)]
-    others = [one for one in moved if one.parameters != given.parameters]
-    stable = [_stable(one, LONGEST_STEP) for one in (given, *others)]
-    longest = min(*stable, *_times(given, brought), LONGEST_STEP)
-    substeps = min(max(fewest, -(-period // longest)), MOST_STEPS)
+    scaled = [
+        _scale_parameters(automaton, effect_parameters, factor)
+        for factor in (PARAMETER_FACTOR, 1 / PARAMETER_FACTOR)
+    ]
+    variants = [one for one in scaled if one.parameters != automaton.parameters]
+    stable = [_stable_step(one, MAX_STEP) for one in (automaton, *variants)]
+    longest = min(*stable, *_time_values(automaton, effect_parameters), MAX_STEP)
+    substeps = min(max(at_least, -(-period // longest)), MAX_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
-        for name, parameter in given.parameters.items()
+        for name, parameter in automaton.parameters.items()
     }
-    tuned = dataclasses.replace(given, parameters=parameters, step=period / substeps)
-    return program_of(tuned), int(substeps)
+    with_tunables = dataclasses.replace(automaton, parameters=parameters, step=period / substeps)
+    return program_of(with_tunables), int(substeps)
 
 
-def _times(given: Automaton, names: Sequence[str]) -> list[Fraction]:
+def _time_values(automaton: Automaton, names: Sequence[str]) -> list[Fraction]:
     """Return the values [s] of those parameters that are times."""
-    known = [given.parameters[name] for name in names if name in given.parameters]
+    known = [automaton.parameters[name] for name in names if name in automaton.parameters]
     return [
         parameter.value
         for parameter in known
-        if parameter.value and parameter.unit.dimension.powers == SECONDS
+        if parameter.value and parameter.unit.dimension.powers == TIME_DIMENSION
     ]
 
 
-def fewest_steps(
-    given: Automaton, layers: Sequence[Layer], seen: Sequence[str], period: Fraction
+def minimum_substeps(
+    automaton: Automaton,
+    placed_effects: Sequence[PlacedEffect],
+    output_names: Sequence[str],
+    period: Fraction,
 ) -> int:
     """Return how many major steps there are to be in a period [s] between two samples at least.
 
-    Several where what is `seen` shows an input at once as well: it is held within a step.
+    Several where what is `output_names` shows an input at once as well: it is held within a step.
     """
-    at_input = any(layer.effect.fits[0].kind == "input" for layer in layers)
-    if at_input and applies(given, "floor"):
-        return int(-(-period // TURNING_STEP))
-    is_short = applications(given, ("delay",)) or shows_inputs(given, seen)
-    return DELAYED_STEPS if is_short else 1
+    at_input = any(
+        placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
+    )
+    if at_input and uses_function(automaton, "floor"):
+        return int(-(-period // MAX_ANGLE_STEP))
+    is_short = memory_calls_by_key(automaton, ("delay",)) or has_feedthrough(
+        automaton, output_names
+    )
+    return MIN_DELAY_STEPS if is_short else 1
 
 
-def _stable(given: Automaton, longest: Fraction) -> Fraction:
-    for limit in () if given.is_sampled else step_limits(given):
+def _stable_step(automaton: Automaton, max_step: Fraction) -> Fraction:
+    for limit in () if automaton.is_sampled else stable_step_limits(automaton):
         stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
-        longest = min(longest, STABLE_PART * stable)
-    return max(longest, Fraction(1, 10**6))
+        max_step = min(max_step, STABLE_FRACTION * stable)
+    return max(max_step, Fraction(1, 10**6))
 
 
-def _scaled(given: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
+def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
     """Return an automaton with some parameters scaled, within their ranges."""
-    parameters = dict(given.parameters)
+    parameters = dict(automaton.parameters)
     for name in names:
         parameter = parameters.get(name)
         if parameter and parameter.range and parameter.value and parameter.type == "real":
             low, high = parameter.range
             value = min(max(parameter.value * factor, low), high)
             parameters[name] = dataclasses.replace(parameter, value=value)
-    return dataclasses.replace(given, parameters=parameters)
+    return dataclasses.replace(automaton, parameters=parameters)
 
 
-def _places(document: Document) -> dict[str, set[str]]:
+def _place_kinds(document: Document) -> dict[str, set[str]]:
     """Return what effects may be laid on, with the kinds of place that each could be."""
     found: dict[str, set[str]] = {}
-    for section, kind in SECTIONS.items():
+    for section, kind in PLACE_KIND_BY_SECTION.items():
         node = document.root.get(section)
         names = [entry.key for entry in getattr(node, "entries", {}).values()]
         names += [item.text for item in getattr(node, "nodes", ()) if hasattr(item, "text")]
         for name in names:
             found.setdefault(name, set()).add(kind)
-    for name, _ in entries_of(document.root, "flow"):
+    for name, _ in formula_entries(document.root, "flow"):
         found.get(name, set()).add("balance")
     return found

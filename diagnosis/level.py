@@ -12,53 +12,53 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, looked_at
-from diagnosis.estimation import led
-from diagnosis.modes import near, points_of
-from diagnosis.point import Point
-from diagnosis.prediction import Noises, noises_of
-from diagnosis.series import Series
-from diagnosis.slopes import Columns
-from diagnosis.tuning import FARTHEST, tuned
+from diagnosis.estimate import Estimate, evaluate
+from diagnosis.estimation import iterate
+from diagnosis.modes import linearise_near, operating_points
+from diagnosis.point import ParameterVector
+from diagnosis.prediction import NoiseLevels, measured_noise_levels
+from diagnosis.series import SampledRecording
+from diagnosis.slopes import Jacobian
+from diagnosis.tuning import MAX_NOISE_RATIO, fit_noise_covariance
 
-REACH = 0.2
+UNIT_RESPONSE_TIME = 0.2
 """Seconds in which a drift of one unit shows."""
 LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Standard deviations that a drift may have, in its unit; the last is the most while naming."""
-FIRST_LEVELS = (0.1, 0.3, 1.0)
+INITIAL_LEVELS = (0.1, 0.3, 1.0)
 """Those from which a base is fitted: a fit with much drift does not find its way to less."""
-QUIET = FIRST_LEVELS[0]
+SMALL_LEVEL = INITIAL_LEVELS[0]
 """That from which a candidate is fitted as well."""
-FAR = 4.0
+HUBER_STDS = 4.0
 """Standard deviations beyond which an innovation counts as that far."""
-SCALE = 1.5
+NOISE_FACTOR = 1.5
 """Factor by which the noise of inputs or of a signal is changed at a time."""
-ENOUGH = 2.0
+MIN_GAIN = 2.0
 """Another level is taken where it gains this much [nats]."""
 
 
-def units_of(
-    candidate: Candidate, series: Sequence[Series], start: Mapping[str, float]
+def disturbance_units(
+    candidate: Candidate, series: Sequence[SampledRecording], start: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the unit [SI] of each drift of a candidate, for the noise that was measured."""
-    seen_noise = noises_of(series, {}).seen
-    mode, seen_there = next(iter(points_of(candidate, series, None).items()))
-    page = candidate.page(start, series[0])
-    linear = near(candidate, page, mode, seen_there.states, seen_there.inputs)
+    output_noise = measured_noise_levels(series, {}).outputs
+    mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
+    page = candidate.calibration_page(start, series[0])
+    linear = linearise_near(candidate, page, mode, operating_point.states, operating_point.inputs)
     if linear is None:
         raise ValueError("the base is unstable where the first recording starts")
-    count = max(1, round(REACH / float(series[0].period)))
+    count = max(1, round(UNIT_RESPONSE_TIME / float(series[0].period)))
     ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
-    found = {}
-    for name in candidate.drifts:
-        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / seen_noise
-        found[name] = 1.0 / max(float(np.max(seen)), 1e-12)
-    return found
+    units = {}
+    for name in candidate.disturbance_states:
+        noise_ratios = np.abs(ahead[:, candidate.predictor.states.index(name)]) / output_noise
+        units[name] = 1.0 / max(float(np.max(noise_ratios)), 1e-12)
+    return units
 
 
-def levelled(
-    now: Estimate,
-    series: Sequence[Series],
+def line_search_noise(
+    estimate: Estimate,
+    series: Sequence[SampledRecording],
     units: Mapping[str, float],
 ) -> Estimate:
     """Return an estimate with the drifts that the recordings ask for, its parameters held.
@@ -67,122 +67,140 @@ def levelled(
     known to a factor only: with a gain that is not the best, anything would seem to gain.
     """
     for name in units:
-        here = _place(now.noises.drifts.get(name, 0.0), units[name])
+        level_index = _nearest_level(estimate.noise_levels.process.get(name, 0.0), units[name])
         for direction in (1, -1):
-            while 0 <= here + direction < len(LEVELS):
-                drifts = {**now.noises.drifts, name: LEVELS[here + direction] * units[name]}
-                noises = dataclasses.replace(now.noises, drifts=drifts)
-                tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
-                if not tried.cost < now.cost - ENOUGH:
+            while 0 <= level_index + direction < len(LEVELS):
+                drifts = {
+                    **estimate.noise_levels.process,
+                    name: LEVELS[level_index + direction] * units[name],
+                }
+                noise_levels = dataclasses.replace(estimate.noise_levels, process=drifts)
+                trial = evaluate(
+                    estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
+                )
+                if not trial.cost < estimate.cost - MIN_GAIN:
                     break
-                now, here = tried, here + direction
-    return _scaled_noises(now, series)
+                estimate, level_index = trial, level_index + direction
+    return _line_search_signal_noise(estimate, series)
 
 
-def _scaled_noises(now: Estimate, series: Sequence[Series]) -> Estimate:
+def _line_search_signal_noise(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
     """Return an estimate with the noise of its inputs, then of each signal, scaled.
 
     Not far from what was measured: a model that lacks something would trust in its signals alone.
     """
-    known = noises_of(series, {})
-    for place in range(-1, len(now.noises.seen)):
-        for factor in (SCALE, 1.0 / SCALE):
-            noises = _scaled(now.noises, place, factor)
-            while _is_near(noises, known, place):
-                tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
-                if not tried.cost < now.cost - ENOUGH:
+    measured = measured_noise_levels(series, {})
+    for place in range(-1, len(estimate.noise_levels.outputs)):
+        for factor in (NOISE_FACTOR, 1.0 / NOISE_FACTOR):
+            noise_levels = _scale_noise(estimate.noise_levels, place, factor)
+            while _is_near_measured(noise_levels, measured, place):
+                trial = evaluate(
+                    estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
+                )
+                if not trial.cost < estimate.cost - MIN_GAIN:
                     break
-                now, noises = tried, _scaled(noises, place, factor)
-    return now
+                estimate, noise_levels = trial, _scale_noise(noise_levels, place, factor)
+    return estimate
 
 
-def _is_near(noises: Noises, known: Noises, place: int) -> bool:
+def _is_near_measured(noise_levels: NoiseLevels, reference: NoiseLevels, channel: int) -> bool:
     """Tell whether the noise of the inputs (-1) or of a signal is near what was measured."""
     now, measured = (
-        (noises.inputs, known.inputs) if place < 0 else (noises.seen[place], known.seen[place])
+        (noise_levels.inputs, reference.inputs)
+        if channel < 0
+        else (noise_levels.outputs[channel], reference.outputs[channel])
     )
     ratio = np.max(now / np.maximum(measured, 1e-300), initial=0.0, where=np.asarray(measured) > 0)
-    return bool(1.0 / FARTHEST <= ratio <= FARTHEST)
+    return bool(1.0 / MAX_NOISE_RATIO <= ratio <= MAX_NOISE_RATIO)
 
 
-def _scaled(noises: Noises, place: int, factor: float) -> Noises:
+def _scale_noise(noise_levels: NoiseLevels, channel: int, factor: float) -> NoiseLevels:
     """Return noises with that of the inputs (-1) or of a signal by its place scaled."""
-    if place < 0:
-        return dataclasses.replace(noises, inputs=factor * noises.inputs)
-    seen = noises.seen.copy()
-    seen[place] *= factor
-    return dataclasses.replace(noises, seen=seen)
+    if channel < 0:
+        return dataclasses.replace(noise_levels, inputs=factor * noise_levels.inputs)
+    seen = noise_levels.outputs.copy()
+    seen[channel] *= factor
+    return dataclasses.replace(noise_levels, outputs=seen)
 
 
-def settled(
+def fit_with_noise(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
     units: Mapping[str, float],
-    columns: Columns | None = None,
-    like: Estimate | None = None,
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
 ) -> Estimate:
     """Return parameters and levels found together, from levels that fit where parameters lead.
 
-    `columns` are slopes of the candidate near the start, `like` a model near it, if there are such.
+    `jacobian` are slopes of the candidate near the start, `nearby` a model near it, if there are such.
     """
-    now = led(candidate, series, noises, start, known=columns, like=like)
-    return tuned(levelled(now, series, units), series, units)
+    now = iterate(candidate, series, noise_levels, start, jacobian=jacobian, nearby=nearby)
+    return fit_noise_covariance(line_search_noise(now, series, units), series, units)
 
 
-def fitted(
+def fit_candidate(
     candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    start: Mapping[str, float] | Point,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
     units: Mapping[str, float],
-    known: float = -np.inf,
-    columns: Columns | None = None,
-    like: Estimate | None = None,
+    known_cost: float = -np.inf,
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return a fit with next to no drift at first, or a better one with those that `noises` has.
+    """Return a fit with next to no drift at first, or a better one with those that `noise_levels` has.
 
     What a model explains it has to explain without drifts; a fit with much does not find there.
-    The other one is tried where the first does not come below a `known` cost [nats].
+    The other one is tried where the first does not come below a `known_cost` cost [nats].
     """
-    quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
-    still = dataclasses.replace(noises, drifts=quiet)
-    first = settled(candidate, series, still, start, units, columns, like)
-    is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
-    if is_quiet or first.cost < known:
+    small_process = {
+        **noise_levels.process,
+        **{name: SMALL_LEVEL * unit for name, unit in units.items()},
+    }
+    small_noise = dataclasses.replace(noise_levels, process=small_process)
+    first = fit_with_noise(candidate, series, small_noise, start, units, jacobian, nearby)
+    has_small_noise = all(
+        noise_levels.process.get(name, 0.0) <= small_process[name] for name in units
+    )
+    if has_small_noise or first.cost < known_cost:
         return first
-    second = settled(candidate, series, noises, start, units, columns, like)
+    second = fit_with_noise(candidate, series, noise_levels, start, units, jacobian, nearby)
     return min(first, second, key=lambda one: one.cost)
 
 
-def first_fit(
-    candidate: Candidate, series: Sequence[Series], units: Mapping[str, float]
+def fit_base(
+    candidate: Candidate, series: Sequence[SampledRecording], units: Mapping[str, float]
 ) -> Estimate:
     """Return the base fitted once to recordings from where it is declared.
 
     How far innovations usually are out, beyond which they count no more, is known after it.
     """
-    first = settled(candidate, series, noises_of(series, units), {}, units)
-    limits = FAR * np.maximum(first.outcome.robust(), 1e-12)
-    return dataclasses.replace(first, noises=dataclasses.replace(first.noises, limits=limits))
+    first = fit_with_noise(candidate, series, measured_noise_levels(series, units), {}, units)
+    limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
+    return dataclasses.replace(
+        first, noise_levels=dataclasses.replace(first.noise_levels, huber_limits=limits)
+    )
 
 
-def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
+def recalibrate(
+    first: Estimate, series: Sequence[SampledRecording], units: Mapping[str, float]
+) -> Estimate:
     """Return the base fitted to recordings from a first fit, with drifts from little to much, until
     two come to rest alike.
     """
-    found: list[Estimate] = []
-    for level in FIRST_LEVELS:
-        if len(found) > 1 and abs(found[-1].cost - found[-2].cost) < ENOUGH:
+    fits: list[Estimate] = []
+    for level in INITIAL_LEVELS:
+        if len(fits) > 1 and abs(fits[-1].cost - fits[-2].cost) < MIN_GAIN:
             break
         drifts = {name: level * unit for name, unit in units.items()}
-        known = dataclasses.replace(first.noises, drifts=drifts)
-        near = min(found, key=lambda one: one.cost, default=first)
-        start, columns = near.point, near.columns
-        found.append(settled(first.candidate, series, known, start, units, columns, near))
-    return min(found, key=lambda one: one.cost)
+        known = dataclasses.replace(first.noise_levels, process=drifts)
+        best = min(fits, key=lambda one: one.cost, default=first)
+        start, columns = best.point, best.jacobian
+        fits.append(fit_with_noise(first.candidate, series, known, start, units, columns, best))
+    return min(fits, key=lambda one: one.cost)
 
 
-def _place(value: float, unit: float) -> int:
+def _nearest_level(value: float, unit: float) -> int:
     return int(np.argmin([abs(level - value / unit) for level in LEVELS]))

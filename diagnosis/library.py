@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from diagnosis.change import Change, changes
-from diagnosis.layers import Layer, automaton, fitting
-from language.document import Document, Table
-from language.effect import TEXT_KEYS, Effect, Fit, read_effect
-from language.known import unit_text
+from diagnosis.change import EquationChange, equation_changes
+from diagnosis.layers import PlacedEffect, automaton_with_effects, find_placements
+from language.document import Document, MappingNode
+from language.effect import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
+from language.known import format_si_unit
 from language.problem import Problems, Source, Span, SpecError
 from language.project import Project
 
-HEAD = ("language", "effect", "about", "at", *TEXT_KEYS)
+HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
 """Keys of an effect's file that are told in words."""
 
 
 @dataclass(frozen=True)
-class Described:
+class EffectDescription:
     """An effect with its lines of equations, and the places of a spec that it fits.
 
     `changes` are the lines of the spec that it alters at each place, by the place's name.
@@ -26,69 +26,77 @@ class Described:
 
     effect: Effect
     lines: tuple[str, ...] = field(repr=False)
-    layers: tuple[Layer, ...] = field(default=(), repr=False)
-    changes: Mapping[str, tuple[Change, ...]] = field(default_factory=dict, repr=False)
+    placements: tuple[PlacedEffect, ...] = field(default=(), repr=False)
+    changes: Mapping[str, tuple[EquationChange, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def places(self) -> tuple[str, ...]:
         """The names of the places that it fits."""
-        return tuple(layer.place for layer in self.layers)
+        return tuple(placed_effect.place for placed_effect in self.placements)
 
 
-def library(project: Project) -> tuple[Effect, ...]:
+def library_effects(project: Project) -> tuple[Effect, ...]:
     """Return the effects of a project and those shipped, by name. Raises SpecError."""
     span = Span(Source("effects"), 1, 1)
     problems = Problems()
-    found = [read_effect(project.effect(name, span), problems) for name in sorted(project.effects)]
-    problems.stop_if_any()
+    found = [
+        read_effect(project.read_effect_document(name, span), problems)
+        for name in sorted(project.effect_index)
+    ]
+    problems.raise_if_errors()
     return tuple(found)
 
 
-def described(
+def describe_effect(
     effect: Effect, document: Document | None = None, project: Project | None = None
-) -> Described:
+) -> EffectDescription:
     """Return an effect as it is told, with its places in an expanded document of a project."""
     if document is None or project is None:
-        return Described(effect, _lines(effect.body))
-    fits = fitting(document, effect)
-    layers = tuple(layer for layer in fits if _can_be_laid(document, project, layer))
-    altered = {layer.place: tuple(changes(document, [layer])) for layer in layers}
-    return Described(effect, _lines(effect.body), layers, altered)
+        return EffectDescription(effect, _defining_lines(effect.body))
+    fits = find_placements(document, effect)
+    placed_effects = tuple(
+        placed_effect for placed_effect in fits if _is_placeable(document, project, placed_effect)
+    )
+    altered = {
+        placed_effect.place: tuple(equation_changes(document, [placed_effect]))
+        for placed_effect in placed_effects
+    }
+    return EffectDescription(effect, _defining_lines(effect.body), placed_effects, altered)
 
 
-def _can_be_laid(document: Document, project: Project, layer: Layer) -> bool:
+def _is_placeable(document: Document, project: Project, placed_effect: PlacedEffect) -> bool:
     """Tell whether what comes out is sound: a filter's balance looks like one of a speed."""
     try:
-        automaton(document, project, (layer,))
+        automaton_with_effects(document, project, (placed_effect,))
     except SpecError:
         return False
     return True
 
 
-def _lines(body: Table) -> tuple[str, ...]:
+def _defining_lines(body: MappingNode) -> tuple[str, ...]:
     """Return the lines of an effect's file that say what it does."""
     source = body.span.source
     starts = sorted((entry.span.line, entry.key) for entry in body)
     ends = [line for line, _ in starts[1:]] + [len(source.lines) + 1]
     found: list[str] = []
     for (line, key), end in zip(starts, ends, strict=True):
-        if key not in HEAD:
+        if key not in HEADER_KEYS:
             found += source.lines[line - 1 : end - 1]
     return tuple(found)
 
 
-def place_kinds(effect: Effect) -> str:
+def format_place_kinds(effect: Effect) -> str:
     """Return in words what an effect is laid on."""
-    return ", or ".join(_kind(fit) for fit in effect.fits)
+    return ", or ".join(_format_place_kind(fit) for fit in effect.place_patterns)
 
 
-def _kind(fit: Fit) -> str:
+def _format_place_kind(fit: PlacePattern) -> str:
     if fit.kind == "balance":
         words = "the balance of a speed" if fit.of == "rate" else "a balance"
     elif fit.kind == "element":
         words = f"an {fit.of} element" if fit.of == "elastic" else "an inertia"
     else:
         words = f"an {fit.kind}"
-    unit = f" in {unit_text(fit.unit)}" if fit.unit else ""
+    unit = f" in {format_si_unit(fit.unit)}" if fit.unit else ""
     has = f" that has {', '.join(fit.has)}" if fit.has else ""
     return words + unit + has

@@ -11,22 +11,32 @@ import dataclasses
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.prediction import Outcome
+from diagnosis.prediction import PredictionResult
 
 
-def seen_like(candidate: Candidate, own: Outcome, near: Candidate, known: Outcome) -> Outcome:
-    """Return the `own` outcome of a candidate with states and modes of a `known` one of a model
+def share_operating_points(
+    candidate: Candidate,
+    prediction: PredictionResult,
+    near_candidate: Candidate,
+    near_prediction: PredictionResult,
+) -> PredictionResult:
+    """Return the `prediction` outcome of a candidate with states and modes of a `near_prediction` one of a model
     near it, for the same recordings; as it is where their modes or samples are others.
     """
-    mine, theirs = own.runs.whole, known.runs.whole
-    is_alike = candidate.predictor.modes == near.predictor.modes and own.is_whole
-    if not (is_alike and known.is_whole and len(mine.states) == len(theirs.states)):
-        return own
-    states, places = mine.states.copy(), {n: k for k, n in enumerate(near.predictor.states)}
+    mine, theirs = prediction.runs.stacked, near_prediction.runs.stacked
+    is_alike = (
+        candidate.predictor.modes == near_candidate.predictor.modes and prediction.is_complete
+    )
+    if not (is_alike and near_prediction.is_complete and len(mine.states) == len(theirs.states)):
+        return prediction
+    states, places = (
+        mine.states.copy(),
+        {n: k for k, n in enumerate(near_candidate.predictor.states)},
+    )
     for column, name in enumerate(candidate.predictor.states):
         if name in places:
             states[:, column] = theirs.states[:, places[name]]
     if not np.all(np.isfinite(states)):
-        return own
+        return prediction
     whole = dataclasses.replace(mine, states=states, modes=theirs.modes)
-    return dataclasses.replace(own, runs=dataclasses.replace(own.runs, whole=whole))
+    return dataclasses.replace(prediction, runs=dataclasses.replace(prediction.runs, stacked=whole))

@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis import wording
-from diagnosis.digits import change, per_cent, probability, significant
-from diagnosis.dossier import Dossier
-from diagnosis.locus import Locus
-from diagnosis.search import Tried
+from diagnosis.digits import format_change, format_percent, format_probability, format_significant
+from diagnosis.dossier import DiagnosisReport
+from diagnosis.locus import Location
+from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
-from diagnosis.worst_window import FreeRuns, by_recording
+from diagnosis.worst_window import FreeRuns, rms_by_recording
 
-MOST_WINDOWS = 6
-LOOSE = 0.3
+MAX_WINDOWS = 6
+MIN_CORRELATION = 0.3
 """A correlation below this is not told."""
-SAME = 0.02
+CHANGE_TOLERANCE = 0.02
 """Part of a misfit below which a change is none."""
 
 
@@ -41,22 +41,24 @@ class FitRow:
     is_sum: bool = False
 
 
-def fit_rows(dossier: Dossier, words: str, part: str, runs: FreeRuns) -> list[FitRow]:
+def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
     """Return the misfits [SI] of each recording of a set, then those of all over their spread."""
     rows = []
-    for name, before, after in by_recording(runs):
+    for name, before, after in rms_by_recording(runs):
         pairs = zip(before, after, strict=True)
-        cells = tuple(_cell(float(a), float(b), significant) for a, b in pairs)
-        rows.append(FitRow(name, words, cells))
-    whole = dossier.verdict.fit.get(part, {})
-    sums = tuple(_cell(one.nrmse_before, one.nrmse_after, per_cent) for one in whole.values())
-    return [*rows, FitRow("all together, over the spread of the signal", words, sums, True)]
+        cells = tuple(_misfit_cell(float(a), float(b), format_significant) for a, b in pairs)
+        rows.append(FitRow(name, label, cells))
+    whole = report.verdict.fit.get(dataset, {})
+    sums = tuple(
+        _misfit_cell(one.nrmse_before, one.nrmse_after, format_percent) for one in whole.values()
+    )
+    return [*rows, FitRow("all together, over the spread of the signal", label, sums, True)]
 
 
-def _cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
+def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
     part = after / before - 1.0 if before > 0.0 else 0.0
-    trend = "same" if abs(part) < SAME else "better" if part < 0.0 else "worse"
-    return Cell(text(before), text(after), change(before, after), trend)
+    trend = "same" if abs(part) < CHANGE_TOLERANCE else "better" if part < 0.0 else "worse"
+    return Cell(text(before), text(after), format_change(before, after), trend)
 
 
 @dataclass(frozen=True)
@@ -73,69 +75,77 @@ class CandidateRow:
     is_accepted: bool
 
 
-def candidate_rows(dossier: Dossier, selection: Selection) -> list[CandidateRow]:
+def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
     """Return those that were fitted: what was accepted first, then by rank."""
-    ids = {one.layer.id for one in selection.accepted}
-    first = [one for one in selection.first_round if one.layer.id not in ids]
-    listed = [one for one in (*selection.accepted, *first) if one.evidence]
-    most = max([one.evidence.train for one in listed if one.evidence] + [1.0])
+    ids = {one.placed_effect.id for one in selection.accepted}
+    first = [one for one in selection.first_round if one.placed_effect.id not in ids]
+    listed = [one for one in (*selection.accepted, *first) if one.likelihood_gain]
+    most = max([one.likelihood_gain.penalised for one in listed if one.likelihood_gain] + [1.0])
     shares = selection.probabilities()
-    return [_row(dossier, selection, one, k, most, shares) for k, one in enumerate(listed)]
+    return [_candidate_row(report, selection, one, k, most, shares) for k, one in enumerate(listed)]
 
 
-def _row(
-    dossier: Dossier,
+def _candidate_row(
+    report: DiagnosisReport,
     selection: Selection,
-    tried: Tried,
+    candidate_fit: CandidateFit,
     rank: int,
-    most: float,
+    largest: float,
     shares: Mapping[str, float],
 ) -> CandidateRow:
-    assert tried.evidence
-    known, share = tried.evidence, shares.get(tried.layer.id)
-    is_accepted = tried.layer.id in {one.layer.id for one in selection.accepted}
-    reason = wording.reason(tried, rank, selection, dossier.case.thresholds)
-    if is_accepted and dossier.verdict.verdict == "ambiguous":
+    assert candidate_fit.likelihood_gain
+    known, share = candidate_fit.likelihood_gain, shares.get(candidate_fit.placed_effect.id)
+    is_accepted = candidate_fit.placed_effect.id in {
+        one.placed_effect.id for one in selection.accepted
+    }
+    reason = wording.format_reason(candidate_fit, rank, selection, report.case.thresholds)
+    if is_accepted and report.verdict.verdict == "ambiguous":
         reason = "best, but not told from others: laid in what is shown here"
-    if is_accepted and dossier.verdict.verdict == "unknown":
+    if is_accepted and report.verdict.verdict == "unknown":
         reason = "a formula, no effect of the library: laid in what is shown here"
-    effect, _, place = wording.title(tried.layer, dossier).partition("@")
+    effect, _, place = wording.candidate_title(candidate_fit.placed_effect, report).partition("@")
     return CandidateRow(
         effect,
         place,
-        _nats(known.train),
-        _nats(known.left_out),
-        "" if share is None else probability(share),
-        100.0 * max(known.train, 0.0) / most,
+        _format_nats(known.penalised),
+        _format_nats(known.cross_validated),
+        "" if share is None else format_probability(share),
+        100.0 * max(known.penalised, 0.0) / largest,
         reason,
         is_accepted,
     )
 
 
-def _nats(gain: float) -> str:
+def _format_nats(gain: float) -> str:
     return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
 
 
-def unfitted(dossier: Dossier, selection: Selection) -> list[tuple[str, list[str]]]:
+def unfitted_candidates(
+    report: DiagnosisReport, selection: Selection
+) -> list[tuple[str, list[str]]]:
     """Return why the other candidates were not fitted, each reason with their names."""
     found: dict[str, list[str]] = {}
-    ids = {one.layer.id for one in selection.accepted}
+    ids = {one.placed_effect.id for one in selection.accepted}
     for tried in selection.first_round:
-        if not tried.evidence and tried.layer.id not in ids:
-            why = wording.reason(tried, 0, selection, dossier.case.thresholds)
-            found.setdefault(why, []).append(wording.title(tried.layer, dossier))
+        if not tried.likelihood_gain and tried.placed_effect.id not in ids:
+            why = wording.format_reason(tried, 0, selection, report.case.thresholds)
+            found.setdefault(why, []).append(wording.candidate_title(tried.placed_effect, report))
     return list(found.items())
 
 
-def place_rows(locus: Locus, most: int = MOST_WINDOWS) -> list[tuple[str, str]]:
+def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tuple[str, str]]:
     """Return what is known of what is missing at a place: modes, windows, companions."""
-    modes = sorted(locus.modes.items(), key=lambda pair: -pair[1])
-    shares = [f"{name} {per_cent(share)}" for name, share in modes if share >= 0.005]
+    modes = sorted(location.modes.items(), key=lambda pair: -pair[1])
+    shares = [f"{name} {format_percent(share)}" for name, share in modes if share >= 0.005]
     shares = shares if len(modes) > 1 else []
-    windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in locus.windows]
-    more = len(windows) - most
-    told = ", ".join(windows[:most]) + (f" and {more} more" if more > 0 else "")
-    along = [f"{name} (correlation {r:.2f})" for name, r in locus.along if abs(r) >= LOOSE]
+    windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in location.windows]
+    more = len(windows) - max_windows
+    told = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
+    along = [
+        f"{name} (correlation {r:.2f})"
+        for name, r in location.correlates
+        if abs(r) >= MIN_CORRELATION
+    ]
     rows = [
         ("strongest in", told),
         ("by mode", ", ".join(shares)),
@@ -144,9 +154,9 @@ def place_rows(locus: Locus, most: int = MOST_WINDOWS) -> list[tuple[str, str]]:
     return [row for row in rows if row[1]]
 
 
-def recording_rows(dossier: Dossier) -> list[tuple[str, ...]]:
+def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
     """Return name, length, rate, lost samples and findings of each training recording."""
-    check = dossier.check
+    check = report.check
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys(one.recording for one in check.channels):
         channels = [one for one in check.channels if one.recording == name]
@@ -155,8 +165,8 @@ def recording_rows(dossier: Dossier) -> list[tuple[str, ...]]:
         lost = max(one.dropped for one in channels)
         found = [one.severity for one in check.findings if one.recording == name]
         worst = ", ".join(f"{found.count(s)} {s}" for s in ("error", "warning") if s in found)
-        used = "not used" if name in dossier.left_out else "training"
-        if dossier.diagnosis is None:
+        used = "not used" if name in report.unused_recordings else "training"
+        if report.diagnosis is None:
             used = "not used"
         rate = "-".join(f"{rate}" for rate in (rates[:1] + rates[1:][-1:]))
         rows.append(
@@ -165,29 +175,31 @@ def recording_rows(dossier: Dossier) -> list[tuple[str, ...]]:
                 used,
                 f"{length:.1f} s",
                 f"{rate} Hz",
-                per_cent(lost) if lost else "none",
+                format_percent(lost) if lost else "none",
                 worst or "none",
             )
         )
     return rows
 
 
-def untestable(dossier: Dossier) -> list[tuple[str, str]]:
+def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
     """Return what recordings would have to show, and the effects that ask for it."""
     lacking: dict[str, list[str]] = {}
-    for one in dossier.check.excitation.effects:
+    for one in report.check.excitation.effects:
         if one.lacking:
             lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
     return [(needs, ", ".join(names)) for needs, names in lacking.items()]
 
 
-def noise_words(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
+def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
     """Return the noise of the recorded signals: no model misses less."""
-    noise = selection.base.noises.seen
+    noise = selection.base.noise_levels.outputs
     parts = zip(signals, noise, units, strict=True)
-    return ", ".join(f"{name} {significant(float(sd), 2)} {unit}" for name, sd, unit in parts)
+    return ", ".join(
+        f"{name} {format_significant(float(sd), 2)} {unit}" for name, sd, unit in parts
+    )
 
 
-def in_parts(text: str) -> list[tuple[str, bool]]:
+def split_code_spans(text: str) -> list[tuple[str, bool]]:
     """Return a sentence in parts, with whether each stood between back quotes."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]

@@ -12,87 +12,98 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from diagnosis.actor import acting, actors, rests
-from diagnosis.bench import Bench
+from diagnosis.actor import attribute_causes, balance_of, is_inactive
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import inflation
-from diagnosis.freedom import freed
-from diagnosis.layers import Layer, drift
-from diagnosis.locus import Locus, locus_of, over_time
-from language.document import Table
+from diagnosis.evidence import integrated_autocorrelation
+from diagnosis.freedom import free_disturbance
+from diagnosis.layers import PlacedEffect, disturbance_effect
+from diagnosis.locus import Location, location_of, with_smoothed_disturbances
+from language.document import MappingNode
 
-DISTURBED = 0.3
+ABSORBED_FRACTION = 0.3
 """Part that counts of what the small drifts of the base take up as well."""
 
 
-def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
+def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
     """Return every place with what its freedom explains, the best first, that over time.
 
     With each freedom the parameters are fitted anew: those of the base were bent by what it lacks,
     and a place would have to explain the bending as well.
     """
     free = [
-        (section, layer, freed(bench, base, layer)) for section, layer in places_of_freedom(bench)
+        (section, placed_effect, free_disturbance(model_set, base, placed_effect))
+        for section, placed_effect in disturbance_locations(model_set)
     ]
-    quiet = freed(bench, base).cost
-    known = [one.cost for *_, one in free if np.isfinite(one.cost)]
-    quiet = quiet if np.isfinite(quiet) else max(known, default=0.0)
-    found = []
-    for section, layer, one in free:
+    restricted_cost = free_disturbance(model_set, base).cost
+    finite_costs = [one.cost for *_, one in free if np.isfinite(one.cost)]
+    restricted_cost = (
+        restricted_cost if np.isfinite(restricted_cost) else max(finite_costs, default=0.0)
+    )
+    ranked = []
+    for section, placed_effect, one in free:
         if np.isfinite(one.cost):
-            locus = locus_of(bench, section, layer, one)
-            found.append(dataclasses.replace(locus, gain=quiet - one.cost))
-    found.sort(key=lambda locus: -locus.gain)
-    return tuple([over_time(bench, found[0]), *found[1:]] if found else [])
+            location = location_of(model_set, section, placed_effect, one)
+            ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
+    ranked.sort(key=lambda location: -location.gain)
+    return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
 
 
-def unexplained(bench: Bench, base: Estimate, loci: Sequence[Locus]) -> float:
+def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Location]) -> float:
     """Return what the freedom of the best place gains [nats].
 
     What the base takes up with drifts as small as it may have counts little: a model has some
     disturbance. All the same a load that acts on the road is one of these.
     """
-    gain = max((locus.gain for locus in loci), default=0.0)
-    taken_up = min(max(0.0, freed(bench, base).cost - base.cost), gain)
-    return (gain - (1.0 - DISTURBED) * taken_up) / inflation(base, bench.series)
+    gain = max((location.gain for location in locations), default=0.0)
+    taken_up = min(max(0.0, free_disturbance(model_set, base).cost - base.cost), gain)
+    return (gain - (1.0 - ABSORBED_FRACTION) * taken_up) / integrated_autocorrelation(
+        base, model_set.series
+    )
 
 
-def places_of_freedom(bench: Bench) -> list[tuple[str, Layer]]:
+def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
     """Return a drift for each balance of forces, each elastic element, each compared output."""
-    loci = [("flow", layer) for layer in bench.drifts]
-    elements = bench.document.root.get("elements")
-    for entry in elements if isinstance(elements, Table) else ():
-        if bench.automaton.elements[entry.key].kind == "elastic":
-            loci.append(("elements", drift("element", entry.key)))
-    loci += [("outputs", drift("output", name)) for name in bench.seen]
-    return loci
+    locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
+    elements = model_set.document.root.get("elements")
+    for entry in elements if isinstance(elements, MappingNode) else ():
+        if model_set.automaton.elements[entry.key].kind == "elastic":
+            locations.append(("elements", disturbance_effect("element", entry.key)))
+    locations += [
+        ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
+    ]
+    return locations
 
 
-def led_by(loci: Sequence[Locus], paths: Sequence[str], bench: Bench) -> tuple[Locus, ...]:
+def rank_accepted_first(
+    locations: Sequence[Location], paths: Sequence[str], model_set: ModelSet
+) -> tuple[Location, ...]:
     """Return places in which those of accepted effects lead, each with what is known there."""
-    known = {locus.path: locus for locus in loci}
-    first: list[Locus] = []
+    by_path = {location.path: location for location in locations}
+    first: list[Location] = []
     for path in dict.fromkeys(paths):
         section, _, place = path.partition(".")
-        nearest = known.get(path) or known.get(acting(bench, section, place))
-        found = nearest or Locus(section, place, 0.0, 0.0)
-        found = found if first else over_time(bench, found)
-        first.append(dataclasses.replace(found, section=section, place=place, named=True))
-    return (*first, *(locus for locus in loci if locus.path not in paths))
+        nearest = by_path.get(path) or by_path.get(balance_of(model_set, section, place))
+        entry = nearest or Location(section, place, 0.0, 0.0)
+        entry = entry if first else with_smoothed_disturbances(model_set, entry)
+        first.append(dataclasses.replace(entry, section=section, place=place, is_accepted=True))
+    return (*first, *(location for location in locations if location.path not in paths))
 
 
-def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple[Locus, ...]:
+def rank_causes_first(
+    locations: Sequence[Location], nearest_paths: Iterable[str], model_set: ModelSet
+) -> tuple[Location, ...]:
     """Return places of something unknown, led by an input or a body that acts at the first one.
 
-    What it does over time tells which; else `nearest`, the paths of what comes nearest to what is
+    What it does over time tells which; else `nearest_paths`, the paths of what comes nearest to what is
     missing and gains enough, best first.
     """
-    if not loci:
+    if not locations:
         return ()
-    known = (path for path in nearest if not rests(bench, loci[0], path))
-    for path in (*actors(bench, loci[0]), *known):
+    known = (path for path in nearest_paths if not is_inactive(model_set, locations[0], path))
+    for path in (*attribute_causes(model_set, locations[0]), *known):
         section, _, place = path.partition(".")
-        if acting(bench, section, place) == loci[0].path:
-            first = dataclasses.replace(loci[0], section=section, place=place)
-            return tuple(loci) if path == loci[0].path else (first, *loci)
-    return tuple(loci)
+        if balance_of(model_set, section, place) == locations[0].path:
+            first = dataclasses.replace(locations[0], section=section, place=place)
+            return tuple(locations) if path == locations[0].path else (first, *locations)
+    return tuple(locations)

@@ -7,29 +7,31 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from diagnosis.locus import Locus
+from diagnosis.locus import Location
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import visible
+from language.text import escape_invisible
 
 BLUE, _, _, _, _, _, GREY = PALETTE
 
 
-def locus_picture(loci: Sequence[Locus]) -> Picture:
+def draw_locations(locations: Sequence[Location]) -> Picture:
     """Return a bar for each place, the largest gain [nats] on top.
 
     An infinite one, where the model does not run at all without it, is drawn beyond the others;
     a place where it does not run in any case is left out.
     """
-    known = [locus for locus in loci if not math.isnan(locus.gain)]
-    shown = sorted(known, key=lambda locus: locus.gain)
+    known = [location for location in locations if not math.isnan(location.gain)]
+    shown = sorted(known, key=lambda location: location.gain)
     figure = Figure(figsize=(7.0, 0.9 + 0.38 * max(1, len(shown))), layout="constrained")
     axis = figure.subplots()
-    most = max([locus.gain for locus in shown if math.isfinite(locus.gain)] + [1.0])
-    gains = [min(max(locus.gain, 0.0), 1.5 * most) for locus in shown]
-    labels = [f"{max(locus.gain, 0.0):.0f}" for locus in shown]
+    most = max([location.gain for location in shown if math.isfinite(location.gain)] + [1.0])
+    gains = [min(max(location.gain, 0.0), 1.5 * most) for location in shown]
+    labels = [f"{max(location.gain, 0.0):.0f}" for location in shown]
     colours = [GREY] * (len(shown) - 1) + [BLUE]
-    bars = axis.barh([visible(locus.path) for locus in shown], gains, color=colours, height=0.65)
+    bars = axis.barh(
+        [escape_invisible(location.path) for location in shown], gains, color=colours, height=0.65
+    )
     axis.bar_label(bars, labels=labels, padding=3, fontsize=8)
     axis.set_xlim(0.0, 1.12 * max([*gains, 1.0]))
     axis.set_xlabel("what an unknown torque, force or error there would explain [nats]")

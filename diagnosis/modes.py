@@ -10,122 +10,141 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Runs
+from codegen.runs import StackedPrediction
 from diagnosis.candidate import Candidate
-from diagnosis.linear import Linear, linearised
-from diagnosis.prediction import Outcome
-from diagnosis.series import Series
+from diagnosis.linear import LinearModel, linearise
+from diagnosis.prediction import PredictionResult
+from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]
-Wholes = NDArray[np.int64]
-Models = dict[int, tuple[Linear, int]]
+Integers = NDArray[np.int64]
+ModeModels = dict[int, tuple[LinearModel, int]]
 """By mode, a candidate over one sample near where it was seen, and the usual stay [samples]."""
-SHORT_STAY = 5
+MIN_DWELL_SAMPLES = 5
 """Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
-SMALL = 1e-5
+STATE_STEP_FRACTION = 1e-5
 """Change of a state for a difference, as a part of its range."""
-MOST_KEPT = 4
+CACHE_SIZE = 4
 """Models of candidates that are kept, the latest ones: levels of noise move, and they stay."""
 
-_kept: OrderedDict[tuple[object, ...], tuple[Models, object]] = OrderedDict()
+_cache: OrderedDict[tuple[object, ...], tuple[ModeModels, object]] = OrderedDict()
 
 
-def models_of(
-    candidate: Candidate, series: Sequence[Series], page: Reals, outcome: Outcome | None
-) -> Models:
-    """Return the models of a candidate with a page near where `outcome` saw its modes, the longest
+def linearise_modes(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    calibration_page: Reals,
+    prediction: PredictionResult | None,
+) -> ModeModels:
+    """Return the models of a candidate with a page near where `prediction` saw its modes, the longest
     stay first; as they were kept or made now. None of a mode in which it is unstable.
 
     What they are made of is known by its identity: what is kept holds it.
     """
-    held = candidate.predictor, candidate.recipe, outcome, *series
-    key = page.tobytes(), *map(id, held)
-    found = _kept.pop(key, None) or (_models(candidate, series, page, outcome), held)
-    _kept[key] = found
-    if len(_kept) > MOST_KEPT:
-        _kept.popitem(last=False)
+    held = candidate.predictor, candidate.compiled, prediction, *series
+    key = calibration_page.tobytes(), *map(id, held)
+    found = _cache.pop(key, None) or (
+        _compute_linearised_modes(candidate, series, calibration_page, prediction),
+        held,
+    )
+    _cache[key] = found
+    if len(_cache) > CACHE_SIZE:
+        _cache.popitem(last=False)
     return found[0]
 
 
-def _models(
-    candidate: Candidate, series: Sequence[Series], page: Reals, outcome: Outcome | None
-) -> Models:
+def _compute_linearised_modes(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    calibration_page: Reals,
+    prediction: PredictionResult | None,
+) -> ModeModels:
     found = {}
-    for mode, point in points_of(candidate, series, outcome).items():
-        linear = near(candidate, page, mode, point.states, point.inputs)
+    for mode, point in operating_points(candidate, series, prediction).items():
+        linear = linearise_near(candidate, calibration_page, mode, point.states, point.inputs)
         if linear is not None:
-            found[mode] = linear, point.stay
+            found[mode] = linear, point.dwell_samples
     return found
 
 
-def near(
-    candidate: Candidate, page: Reals, mode: int, states: Reals, inputs: Reals
-) -> Linear | None:
+def linearise_near(
+    candidate: Candidate, calibration_page: Reals, mode: int, states: Reals, inputs: Reals
+) -> LinearModel | None:
     """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
-    substeps, sizes = candidate.recipe.substeps, SMALL * candidate.spans
-    return linearised(candidate.predictor, page, mode, substeps, states, inputs, sizes)
+    substeps, sizes = candidate.compiled.substeps, STATE_STEP_FRACTION * candidate.state_ranges
+    return linearise(candidate.predictor, calibration_page, mode, substeps, states, inputs, sizes)
 
 
 @dataclass(frozen=True)
-class Seen:
+class OperatingPoint:
     """Where a mode was seen: `states` and `inputs` there, and the usual `stay` in it [samples]."""
 
     states: Reals
     inputs: Reals
-    stay: int
+    dwell_samples: int
 
 
-def points_of(
-    candidate: Candidate, series: Sequence[Series], outcome: Outcome | None
-) -> dict[int, Seen]:
+def operating_points(
+    candidate: Candidate, series: Sequence[SampledRecording], prediction: PredictionResult | None
+) -> dict[int, OperatingPoint]:
     """Return where each mode was seen, in its longest stay; the mode with the longest first.
 
     Where the first compared signal is largest: friction is steep near rest alone.
     """
-    if outcome is None:
-        return _first_seen(candidate, series[0])
-    found = {}
-    runs = outcome.runs
-    lows, highs, modes, of = _stays(runs)
+    if prediction is None:
+        return _initial_operating_point(candidate, series[0])
+    points = {}
+    runs = prediction.runs
+    lows, highs, modes, recordings = _dwell_intervals(runs)
     for mode in sorted(set(modes.tolist())):
-        here = np.flatnonzero(modes == mode)
-        lengths = highs[here] - lows[here]
-        best = here[np.argmax(lengths)]
-        if np.max(lengths) >= SHORT_STAY:
-            one, states = series[of[best]], runs.whole.states[runs.starts[of[best]] :]
-            k = _away(one.measured, int(lows[best]), int(highs[best]))
-            usual = max(1, round(median(lengths.tolist())))
-            found[mode] = int(np.max(lengths)), Seen(states[k].copy(), one.inputs[k].copy(), usual)
-    ordered = sorted(found.items(), key=lambda item: -item[1][0])
+        intervals = np.flatnonzero(modes == mode)
+        lengths = highs[intervals] - lows[intervals]
+        best = intervals[np.argmax(lengths)]
+        if np.max(lengths) >= MIN_DWELL_SAMPLES:
+            one, states = (
+                series[recordings[best]],
+                runs.stacked.states[runs.starts[recordings[best]] :],
+            )
+            k = _largest_output_sample(one.measured, int(lows[best]), int(highs[best]))
+            dwell = max(1, round(median(lengths.tolist())))
+            points[mode] = (
+                int(np.max(lengths)),
+                OperatingPoint(states[k].copy(), one.inputs[k].copy(), dwell),
+            )
+    ordered = sorted(points.items(), key=lambda item: -item[1][0])
     return {mode: seen for mode, (_, seen) in ordered}
 
 
-def _stays(runs: Runs) -> tuple[Wholes, Wholes, Wholes, Wholes]:
+def _dwell_intervals(runs: StackedPrediction) -> tuple[Integers, Integers, Integers, Integers]:
     """Return the first sample of each stay in a mode, the one behind it, its mode and recording."""
-    modes, starts = runs.whole.modes, runs.starts
+    modes, starts = runs.stacked.modes, runs.starts
     begins = np.ones(len(modes), dtype=np.bool_)
     begins[1:] = modes[1:] != modes[:-1]
-    ends = starts[:-1] + runs.done
+    ends = starts[:-1] + runs.completed
     begins[starts[:-1]] = True
     begins[ends[ends < starts[1:]]] = True
     edges = np.append(np.flatnonzero(begins), len(modes))
-    of = np.searchsorted(starts, edges[:-1], side="right") - 1
-    kept = edges[:-1] < ends[of]
-    lows, highs, of = edges[:-1][kept], edges[1:][kept], of[kept]
-    return lows - starts[of], highs - starts[of], modes[lows], of
+    recordings = np.searchsorted(starts, edges[:-1], side="right") - 1
+    is_within = edges[:-1] < ends[recordings]
+    lows, highs, recordings = edges[:-1][is_within], edges[1:][is_within], recordings[is_within]
+    return lows - starts[recordings], highs - starts[recordings], modes[lows], recordings
 
 
-def _first_seen(candidate: Candidate, series: Series) -> dict[int, Seen]:
+def _initial_operating_point(
+    candidate: Candidate, series: SampledRecording
+) -> dict[int, OperatingPoint]:
     """Return where a recording starts."""
     predictor = candidate.predictor
-    page = candidate.page({}, series)
-    none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.seen)))
+    page = candidate.calibration_page({}, series)
+    none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.outputs)))
     short, measured = series.inputs[:2].copy(), series.measured[:2].copy()
-    run = predictor.predict(page, short, measured, none[:0], none, candidate.recipe.substeps, False)
-    return {int(run.modes[0]): Seen(run.states[0].copy(), short[0], 1)}
+    run = predictor.predict(
+        page, short, measured, none[:0], none, candidate.compiled.substeps, False
+    )
+    return {int(run.modes[0]): OperatingPoint(run.states[0].copy(), short[0], 1)}
 
 
-def _away(measured: Reals, low: int, high: int) -> int:
+def _largest_output_sample(measured: Reals, low: int, high: int) -> int:
     """Return the sample of a stay, not near its ends, at which the first signal is largest."""
     margin = (high - low) // 5
     inner = np.abs(measured[low + margin : high - margin, 0])

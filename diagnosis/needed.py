@@ -11,97 +11,121 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import Evidence, evidence, less
-from diagnosis.level import settled
+from diagnosis.evidence import LikelihoodGain, likelihood_gain, subtract_gains
+from diagnosis.level import fit_with_noise
 from diagnosis.naming import place_path
-from diagnosis.point import extended
-from diagnosis.search import Tell, Tried
-from diagnosis.share import counted
+from diagnosis.point import extend_vector
+from diagnosis.search import CandidateFit, LogCallback
+from diagnosis.share import supported_gain
 from diagnosis.threshold import Thresholds
 
-STAND_IN = 0.25
+MIN_ADDED_FRACTION = 0.25
 """Part of what another one at its place gains that an effect found before it must add to that: it
 may have stood in for it."""
 
 
 @dataclass(frozen=True)
-class Needed:
+class AcceptedEffects:
     """Effects over a `base` that a `model` holds, the order in which they are named."""
 
     base: Estimate
     model: Estimate
-    kept: tuple[Tried, ...]
+    effects: tuple[CandidateFit, ...]
 
 
-def still_needed(
-    bench: Bench, found: Needed, units: Mapping[str, float], thresholds: Thresholds, tell: Tell
-) -> Needed:
+def eliminate_backward(
+    model_set: ModelSet,
+    accepted: AcceptedEffects,
+    units: Mapping[str, float],
+    thresholds: Thresholds,
+    log: LogCallback,
+) -> AcceptedEffects:
     """Take out what the effects found after it have made needless; put first at a place what is
     worth most there.
     """
-    for tried in found.kept[:-1]:
-        without = _without(bench, found, tried, units)
+    for tried in accepted.effects[:-1]:
+        without = _fit_without(model_set, accepted, tried, units)
         if without is None:
             continue
-        worth = evidence(found.model, without, bench.series)
-        beside = [t for t in found.kept if t is not tried and _place(t) == _place(tried)]
-        most = max((t.evidence.train for t in beside if t.evidence), default=0.0)
-        gained = sum(t.evidence.train for t in beside if t.evidence)
-        if counted(worth) <= max(thresholds.of(tried.layer), STAND_IN * gained):
-            tell(f"{tried.layer.id} is needless beside the others")
-            rest = tuple(t for t in found.kept if t is not tried)
-            found = Needed(found.base, without, _credited(bench, rest, tried, found.base, without))
-        elif worth.train < most:
-            tell(f"{tried.layer.id} adds less than what was found after it at its place")
-            rest = tuple(t for t in found.kept if t is not tried)
-            first = _credited(bench, rest, tried, found.base, without)
-            last = dataclasses.replace(tried, evidence=worth)
-            found = Needed(found.base, found.model, (*first, last))
+        worth = likelihood_gain(accepted.model, without, model_set.series)
+        beside = [t for t in accepted.effects if t is not tried and _path(t) == _path(tried)]
+        most = max((t.likelihood_gain.penalised for t in beside if t.likelihood_gain), default=0.0)
+        gained = sum(t.likelihood_gain.penalised for t in beside if t.likelihood_gain)
+        if supported_gain(worth) <= max(
+            thresholds.threshold_of(tried.placed_effect), MIN_ADDED_FRACTION * gained
+        ):
+            log(f"{tried.placed_effect.id} is needless beside the others")
+            rest = tuple(t for t in accepted.effects if t is not tried)
+            accepted = AcceptedEffects(
+                accepted.base,
+                without,
+                _reassign_gain(model_set, rest, tried, accepted.base, without),
+            )
+        elif worth.penalised < most:
+            log(f"{tried.placed_effect.id} adds less than what was found after it at its place")
+            rest = tuple(t for t in accepted.effects if t is not tried)
+            first = _reassign_gain(model_set, rest, tried, accepted.base, without)
+            last = dataclasses.replace(tried, likelihood_gain=worth)
+            accepted = AcceptedEffects(accepted.base, accepted.model, (*first, last))
         else:
-            new = dataclasses.replace(tried, beside=worth.train)
-            kept = tuple(new if t is tried else t for t in found.kept)
-            found = Needed(found.base, found.model, kept)
-    return found
+            new = dataclasses.replace(tried, joint_gain=worth.penalised)
+            kept = tuple(new if t is tried else t for t in accepted.effects)
+            accepted = AcceptedEffects(accepted.base, accepted.model, kept)
+    return accepted
 
 
-def _without(
-    bench: Bench, found: Needed, tried: Tried, units: Mapping[str, float]
+def _fit_without(
+    model_set: ModelSet,
+    accepted: AcceptedEffects,
+    candidate_fit: CandidateFit,
+    units: Mapping[str, float],
 ) -> Estimate | None:
     """Return the model without one of its effects, fitted from where it is."""
-    candidate = bench.possible([other.layer for other in found.kept if other is not tried])
+    candidate = model_set.try_compile(
+        [other.placed_effect for other in accepted.effects if other is not candidate_fit]
+    )
     if candidate is None:
         return None
-    start = extended(candidate, found.model.candidate, found.model.point, {})
-    given = (found.base.noises, start, units)
-    make = partial(settled, candidate, bench.series, *given, like=found.model)
-    return bench.kept("settled", candidate, (*given, found.model.gains), make)
+    start = extend_vector(candidate, accepted.model.candidate, accepted.model.point, {})
+    given = (accepted.base.noise_levels, start, units)
+    make = partial(fit_with_noise, candidate, model_set.series, *given, nearby=accepted.model)
+    return model_set.load_or_fit("settled", candidate, (*given, accepted.model.gains), make)
 
 
-def _credited(
-    bench: Bench, rest: tuple[Tried, ...], gone: Tried, base: Estimate, model: Estimate
-) -> tuple[Tried, ...]:
+def _reassign_gain(
+    model_set: ModelSet,
+    remaining: tuple[CandidateFit, ...],
+    removed: CandidateFit,
+    base: Estimate,
+    model: Estimate,
+) -> tuple[CandidateFit, ...]:
     """Return the rest with what it gains without the one that is gone: the first one at its place,
     or the first of all, has what the others have not.
     """
-    heir = next((t for t in rest if _place(t) == _place(gone)), rest[0])
-    others = [t.evidence for t in rest if t is not heir and t.evidence]
-    own: Evidence = less(evidence(model, base, bench.series), others)
-    estimate = model if len(rest) == 1 else heir.estimate
-    new = dataclasses.replace(heir, evidence=own, estimate=estimate)
-    return tuple(new if t is heir else t for t in rest)
+    recipient = next((t for t in remaining if _path(t) == _path(removed)), remaining[0])
+    others = [t.likelihood_gain for t in remaining if t is not recipient and t.likelihood_gain]
+    own: LikelihoodGain = subtract_gains(likelihood_gain(model, base, model_set.series), others)
+    estimate = model if len(remaining) == 1 else recipient.estimate
+    new = dataclasses.replace(recipient, likelihood_gain=own, estimate=estimate)
+    return tuple(new if t is recipient else t for t in remaining)
 
 
-def renewed(first: Sequence[Tried], before: Sequence[Tried], kept: Sequence[Tried]) -> list[Tried]:
+def update_first_round(
+    first: Sequence[CandidateFit], before: Sequence[CandidateFit], retained: Sequence[CandidateFit]
+) -> list[CandidateFit]:
     """Return the candidates of the first round: those that stood aside for another are none, the
     first one that is kept gains what it does now.
     """
-    out = {t.layer.id for t in before} - {t.layer.id for t in kept}
-    left = [Tried(t.layer, t.promised) if t.layer.id in out else t for t in first]
-    leading = {t.layer.id: t for t in kept[:1]}
-    return [leading.get(t.layer.id, t) for t in left]
+    out = {t.placed_effect.id for t in before} - {t.placed_effect.id for t in retained}
+    left = [
+        CandidateFit(t.placed_effect, t.screening_gain) if t.placed_effect.id in out else t
+        for t in first
+    ]
+    leading = {t.placed_effect.id: t for t in retained[:1]}
+    return [leading.get(t.placed_effect.id, t) for t in left]
 
 
-def _place(tried: Tried) -> str:
-    return place_path(tried.layer)
+def _path(candidate_fit: CandidateFit) -> str:
+    return place_path(candidate_fit.placed_effect)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-EFFECTS: Mapping[str, tuple[str, ...]] = {
+EFFECT_NEEDS: Mapping[str, tuple[str, ...]] = {
     "actuator_delay": ("fast",),
     "actuator_lag": ("fast",),
     "added_inertia": ("fast", "sampled_fast"),
@@ -40,7 +40,7 @@ EFFECTS: Mapping[str, tuple[str, ...]] = {
     "viscous_friction": ("speed_range",),
 }
 """What each effect of the library has to see."""
-NEEDS: Mapping[str, str] = {
+NEED_DESCRIPTIONS: Mapping[str, str] = {
     "fast": "steps or a sweep to 5 Hz or more",
     "sampled_fast": "a rate of 50 Hz or more",
     "torque_reverses": "an input that changes its sign",

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
-STRETCH = 50
+WINDOW_SAMPLES = 50
 """Samples of a stretch."""
-QUIET = 0.2
+NOISE_QUANTILE = 0.2
 """The part of the stretches that counts as quiet."""
-MAD = 1.4826
+MAD_TO_STD = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
 
 
@@ -23,14 +23,14 @@ def noise_of(values: Reals) -> float:
     known = values[np.isfinite(values)]
     if len(known) < 5:
         return 0.0
-    spread = MAD * _medians(np.abs(np.diff(known, n=2)))
-    white = float(np.quantile(spread, QUIET)) / 6.0**0.5
+    spread = MAD_TO_STD * _window_medians(np.abs(np.diff(known, n=2)))
+    white = float(np.quantile(spread, NOISE_QUANTILE)) / 6.0**0.5
     return float(max(white, quantum_of(known) / 12.0**0.5))
 
 
-def _medians(sizes: Reals) -> Reals:
+def _window_medians(sizes: Reals) -> Reals:
     """Return the median of each stretch of sizes (n,): the first ones have one more of them."""
-    count = max(1, len(sizes) // STRETCH)
+    count = max(1, len(sizes) // WINDOW_SAMPLES)
     width, more = divmod(len(sizes), count)
     edge = more * (width + 1)
     longer, others = sizes[:edge].reshape(more, width + 1), sizes[edge:].reshape(-1, width)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
-from diagnosis.point import Point, bounds_of, is_own
-from diagnosis.prediction import Outcome
-from diagnosis.slopes import Columns
+from diagnosis.point import ParameterVector, bounds_of, per_recording_mask
+from diagnosis.prediction import PredictionResult
+from diagnosis.slopes import Jacobian
 
 Reals = NDArray[np.float64]
 Sums = tuple[Reals, Reals]
@@ -19,7 +19,7 @@ Sums = tuple[Reals, Reals]
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """`a` (blocks, n, n) and `g` (blocks, n): J'J and J'e over the mean squares, without priors.
 
     `own` (n,) tells which coordinates each recording has of its own; `of` (blocks,) is the
@@ -32,18 +32,18 @@ class Normal:
     of: NDArray[np.int64]
     fold: NDArray[np.int64]
 
-    def without(self, fold: int) -> Normal:
+    def without_fold(self, fold: int) -> NormalEquations:
         """Return the equations of the other folds."""
         kept = self.fold != fold
-        return Normal(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
+        return NormalEquations(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
 
     @cached_property
-    def whole(self) -> Sums:
+    def total(self) -> Sums:
         """The sums over all blocks."""
         return self.a.sum(axis=0), self.g.sum(axis=0)
 
     @cached_property
-    def each(self) -> dict[int, Sums]:
+    def by_recording(self) -> dict[int, Sums]:
         """The sums over the blocks of each recording; none without coordinates of its own."""
         if not self.own.any():
             return {}
@@ -51,18 +51,20 @@ class Normal:
         return {r: (self.a[of].sum(axis=0), self.g[of].sum(axis=0)) for r, of in here.items()}
 
 
-def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
+def normal_equations_of(
+    candidate: Candidate, prediction: PredictionResult, jacobian: Jacobian
+) -> NormalEquations:
     """Return the normal equations of an outcome, of all coordinates of a candidate."""
-    blocks, innovation = outcome.blocks, outcome.joined
+    blocks, innovation = prediction.blocks, prediction.stacked
     known = np.isfinite(innovation)
-    far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
-    weight = np.where(known, 1.0 / outcome.variances / far, 0.0)
+    far = np.maximum(np.abs(innovation) / prediction.huber_limits, 1.0)
+    weight = np.where(known, 1.0 / prediction.variances / far, 0.0)
     root = np.sqrt(weight)
     errors = np.where(known, innovation * root, 0.0).reshape(-1)
     count, seen = len(candidate.names), innovation.shape[1]
     changes = np.empty((count, innovation.size))
     for name, row in zip(candidate.names, changes, strict=True):
-        np.multiply(columns[name], root, out=row.reshape(innovation.shape))
+        np.multiply(jacobian[name], root, out=row.reshape(innovation.shape))
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
@@ -70,16 +72,16 @@ def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Norma
         a[place] = changes[:, part] @ changes[:, part].T
         g[place] = changes[:, part] @ errors[part]
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
-    return Normal(a, g, is_own(candidate), of, fold)
+    return NormalEquations(a, g, per_recording_mask(candidate), of, fold)
 
 
-def stepped(
+def damped_step(
     candidate: Candidate,
-    point: Point,
-    normal: Normal,
+    point: ParameterVector,
+    normal: NormalEquations,
     damping: float,
     own_only: bool = False,
-) -> Point:
+) -> ParameterVector:
     """Return the point one damped step further, within the ranges.
 
     A coordinate at its bound that the step would lead out of its range is held (active set).
@@ -87,7 +89,7 @@ def stepped(
     """
     bounds = bounds_of(candidate)
     held = np.full(len(point.shared), own_only)
-    step = _solved(point, normal, damping, held)
+    step = _solve_step(point, normal, damping, held)
     for _ in held:
         trial = point.shared + step.shared
         out = (trial <= bounds[:, 0]) & (point.shared <= bounds[:, 0])
@@ -96,44 +98,50 @@ def stepped(
         if not np.any(out):
             break
         held |= out
-        step = _solved(point, normal, damping, held)
+        step = _solve_step(point, normal, damping, held)
     shared = np.clip(point.shared + step.shared, bounds[:, 0], bounds[:, 1])
-    own = np.clip(point.own + step.own, bounds[:, 0], bounds[:, 1])
-    return Point(shared, own)
+    own = np.clip(point.per_recording + step.per_recording, bounds[:, 0], bounds[:, 1])
+    return ParameterVector(shared, own)
 
 
-def foreseen(candidate: Candidate, now: Point, normal: Normal, there: Point) -> float:
+def predicted_gain(
+    candidate: Candidate, start: ParameterVector, normal: NormalEquations, end: ParameterVector
+) -> float:
     """Return what the normal equations say that a step gains [nats], priors counted."""
-    step = np.where(normal.own, (there.own - now.own)[normal.of], there.shared - now.shared)
+    step = np.where(
+        normal.own, (end.per_recording - start.per_recording)[normal.of], end.shared - start.shared
+    )
     slope = normal.g + 0.5 * (normal.a @ step[:, :, None])[:, :, 0]
-    return now.prior(candidate) - there.prior(candidate) - float(np.sum(slope * step))
+    return start.prior_cost(candidate) - end.prior_cost(candidate) - float(np.sum(slope * step))
 
 
-def _solved(point: Point, normal: Normal, damping: float, held: NDArray[np.bool_]) -> Point:
+def _solve_step(
+    point: ParameterVector, normal: NormalEquations, damping: float, is_fixed: NDArray[np.bool_]
+) -> ParameterVector:
     """Solve for a step: coordinates of one recording are eliminated before the shared ones."""
-    own, free = np.flatnonzero(normal.own), np.flatnonzero(~normal.own & ~held)
+    own, free = np.flatnonzero(normal.own), np.flatnonzero(~normal.own & ~is_fixed)
     among = free[:, None], free
-    matrix = np.eye(len(free)) + normal.whole[0][among]
-    right = -point.shared[free] - normal.whole[1][free]
-    parts: dict[int, tuple[Reals, Reals, Reals]] = {}
-    for r, (a, g) in normal.each.items():
+    matrix = np.eye(len(free)) + normal.total[0][among]
+    right = -point.shared[free] - normal.total[1][free]
+    eliminated: dict[int, tuple[Reals, Reals, Reals]] = {}
+    for r, (a, g) in normal.by_recording.items():
         inner = a[own[:, None], own]
         inner = inner + np.eye(len(inner)) + damping * np.diag(inner.diagonal())
-        cross, rest = a[free[:, None], own], -g[own] - point.own[r, own]
-        solved = solution(inner, np.column_stack([cross.T, rest]))
+        cross, rest = a[free[:, None], own], -g[own] - point.per_recording[r, own]
+        solved = solve(inner, np.column_stack([cross.T, rest]))
         matrix = matrix - cross @ solved[:, :-1]
         right = right - cross @ solved[:, -1]
-        parts[r] = (inner, cross, rest)
+        eliminated[r] = (inner, cross, rest)
     matrix = matrix + damping * np.diag(np.maximum(matrix.diagonal(), 1e-12))
     shared = np.zeros(normal.own.shape)
-    shared[free] = solution(matrix, right)
-    each = np.zeros((len(point.own), len(shared)))
-    for r, (inner, cross, rest) in parts.items():
-        each[r, own] = solution(inner, rest - cross.T @ shared[free])
-    return Point(shared, each)
+    shared[free] = solve(matrix, right)
+    each = np.zeros((len(point.per_recording), len(shared)))
+    for r, (inner, cross, rest) in eliminated.items():
+        each[r, own] = solve(inner, rest - cross.T @ shared[free])
+    return ParameterVector(shared, each)
 
 
-def solution(matrix: Reals, right: Reals) -> Reals:
+def solve(matrix: Reals, right: Reals) -> Reals:
     """Solve; the smallest solution where changes without bound drown the priors."""
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from diagnosis.digits import change, with_spread
-from diagnosis.dossier import Dossier
-from diagnosis.fit import note_of
+from diagnosis.digits import format_change, format_with_std
+from diagnosis.dossier import DiagnosisReport
+from diagnosis.fit import parameter_note
 from diagnosis.naming import quantities_of
 from diagnosis.selection import Selection
-from language.document import Scalar, Table
+from language.document import MappingNode, ScalarNode
 
-ASTRAY, CLEARLY, MOST_ASTRAY = 0.03, 3.0, 5
+MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
 """Part of a value, and standard deviations, from which recalibration was led astray; most told."""
 
 
@@ -29,41 +29,41 @@ class ParameterRow:
     note: str
 
 
-def parameter_rows(dossier: Dossier, selection: Selection) -> list[ParameterRow]:
+def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
     """Return each fitted parameter: declared, recalibrated, and with what was found."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     brought = {
-        layer.named(own): text_of(entry, "about")
-        for layer in (tried.layer for tried in selection.accepted)
-        for own, entry in _parameters(layer.effect.body)
+        placed_effect.qualified_name(own): text_of(entry, "about")
+        for placed_effect in (tried.placed_effect for tried in selection.accepted)
+        for own, entry in _parameter_tables(placed_effect.effect.body)
     }
-    coordinates = {one.name: one for one in selection.model.candidate.uncertain}
+    coordinates = {one.name: one for one in selection.model.candidate.free_parameters}
     rows = []
     for name, now in after.items():
-        declared = dossier.automaton.parameters.get(name)
+        declared = report.automaton.parameters.get(name)
         value = None if declared is None or declared.value is None else float(declared.value)
         rows.append(
             ParameterRow(
                 name,
                 "" if now.unit == "1" else now.unit,
                 "new" if value is None else f"{value:.5g}",
-                with_spread(before[name].value, before[name].std) if name in before else "",
-                with_spread(now.value, now.std),
-                "" if value is None else _moved(value, now.value),
-                about_of(dossier, "parameters", name) or brought.get(name, ""),
-                note_of(now, coordinates[name]),
+                format_with_std(before[name].value, before[name].std) if name in before else "",
+                format_with_std(now.value, now.std),
+                "" if value is None else _format_change(value, now.value),
+                about_of(report, "parameters", name) or brought.get(name, ""),
+                parameter_note(now, coordinates[name]),
             )
         )
     return rows
 
 
-def _parameters(body: Table) -> list[tuple[str, Table]]:
+def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
     table = body.get("parameters")
-    entries = table if isinstance(table, Table) else ()
-    return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, Table)]
+    entries = table if isinstance(table, MappingNode) else ()
+    return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, MappingNode)]
 
 
-def astray(selection: Selection) -> str:
+def format_biased_parameters(selection: Selection) -> str:
     """Return how far recalibration without the effects takes parameters, the farthest first."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
@@ -72,32 +72,32 @@ def astray(selection: Selection) -> str:
         if now is None or now.value <= 0.0 or one.value <= 0.0:
             continue
         part = one.value / now.value - 1.0
-        if abs(part) >= ASTRAY and abs(one.value - now.value) > CLEARLY * now.std:
-            found.append((abs(part), f"{name} {change(now.value, one.value)}"))
-    return ", ".join(text for _, text in sorted(found, reverse=True)[:MOST_ASTRAY])
+        if abs(part) >= MIN_BIAS and abs(one.value - now.value) > MIN_BIAS_STDS * now.std:
+            found.append((abs(part), f"{name} {format_change(now.value, one.value)}"))
+    return ", ".join(text for _, text in sorted(found, reverse=True)[:MAX_BIASED])
 
 
-def _moved(declared: float, now: float) -> str:
-    return change(declared, now) if declared > 0.0 else ""
+def _format_change(declared: float, current: float) -> str:
+    return format_change(declared, current) if declared > 0.0 else ""
 
 
-def about_of(dossier: Dossier, section: str, name: str) -> str:
+def about_of(report: DiagnosisReport, section: str, name: str) -> str:
     """Return what the spec says a parameter, input or state is; empty where it says nothing."""
-    table = dossier.case.document.root.get(section)
-    entry = table.get(name) if isinstance(table, Table) else None
-    return text_of(entry, "about") if isinstance(entry, Table) else ""
+    table = report.case.document.root.get(section)
+    entry = table.get(name) if isinstance(table, MappingNode) else None
+    return text_of(entry, "about") if isinstance(entry, MappingNode) else ""
 
 
-def text_of(table: Table, key: str) -> str:
+def text_of(table: MappingNode, key: str) -> str:
     """Return the text of a key; empty where there is none."""
     node = table.get(key)
-    return node.text if isinstance(node, Scalar) else ""
+    return node.text if isinstance(node, ScalarNode) else ""
 
 
-def fixed(dossier: Dossier) -> list[str]:
+def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
     """Return the parameters that have no range, with their values: they were taken as exact."""
     return [
         f"{name} = {float(one.value):.5g}"
-        for name, one in dossier.automaton.parameters.items()
+        for name, one in report.automaton.parameters.items()
         if one.range is None and one.value is not None and one.type == "real"
     ]

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from diagnosis.plan import Plan
+from diagnosis.plan import ExperimentPlan
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import visible
+from language.text import escape_invisible
 
 
-def plan_picture(
-    plan: Plan, inputs: Mapping[str, str], signals: Sequence[tuple[str, str]]
+def draw_experiment(
+    plan: ExperimentPlan, inputs: Mapping[str, str], signals: Sequence[tuple[str, str]]
 ) -> Picture:
     """Return the inputs on top, the signals under them; `inputs` and `signals` with their units."""
     best = plan.options[0]
@@ -26,22 +26,33 @@ def plan_picture(
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     names = list(inputs.items())
     for k in moved:
-        axes[0].plot(time, series.inputs[:, k], color="black", lw=1.2, label=visible(names[k][0]))
+        axes[0].plot(
+            time, series.inputs[:, k], color="black", lw=1.2, label=escape_invisible(names[k][0])
+        )
     axes[0].set_ylabel(
-        visible(f"inputs [{names[moved[0]][1] if moved else ''}]"), fontsize=9, parse_math=False
+        escape_invisible(f"inputs [{names[moved[0]][1] if moved else ''}]"),
+        fontsize=9,
+        parse_math=False,
     )
     for row, (name, unit) in enumerate(signals):
         axis = axes[row + 1]
-        for place, (title, shown) in enumerate(zip(plan.names, best.shown, strict=True)):
+        for place, (title, shown) in enumerate(zip(plan.names, best.outputs, strict=True)):
             style = ("-", "--", ":")[place % 3]
             axis.plot(
-                time, shown[:, row], style, color=PALETTE[place], lw=1.3, label=visible(title)
+                time,
+                shown[:, row],
+                style,
+                color=PALETTE[place],
+                lw=1.3,
+                label=escape_invisible(title),
             )
-        axis.set_ylabel(visible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
+        axis.set_ylabel(escape_invisible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
     for axis in axes:
         axis.grid(alpha=0.3)
     axes[0].legend(loc="best", fontsize=8)
     axes[1].legend(loc="best", fontsize=8)
-    axes[0].set_title(visible(best.manoeuvre.name), loc="left", fontsize=11, parse_math=False)
+    axes[0].set_title(
+        escape_invisible(best.manoeuvre.name), loc="left", fontsize=11, parse_math=False
+    )
     axes[-1].set_xlabel("time [s]")
     return Picture(figure)

@@ -15,15 +15,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Prediction, Recorded
-from diagnosis.bench import Bench
-from diagnosis.candidate import Candidate, candidate
+from codegen.runs import Prediction, StackedRecordings
+from diagnosis.bench import ModelSet
+from diagnosis.candidate import Candidate, compile_candidate
 from diagnosis.estimate import Estimate
-from diagnosis.joined import burnt, joined
-from diagnosis.layers import DRIFT, Layer, drift
-from diagnosis.scale import KINDS
-from diagnosis.series import Series
-from language.document import Document, Entry, Scalar, Table
+from diagnosis.joined import burn_in_samples, stack_recordings
+from diagnosis.layers import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
+from diagnosis.scale import DISTURBANCE_KIND_BY_SECTION
+from diagnosis.series import SampledRecording
+from language.document import Document, Entry, MappingNode, ScalarNode
 from language.element import outputs_as_mapping
 from language.model import Automaton
 from language.syntax import Name
@@ -32,7 +32,7 @@ Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Probe:
+class DisturbanceResponse:
     """A model that can be disturbed at one place: its observer has the gains of `model`.
 
     Its signals are those compared, then `torques` of elements, then the disturbance.
@@ -40,40 +40,42 @@ class Probe:
 
     model: Estimate = field(repr=False)
     candidate: Candidate = field(repr=False)
-    series: tuple[Series, ...] = field(repr=False)
-    torques: tuple[str, ...]
-    first: Reals = field(repr=False)
-    steady: Reals = field(repr=False)
+    series: tuple[SampledRecording, ...] = field(repr=False)
+    element_torques: tuple[str, ...]
+    transient_gains: Reals = field(repr=False)
+    steady_state_gains: Reals = field(repr=False)
 
-    def run(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
+    def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
         """Return the predictions of all recordings under a disturbance (samples,) of each."""
-        pages, recorded = self._disturbed(disturbance)
-        predictor, substeps = self.candidate.predictor, self.candidate.recipe.substeps
-        limits = np.full(len(predictor.seen), np.inf)
-        runs = predictor.predict_all(pages, recorded, self.first, self.steady, substeps, limits)
-        return runs.each()
+        pages, recorded = self._with_disturbance(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
+        limits = np.full(len(predictor.outputs), np.inf)
+        runs = predictor.predict_recordings(
+            pages, recorded, self.transient_gains, self.steady_state_gains, substeps, limits
+        )
+        return runs.split()
 
-    def missed(self, disturbance: Sequence[Reals]) -> list[Reals]:
+    def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
         """Return the innovations of such predictions, of which nothing else is told."""
-        pages, recorded = self._disturbed(disturbance)
-        predictor, substeps = self.candidate.predictor, self.candidate.recipe.substeps
+        pages, recorded = self._with_disturbance(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         runs = predictor.predict_points(
-            pages[np.newaxis], recorded, self.first, self.steady, substeps
+            pages[np.newaxis], recorded, self.transient_gains, self.steady_state_gains, substeps
         )
         edges = pairwise(recorded.starts.tolist())
-        return self._counted([runs[0][0][low:high] for low, high in edges])
+        return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
 
-    def _disturbed(self, disturbance: Sequence[Reals]) -> tuple[Reals, Recorded]:
+    def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
         """Return the page of each recording and the recordings, with a disturbance measured."""
-        together, candidate = joined(self.series), self.candidate
-        recorded, seen = together.recorded, candidate.predictor.seen
-        nothing = np.full((len(recorded.inputs), len(self.torques)), np.nan)
+        together, candidate = stack_recordings(self.series), self.candidate
+        recorded, seen = together.recorded, candidate.predictor.outputs
+        nothing = np.full((len(recorded.inputs), len(self.element_torques)), np.nan)
         shown = np.column_stack([recorded.measured, nothing, np.concatenate(disturbance)])
         first = np.full((len(self.series), len(seen)), np.nan)
-        first[:, : together.first.shape[1]] = together.first
+        first[:, : together.first_measured.shape[1]] = together.first_measured
         first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
         given = dataclasses.replace(recorded, measured=np.ascontiguousarray(shown))
-        return candidate.pages(self._values, first), given
+        return candidate.calibration_pages(self._values, first), given
 
     @cached_property
     def _values(self) -> list[dict[str, float]]:
@@ -81,30 +83,37 @@ class Probe:
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
         """Return the innovations of the compared signals behind the burn-in."""
-        return self._counted([one.innovations for one in predictions])
+        return self._after_burn_in([one.innovations for one in predictions])
 
-    def _counted(self, innovations: Sequence[Reals]) -> list[Reals]:
-        seen = len(self.model.candidate.predictor.seen)
-        skip = burnt(self.series[0])
+    def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
+        seen = len(self.model.candidate.predictor.outputs)
+        skip = burn_in_samples(self.series[0])
         return [one[skip:, :seen] for one in innovations]
 
 
-def probe_of(bench: Bench, section: str, place: str, model: Estimate) -> Probe:
+def build_disturbance_response(
+    model_set: ModelSet, section: str, place: str, model: Estimate
+) -> DisturbanceResponse:
     """Return a model of a bench, made ready to be disturbed at a place. Raises SpecError."""
-    kind = KINDS[section]
-    own = drift(kind, place)
-    layer = Layer(own.effect, place, f"probe_{place}"[:25])
-    torques = torques_of(bench.automaton)
-    seen = (*bench.seen, *torques, layer.named(DRIFT))
-    document = _shown(bench.document, seen)
-    made = candidate(
-        document, bench.project, model.candidate.layers, (*bench.drifts, layer), seen, bench.period
+    kind = DISTURBANCE_KIND_BY_SECTION[section]
+    disturbance = disturbance_effect(kind, place)
+    placed_effect = PlacedEffect(disturbance.effect, place, f"probe_{place}"[:25])
+    torques = element_torques(model_set.automaton)
+    seen = (*model_set.output_names, *torques, placed_effect.qualified_name(DISTURBANCE_STATE))
+    document = _with_outputs(model_set.document, seen)
+    candidate = compile_candidate(
+        document,
+        model_set.project,
+        model.candidate.placed_effects,
+        (*model_set.disturbances, placed_effect),
+        seen,
+        model_set.period,
     )
-    first, steady = _gains(made, model, layer.named(DRIFT))
-    return Probe(model, made, bench.series, torques, first, steady)
+    first, steady = _embed_gains(candidate, model, placed_effect.qualified_name(DISTURBANCE_STATE))
+    return DisturbanceResponse(model, candidate, model_set.series, torques, first, steady)
 
 
-def torques_of(automaton: Automaton) -> tuple[str, ...]:
+def element_torques(automaton: Automaton) -> tuple[str, ...]:
     """Return the names of the torques that elastic elements transmit."""
     trees = [
         one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
@@ -112,31 +121,31 @@ def torques_of(automaton: Automaton) -> tuple[str, ...]:
     return tuple(tree.path for tree in trees if isinstance(tree, Name))
 
 
-def _shown(document: Document, names: Sequence[str]) -> Document:
+def _with_outputs(document: Document, names: Sequence[str]) -> Document:
     """Return a document that shows some names beside its outputs."""
     node = document.root.get("outputs")
     assert node is not None
     outputs = outputs_as_mapping(node)
     span = outputs.span
-    added = {name: Entry(name, span, Scalar(name, span)) for name in names}
-    table = Table({**added, **outputs.entries}, span)
+    added = {name: Entry(name, span, ScalarNode(name, span)) for name in names}
+    table = MappingNode({**added, **outputs.entries}, span)
     root = {**document.root.entries, "outputs": Entry("outputs", span, table)}
-    return dataclasses.replace(document, root=Table(root, document.root.span))
+    return dataclasses.replace(document, root=MappingNode(root, document.root.span))
 
 
-def _gains(made: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
+def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
     """Return the gains of a model, for one that has its states and signals among others."""
-    states, known = made.predictor.states, model.candidate.predictor
+    states, known = candidate.predictor.states, model.candidate.predictor
     rows = [states.index(name) for name in known.states]
-    columns = [made.predictor.seen.index(name) for name in known.seen]
+    columns = [candidate.predictor.outputs.index(name) for name in known.outputs]
     place = np.ix_(rows, columns)
-    first = np.zeros((len(model.gains.first), len(states), len(made.predictor.seen)))
-    steady = np.zeros((len(made.predictor.modes), *first.shape[1:]))
-    for k, gain in enumerate(model.gains.first):
+    first = np.zeros((len(model.gains.transient), len(states), len(candidate.predictor.outputs)))
+    steady = np.zeros((len(candidate.predictor.modes), *first.shape[1:]))
+    for k, gain in enumerate(model.gains.transient):
         first[k][place] = gain
-    for k, mode in enumerate(made.predictor.modes):
-        steady[k][place] = model.gains.steady[known.modes.index(mode)]
-    row, column = states.index(disturbance), made.predictor.seen.index(disturbance)
+    for k, mode in enumerate(candidate.predictor.modes):
+        steady[k][place] = model.gains.steady_state[known.modes.index(mode)]
+    row, column = states.index(disturbance), candidate.predictor.outputs.index(disturbance)
     first[:, row, column] = 1.0
     steady[:, row, column] = 1.0
     return first, steady

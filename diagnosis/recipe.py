@@ -22,110 +22,116 @@ from typing import Any
 import codegen
 import diagnosis
 import language
-from codegen.cache import own_folder
-from codegen.predictor import Columns
-from diagnosis.uncertain import Uncertain
-from language.document import Items, Node, Scalar, Table
+from codegen.cache import cache_subfolder
+from codegen.predictor import PredictorColumns
+from diagnosis.uncertain import FreeParameter
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 
-MAKING = ("candidate", "layers", "recipe", "series", "uncertain")
+COMPILATION_MODULES = ("candidate", "layers", "recipe", "series", "uncertain")
 """The files of diagnosis that candidates are made by."""
 
 
 @dataclass(frozen=True)
-class Recipe:
+class CompiledModel:
     """A candidate but for its library: `columns` of its arrays, `substeps` of a sample, `spans` of
     its states, `uncertain` parameters, `drifts` (states) and their `memories` [s]; `delays` are
     parameters that are one, and `brought` tells which states the effects have.
     """
 
-    columns: Columns
+    columns: PredictorColumns
     substeps: int
     spans: tuple[float, ...]
-    uncertain: tuple[Uncertain, ...]
+    uncertain: tuple[FreeParameter, ...]
     drifts: tuple[str, ...]
     memories: tuple[float, ...]
     delays: tuple[str, ...] = ()
     brought: tuple[bool, ...] = ()
 
 
-def recipe_key(*parts: str) -> str:
+def cache_key(*parts: str) -> str:
     """Return the key of what candidates of this code are made from."""
-    digest = hashlib.sha256(code_digest(MAKING).encode())
+    digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
     for part in parts:
         digest.update(part.encode() + b"\\0")
     return digest.hexdigest()
 
 
-def node_text(node: Node | None) -> str:
+def node_text(node: YamlNode | None) -> str:
     """Return a tree of a document as one text, without places."""
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         return json.dumps(node.text)
-    if isinstance(node, Items):
+    if isinstance(node, SequenceNode):
         return f"[{','.join(node_text(item) for item in node.nodes)}]"
-    if isinstance(node, Table):
+    if isinstance(node, MappingNode):
         return f"{{{','.join(f'{json.dumps(e.key)}:{node_text(e.node)}' for e in node)}}}"
     return ""
 
 
-def kept(key: str, make: Callable[[], tuple[Recipe, bytes]]) -> tuple[Recipe, Path]:
+def load_or_compile(
+    key: str, compile_model: Callable[[], tuple[CompiledModel, bytes]]
+) -> tuple[CompiledModel, Path]:
     """Return the recipe and the library of a key; both are made and kept where they are not."""
-    folder = _folder()
+    folder = _cache_folder()
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
     with suppress(OSError, ValueError, TypeError, KeyError):
-        known = json.loads(recipe_path.read_text())
-        if hashlib.sha256(library.read_bytes()).hexdigest() == known.pop("library"):
-            return _recipe(known), library
-    recipe, data = make()
-    seal = hashlib.sha256(data).hexdigest()
-    text = json.dumps({**dataclasses.asdict(recipe), "library": seal})
-    write_whole(library, data)
-    write_whole(recipe_path, text.encode())
+        metadata = json.loads(recipe_path.read_text())
+        if hashlib.sha256(library.read_bytes()).hexdigest() == metadata.pop("library"):
+            return _from_json(metadata), library
+    recipe, data = compile_model()
+    library_digest = hashlib.sha256(data).hexdigest()
+    text = json.dumps({**dataclasses.asdict(recipe), "library": library_digest})
+    write_atomically(library, data)
+    write_atomically(recipe_path, text.encode())
     return recipe, library
 
 
 @cache
-def _folder() -> Path:
+def _cache_folder() -> Path:
     """The user's own folder of candidates; one for this process alone where there is none."""
-    return own_folder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
+    return cache_subfolder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
 
 
 @cache
-def code_digest(own: tuple[str, ...] = ("*",)) -> str:
-    """Return the hash of the code that fits follow from: of `own` files of diagnosis (patterns)."""
+def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
+    """Return the hash of the code that fits follow from: of `patterns` files of diagnosis (patterns)."""
     digest = hashlib.sha256()
-    files = [file for package in (language, codegen) for file in _sources(_home(package))]
-    files += [file for name in own for file in _sources(_home(diagnosis), name)]
+    files = [
+        file for package in (language, codegen) for file in _source_files(_package_folder(package))
+    ]
+    files += [file for name in patterns for file in _source_files(_package_folder(diagnosis), name)]
     for path in sorted(files):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 
-def _home(package: ModuleType) -> Path:
+def _package_folder(package: ModuleType) -> Path:
     return Path(str(package.__file__)).parent
 
 
-def _sources(folder: Path, name: str = "*") -> Iterator[Path]:
+def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
     for ending in ("py", "jinja", "yaml", "lark"):
         yield from folder.glob(f"**/{name}.{ending}")
 
 
-def _recipe(known: dict[str, Any]) -> Recipe:
-    given: dict[str, Any] = known["columns"]
+def _from_json(data: dict[str, Any]) -> CompiledModel:
+    given: dict[str, Any] = data["columns"]
     columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    uncertain = tuple(Uncertain(**{**u, "starts": tuple(u["starts"])}) for u in known["uncertain"])
-    return Recipe(
-        Columns(**columns),
-        int(known["substeps"]),
-        tuple(known["spans"]),
+    uncertain = tuple(
+        FreeParameter(**{**u, "starts": tuple(u["starts"])}) for u in data["uncertain"]
+    )
+    return CompiledModel(
+        PredictorColumns(**columns),
+        int(data["substeps"]),
+        tuple(data["spans"]),
         uncertain,
-        tuple(known["drifts"]),
-        tuple(known["memories"]),
-        tuple(known["delays"]),
-        tuple(known["brought"]),
+        tuple(data["drifts"]),
+        tuple(data["memories"]),
+        tuple(data["delays"]),
+        tuple(data["brought"]),
     )
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes) -> None:
     """Write a file of the cache: all of it or nothing."""
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:

@@ -6,26 +6,26 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from diagnosis.alike import alike
-from diagnosis.channel_check import ChannelCheck, check_channel, findings_of
-from diagnosis.consistency import Relation, relations
-from diagnosis.disagreement import disagreements, go_together
-from diagnosis.excitation import Excitation, excitation
-from diagnosis.finding import Finding, by_severity
-from diagnosis.free_run import Run, interpreted
-from diagnosis.outlier import outliers, pauses, without_huge
-from diagnosis.reference import reference_of
-from diagnosis.remedy import cured, milliseconds, remedies
-from engine.recording import Recording, pieces
+from diagnosis.alike import find_redundant_speeds
+from diagnosis.channel_check import ChannelCheck, channel_findings, check_channel
+from diagnosis.consistency import OutputAgreement, compare_with_simulation
+from diagnosis.disagreement import agrees_with_other_outputs, find_unit_sign_clock_errors
+from diagnosis.excitation import Excitation, analyse_excitation
+from diagnosis.finding import Finding, sort_by_severity
+from diagnosis.free_run import RunFunction, run_interpreter
+from diagnosis.outlier import drop_huge_values, find_outliers, find_time_leaps
+from diagnosis.reference import cached_reference
+from diagnosis.remedy import find_corrections, find_millisecond_time, replace_corrected
+from engine.recording import Recording, split_by_windows
 from language.experiment import RecordingMap
 from language.model import Automaton
 
-Mistakes = Callable[[Sequence[Recording]], list[Finding] | None]
-SHORTEST = 2.0
+ClockErrorSearch = Callable[[Sequence[Recording]], list[Finding] | None]
+MIN_DURATION = 2.0
 """Time of a recording below which it tells nothing [s]: an observer needs 0.5 s to find in."""
-BROKEN = ("no_signal", "too_short", "outlier", "leap", "time")
+DISQUALIFYING_KINDS = ("no_signal", "too_short", "outlier", "leap", "time")
 """Findings after which a recording is compared with nothing."""
-FEWEST = 100
+MIN_SAMPLES = 100
 """Samples of a channel below which nothing can be told apart."""
 
 
@@ -39,7 +39,7 @@ class RecordingCheck:
     channels: tuple[ChannelCheck, ...]
     findings: tuple[Finding, ...]
     excitation: Excitation
-    relations: tuple[Relation, ...] = ()
+    agreements: tuple[OutputAgreement, ...] = ()
 
     @property
     def is_usable(self) -> bool:
@@ -51,73 +51,86 @@ def check_recordings(
     recordings: Sequence[Recording],
     mapping: RecordingMap,
     automaton: Automaton | None = None,
-    carry_out: Run = interpreted,
-    mistakes: Mistakes = lambda recordings: None,
+    run_programs: RunFunction = run_interpreter,
+    find_clock_errors: ClockErrorSearch = lambda recordings: None,
 ) -> RecordingCheck:
     """Return what is to be known of recordings; with an automaton also units, signs and clocks.
 
-    `mistakes` finds wrong clocks and signs, or returns None where it cannot: what a simulation
+    `find_clock_errors` finds wrong clocks and signs, or returns None where it cannot: what a simulation
     tells of clocks is a hint, no more.
     """
-    strange = [f for one in recordings for f in (*outliers(one, automaton), *pauses(one))]
-    recordings = [without_huge(recording) for recording in recordings]
-    channels, findings = _each(recordings, strange)
-    excited = excitation(recordings, channels)
-    far = {(finding.recording, finding.channel) for finding in strange}
+    early_findings = [
+        f for one in recordings for f in (*find_outliers(one, automaton), *find_time_leaps(one))
+    ]
+    recordings = [drop_huge_values(recording) for recording in recordings]
+    channels, findings = _check_channels(recordings, early_findings)
+    excited = analyse_excitation(recordings, channels)
+    outlying = {(finding.recording, finding.channel) for finding in early_findings}
     findings += [
         finding
-        for finding in _missing(recordings, channels, mapping, automaton)
-        if (finding.recording, finding.channel) not in far
+        for finding in _find_missing_signals(recordings, channels, mapping, automaton)
+        if (finding.recording, finding.channel) not in outlying
     ]
-    findings += _too_little(recordings, channels, excited)
+    findings += _find_insufficient_data(recordings, channels, excited)
     reference = None
     if automaton is not None and automaton.period is None:
-        reference = reference_of(automaton, mapping, carry_out)
-        findings += [f for one in recordings for f in milliseconds(one, reference)]
-    broken = {finding.recording for finding in findings if finding.kind in BROKEN}
-    whole = [one for one in recordings if "" not in broken and one.name not in broken]
-    found: list[Relation] = []
-    if automaton is None and whole:
-        findings += alike(whole)
-    if reference is not None and whole:
-        found = relations(whole, reference)
-        odd = disagreements(found, reference.automaton, mapping, whole)
-        odd = cured(odd, remedies(found, whole, reference, odd))
-        odd = [finding for finding in odd if not go_together(finding, found)]
-        findings += _compared(odd, whole, mistakes)
-    return RecordingCheck(tuple(channels), by_severity(findings), excited, tuple(found))
+        reference = cached_reference(automaton, mapping, run_programs)
+        findings += [f for one in recordings for f in find_millisecond_time(one, reference)]
+    broken = {finding.recording for finding in findings if finding.kind in DISQUALIFYING_KINDS}
+    usable_recordings = [one for one in recordings if "" not in broken and one.name not in broken]
+    agreements: list[OutputAgreement] = []
+    if automaton is None and usable_recordings:
+        findings += find_redundant_speeds(usable_recordings)
+    if reference is not None and usable_recordings:
+        agreements = compare_with_simulation(usable_recordings, reference)
+        inconsistencies = find_unit_sign_clock_errors(
+            agreements, reference.automaton, mapping, usable_recordings
+        )
+        inconsistencies = replace_corrected(
+            inconsistencies,
+            find_corrections(agreements, usable_recordings, reference, inconsistencies),
+        )
+        inconsistencies = [
+            finding
+            for finding in inconsistencies
+            if not agrees_with_other_outputs(finding, agreements)
+        ]
+        findings += _merge_clock_errors(inconsistencies, usable_recordings, find_clock_errors)
+    return RecordingCheck(tuple(channels), sort_by_severity(findings), excited, tuple(agreements))
 
 
-def _each(
-    recordings: Sequence[Recording], strange: Sequence[Finding]
+def _check_channels(
+    recordings: Sequence[Recording], earlier: Sequence[Finding]
 ) -> tuple[list[ChannelCheck], list[Finding]]:
-    """Return the facts of each channel, and what was found beside what was `strange` before.
+    """Return the facts of each channel, and what was found beside what was `earlier` before.
 
     Where stamps leap, gaps are no news.
     """
-    leapt = {finding.recording for finding in strange if finding.kind == "leap"}
-    channels, findings = [], list(strange)
+    leapt = {finding.recording for finding in earlier if finding.kind == "leap"}
+    channels, findings = [], list(earlier)
     for recording in recordings:
         for channel in recording.channels.values():
             check = check_channel(recording, channel)
             channels.append(check)
-            findings += findings_of(check, channel.column.compare is not None)
+            findings += channel_findings(check, channel.column.compare is not None)
     return channels, [
         one for one in findings if one.kind not in ("dropped", "gap") or one.recording not in leapt
     ]
 
 
-def _compared(
-    odd: Sequence[Finding], recordings: Sequence[Recording], mistakes: Mistakes
+def _merge_clock_errors(
+    findings: Sequence[Finding],
+    recordings: Sequence[Recording],
+    find_clock_errors: ClockErrorSearch,
 ) -> list[Finding]:
-    """Return what is odd between channels, found by `mistakes` where that is possible."""
-    others = [finding for finding in odd if finding.kind not in ("clock_offset", "sign")]
+    """Return what is odd between channels, found by `find_clock_errors` where that is possible."""
+    others = [finding for finding in findings if finding.kind not in ("clock_offset", "sign")]
     wrong = {finding.recording for finding in others if finding.severity == "error"}
     right = [one for one in recordings if "" not in wrong and one.name not in wrong]
-    signs = [finding for finding in odd if finding.kind == "sign"]
-    sure = mistakes(right) if right else []
+    signs = [finding for finding in findings if finding.kind == "sign"]
+    sure = find_clock_errors(right) if right else []
     if sure is None:
-        hints = [finding for finding in odd if finding.kind == "clock_offset"]
+        hints = [finding for finding in findings if finding.kind == "clock_offset"]
         return [*others, *signs, *[dataclasses.replace(one, severity="warning") for one in hints]]
     shared = [finding for finding in signs if not finding.recording]
     against = {finding.recording for finding in signs}
@@ -131,7 +144,7 @@ def _compared(
     return [*others, *(sure if known or not shared else shared)]
 
 
-def _missing(
+def _find_missing_signals(
     recordings: Sequence[Recording],
     checks: Sequence[ChannelCheck],
     mapping: RecordingMap,
@@ -181,14 +194,16 @@ def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str
     ] or list(mapping.columns)
 
 
-def _too_little(
-    recordings: Sequence[Recording], checks: Sequence[ChannelCheck], excited: Excitation
+def _find_insufficient_data(
+    recordings: Sequence[Recording], checks: Sequence[ChannelCheck], excitation: Excitation
 ) -> list[Finding]:
     found = []
-    total = sum(float(p.end - p.start) for recording in recordings for p in pieces(recording))
+    total = sum(
+        float(p.end - p.start) for recording in recordings for p in split_by_windows(recording)
+    )
     fewest = min((check.samples for check in checks), default=0)
     name = recordings[0].name if len(recordings) == 1 else ""
-    if total < SHORTEST or (fewest < FEWEST and len(recordings) == 1):
+    if total < MIN_DURATION or (fewest < MIN_SAMPLES and len(recordings) == 1):
         text = (
             f"{total:.3g} s and {fewest} samples of a channel are too short to tell effects apart"
         )
@@ -196,11 +211,11 @@ def _too_little(
     for recording in recordings if len(recordings) > 1 else ():
         length = float(recording.end - recording.start)
         fewest = min((c.samples for c in checks if c.recording == recording.name), default=0)
-        if length < SHORTEST or fewest < FEWEST:
+        if length < MIN_DURATION or fewest < MIN_SAMPLES:
             text = f"{length:.3g} s and {fewest} samples of a channel are too short to be used"
             found.append(Finding("too_short", recording.name, "", text, "error"))
-    if excited.is_dead:
-        names = ", ".join(f"`{signal.name}`" for signal in excited.inputs) or "no input"
+    if excitation.is_absent:
+        names = ", ".join(f"`{signal.name}`" for signal in excitation.inputs) or "no input"
         text = f"nothing is excited: {names} neither steps nor varies above its noise"
         found.append(Finding("no_excitation", name, "", text, "error"))
     return found

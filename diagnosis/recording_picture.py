@@ -12,52 +12,50 @@ from numpy.typing import NDArray
 
 from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation, SignalExcitation
-from diagnosis.finding import told
+from diagnosis.finding import format_findings
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.spectrum import spectrum
 from engine.band import PALETTE
 from engine.plot import Picture
 from engine.recording import Channel, Recording
-from language.text import shortened, visible
+from language.text import escape_invisible, truncate
 
-Values = NDArray[np.float64]
+Reals = NDArray[np.float64]
 
-MOST_CHANNELS = 6
+MAX_CHANNELS = 6
 """Most channels drawn: the picture stays on one page."""
-MOST_POINTS = 4000
+MAX_POINTS = 4000
 """Most points of a curve; beyond, the smallest and largest of each stretch are drawn."""
-LONGEST_WINDOW = 1024
+MAX_WINDOW = 1024
 """Samples of a window of a spectrum."""
-MOST_FINDINGS = 5
-LONGEST_LINE = 200
+MAX_FINDINGS = 5
+MAX_LINE_LENGTH = 200
 BLUE, RED, GREEN, YELLOW, _, PURPLE, GREY = PALETTE
 PALE = "#d8d8d8"
 SIGNS = {"error": "\N{BLACK CIRCLE}", "warning": "\N{BLACK UP-POINTING TRIANGLE}", "note": "-"}
 COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
-def recording_picture(
-    recordings: Sequence[Recording], check: RecordingCheck, title: str
-) -> Picture:
+def draw_recordings(recordings: Sequence[Recording], check: RecordingCheck, title: str) -> Picture:
     """Return the picture of checked recordings, one after another on the left."""
-    names = list(dict.fromkeys(one.name for one in check.channels))[:MOST_CHANNELS]
-    count = max(1, len(told(check.findings)[:MOST_FINDINGS]))
+    names = list(dict.fromkeys(one.name for one in check.channels))[:MAX_CHANNELS]
+    count = max(1, len(format_findings(check.findings)[:MAX_FINDINGS]))
     height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * count
     figure = Figure(figsize=(13.5, height), layout="constrained")
-    figure.suptitle(visible(title), x=0.01, ha="left", fontsize=13, fontweight="bold")
+    figure.suptitle(escape_invisible(title), x=0.01, ha="left", fontsize=13, fontweight="bold")
     grid = figure.add_gridspec(
         2, 2, width_ratios=(1.9, 1.0), height_ratios=(height, 0.24 * count + 0.1)
     )
-    _channels(figure, grid[0, 0], recordings, check, names)
+    _draw_channels(figure, grid[0, 0], recordings, check, names)
     right = grid[0, 1].subgridspec(3, 1, height_ratios=(1.15, 0.9, 1.45))
-    _visited(figure.add_subplot(right[0]), recordings, check.excitation)
-    _spectrum(figure.add_subplot(right[1]), recordings, check)
-    _effects(figure.add_subplot(right[2]), check.excitation)
-    _findings(figure.add_subplot(grid[1, :]), check)
+    _draw_operating_range(figure.add_subplot(right[0]), recordings, check.excitation)
+    _draw_spectrum(figure.add_subplot(right[1]), recordings, check)
+    _draw_effects(figure.add_subplot(right[2]), check.excitation)
+    _draw_findings(figure.add_subplot(grid[1, :]), check)
     return Picture(figure)
 
 
-def _channels(
+def _draw_channels(
     figure: Figure,
     place: SubplotSpec,
     recordings: Sequence[Recording],
@@ -74,21 +72,21 @@ def _channels(
             channel = recording.channels.get(name)
             start = float(recording.start)
             if channel is not None:
-                _trace(axis, channel, shift - start, check)
+                _draw_signal(axis, channel, shift - start, check)
                 for one in check.channels:
                     if (one.recording, one.name) == (recording.name, name):
-                        _marks(axis, one, shift - start)
+                        _mark_defects(axis, one, shift - start)
             for first, last in recording.windows:
                 axis.axvspan(
                     float(first) + shift - start, float(last) + shift - start,
                     color=GREEN, alpha=0.07, lw=0,
                 )  # fmt: skip
             if row == 0 and len(recordings) > 1:
-                _name(axis, recording.name, shift)
+                _draw_name(axis, recording.name, shift)
             shift += float(recording.end - recording.start)
             axis.axvline(shift, color=GREY, lw=0.8, ls=":")
         one = next(one for one in check.channels if one.name == name)
-        axis.set_title(_facts(one), loc="left", fontsize=8.5, parse_math=False, pad=3)
+        axis.set_title(_format_facts(one), loc="left", fontsize=8.5, parse_math=False, pad=3)
         axis.tick_params(labelsize=7.5, labelbottom=row == len(names) - 1)
         axis.spines[["top", "right"]].set_visible(False)
         axis.margins(x=0.0)
@@ -97,46 +95,47 @@ def _channels(
     )
 
 
-def _name(axis: Axes, name: str, start: float) -> None:
+def _draw_name(axis: Axes, name: str, start: float) -> None:
     across = axis.get_xaxis_transform()
-    text = visible(f" {name}")
+    text = escape_invisible(f" {name}")
     axis.text(start, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
               parse_math=False)  # fmt: skip
 
 
-def _facts(one: ChannelCheck) -> str:
+def _format_facts(check: ChannelCheck) -> str:
     parts = [
-        f"{one.name}" + (f" \N{RIGHTWARDS ARROW} {one.signal}" if one.signal != one.name else "")
+        f"{check.name}"
+        + (f" \N{RIGHTWARDS ARROW} {check.signal}" if check.signal != check.name else "")
     ]
-    parts[0] += f"  [{one.unit}]"
-    parts.append(f"{one.rate:.4g} Hz")
-    if one.quantum:
-        parts.append(f"step {one.quantum / one.factor:.3g}")
-    parts.append(f"noise {one.noise / one.factor:.2g}")
-    if one.dropped >= 0.001:
-        parts.append(f"{one.dropped:.1%} missing")
-    return visible("   ".join(parts))
+    parts[0] += f"  [{check.unit}]"
+    parts.append(f"{check.rate:.4g} Hz")
+    if check.quantum:
+        parts.append(f"step {check.quantum / check.factor:.3g}")
+    parts.append(f"noise {check.noise / check.factor:.2g}")
+    if check.dropped >= 0.001:
+        parts.append(f"{check.dropped:.1%} missing")
+    return escape_invisible("   ".join(parts))
 
 
-def _trace(axis: Axes, channel: Channel, shift: float, check: RecordingCheck) -> None:
-    times, values = _thinned(channel.seconds + shift, channel.array)
+def _draw_signal(axis: Axes, channel: Channel, shift: float, check: RecordingCheck) -> None:
+    times, values = _envelope(channel.seconds + shift, channel.array)
     factor = float(channel.column.unit.factor * channel.column.scale[0])
     colour = "#cc7a00" if channel.column.to is not None else BLUE
     axis.plot(times, values / factor, color=colour, lw=0.8)
 
 
-def _marks(axis: Axes, one: ChannelCheck, shift: float) -> None:
-    for start, end in one.gaps:
+def _mark_defects(axis: Axes, check: ChannelCheck, shift: float) -> None:
+    for start, end in check.gaps:
         axis.axvspan(start + shift, end + shift, color=RED, alpha=0.25, lw=0)
-    if one.stuck:
-        axis.axvspan(one.stuck[0] + shift, one.stuck[1] + shift, color=YELLOW, alpha=0.35, lw=0)
+    if check.stuck:
+        axis.axvspan(check.stuck[0] + shift, check.stuck[1] + shift, color=YELLOW, alpha=0.35, lw=0)
 
 
-def _thinned(times: Values, values: Values) -> tuple[Values, Values]:
+def _envelope(times: Reals, values: Reals) -> tuple[Reals, Reals]:
     """Return the curve, or the ends of each stretch of one that has too many points."""
-    if len(values) <= MOST_POINTS:
+    if len(values) <= MAX_POINTS:
         return times, values
-    size = -(-len(values) // (MOST_POINTS // 2))
+    size = -(-len(values) // (MAX_POINTS // 2))
     kept = len(values) // size * size
     blocks = values[:kept].reshape(-1, size)
     ends = np.stack((blocks.min(axis=1), blocks.max(axis=1)), axis=1).ravel()
@@ -144,50 +143,52 @@ def _thinned(times: Values, values: Values) -> tuple[Values, Values]:
     return np.repeat(starts, 2), ends
 
 
-def _main(signals: Sequence[SignalExcitation]) -> SignalExcitation | None:
+def _main_signal(signals: Sequence[SignalExcitation]) -> SignalExcitation | None:
     """Return the signal that does most: most steps, then the largest band."""
     return max(signals, key=lambda one: (len(one.steps), one.band), default=None)
 
 
-def _visited(axis: Axes, recordings: Sequence[Recording], excited: Excitation) -> None:
+def _draw_operating_range(
+    axis: Axes, recordings: Sequence[Recording], excitation: Excitation
+) -> None:
     """Draw input over speed: where the machine has been."""
     axis.set_title("where the machine has been", loc="left", fontsize=9.5)
-    first, second = _main(excited.inputs), _main(excited.speeds)
+    first, second = _main_signal(excitation.inputs), _main_signal(excitation.speeds)
     pairs = [
         (r.channels[first.name], r.channels[second.name])
         for r in recordings
         if first and second and first.name in r.channels and second.name in r.channels
     ]
     if not pairs or first is second:
-        _empty(axis, "no input beside a speed")
+        _draw_empty(axis, "no input beside a speed")
         return
     for driven, speed in pairs:
-        x = np.interp(driven.seconds, speed.seconds, speed.array) / _factor(speed)
-        y = driven.array / _factor(driven)
+        x = np.interp(driven.seconds, speed.seconds, speed.array) / _si_factor(speed)
+        y = driven.array / _si_factor(driven)
         axis.plot(x, y, color=BLUE, lw=0.3, alpha=0.5)
         axis.scatter(x[::3], y[::3], s=5, color=BLUE, alpha=0.35, lw=0)
-        axis.set_xlabel(visible(_label(speed)), fontsize=8, parse_math=False)
-        axis.set_ylabel(visible(_label(driven)), fontsize=8, parse_math=False)
+        axis.set_xlabel(escape_invisible(_axis_label(speed)), fontsize=8, parse_math=False)
+        axis.set_ylabel(escape_invisible(_axis_label(driven)), fontsize=8, parse_math=False)
     axis.axhline(0.0, color="black", lw=0.6)
     axis.axvline(0.0, color="black", lw=0.6)
     axis.tick_params(labelsize=7.5)
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck) -> None:
+def _draw_spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck) -> None:
     """Draw what frequencies the input holds, above its noise."""
     axis.set_title("what the input excites", loc="left", fontsize=9.5)
-    main = _main(check.excitation.inputs)
+    main = _main_signal(check.excitation.inputs)
     facts = [one for one in check.channels if main and one.name == main.name]
     if not main or not facts:
-        _empty(axis, "no input")
+        _draw_empty(axis, "no input")
         return
     for recording, one in zip(recordings, facts, strict=False):
         channel = recording.channels[main.name]
         if len(channel.array) < 64:
             continue
-        values = (channel.array - channel.array.mean()) / _factor(channel)
-        frequencies, power = spectrum(values, one.rate, LONGEST_WINDOW)
+        values = (channel.array - channel.array.mean()) / _si_factor(channel)
+        frequencies, power = spectrum(values, one.rate, MAX_WINDOW)
         axis.loglog(frequencies[1:], np.sqrt(power[1:]) + 1e-12, color="#cc7a00", lw=0.9, alpha=0.8)
     noise = max(facts[0].noise, facts[0].quantum / np.sqrt(12.0)) / facts[0].factor
     if noise:
@@ -196,21 +197,21 @@ def _spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck
         axis.annotate("its noise", (0.01, level), xycoords=("axes fraction", "data"), fontsize=7.5,
                       ha="left", va="bottom", color=GREY)  # fmt: skip
     axis.set_xlabel("frequency [Hz]", fontsize=8)
-    axis.set_ylabel(visible(f"{main.name} [{main.unit}/\N{SQUARE ROOT}Hz]"), fontsize=8,
+    axis.set_ylabel(escape_invisible(f"{main.name} [{main.unit}/\N{SQUARE ROOT}Hz]"), fontsize=8,
                     parse_math=False)  # fmt: skip
     axis.tick_params(labelsize=7.5, which="both")
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _effects(axis: Axes, excited: Excitation) -> None:
+def _draw_effects(axis: Axes, excitation: Excitation) -> None:
     """List the effects: those that the data can test in green, the others pale."""
-    able = sum(effect.is_testable for effect in excited.effects)
+    able = sum(effect.is_testable for effect in excitation.effects)
     axis.set_title(
-        f"these data can test {able} of {len(excited.effects)} effects", loc="left", fontsize=9.5
+        f"these data can test {able} of {len(excitation.effects)} effects", loc="left", fontsize=9.5
     )
     axis.axis("off")
-    rows = -(-len(excited.effects) // 2)
-    ordered = sorted(excited.effects, key=lambda effect: (not effect.is_testable, effect.effect))
+    rows = -(-len(excitation.effects) // 2)
+    ordered = sorted(excitation.effects, key=lambda effect: (not effect.is_testable, effect.effect))
     for k, effect in enumerate(ordered):
         x, y = 0.52 * (k // rows), 1.0 - (k % rows + 0.5) / rows
         good = effect.is_testable
@@ -220,30 +221,30 @@ def _effects(axis: Axes, excited: Excitation) -> None:
                   color="black" if good else "#9a9a9a", transform=axis.transAxes)  # fmt: skip
 
 
-def _findings(axis: Axes, check: RecordingCheck) -> None:
+def _draw_findings(axis: Axes, check: RecordingCheck) -> None:
     axis.axis("off")
-    lines = told(check.findings)
+    lines = format_findings(check.findings)
     if not lines:
         axis.text(0.0, 0.5, "nothing odd was found in these data", color=GREEN, fontsize=10,
                   va="center", transform=axis.transAxes)  # fmt: skip
-    shown = lines[:MOST_FINDINGS]
+    shown = lines[:MAX_FINDINGS]
     for k, (severity, line) in enumerate(shown):
         rest = len(lines) - len(shown)
         more = f"   (and {rest} more)" if rest and k == len(shown) - 1 else ""
-        text = visible(shortened(f"{SIGNS[severity]} {line}{more}", LONGEST_LINE))
+        text = escape_invisible(truncate(f"{SIGNS[severity]} {line}{more}", MAX_LINE_LENGTH))
         axis.text(0.0, 1.0 - (k + 0.5) / len(shown), text, fontsize=9, va="center",
                   color=COLOURS[severity], transform=axis.transAxes,
                   parse_math=False)  # fmt: skip
 
 
-def _empty(axis: Axes, text: str) -> None:
+def _draw_empty(axis: Axes, text: str) -> None:
     axis.axis("off")
     axis.text(0.5, 0.5, text, ha="center", color=GREY, fontsize=9, transform=axis.transAxes)
 
 
-def _factor(channel: Channel) -> float:
+def _si_factor(channel: Channel) -> float:
     return float(channel.column.unit.factor * channel.column.scale[0])
 
 
-def _label(channel: Channel) -> str:
+def _axis_label(channel: Channel) -> str:
     return f"{channel.column.name} [{channel.column.unit.text}]"

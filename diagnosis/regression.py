@@ -19,16 +19,16 @@ RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
-class Columns:
+class TermColumns:
     """A term as columns of a problem, at `places`; with `has_own` each recording has its own."""
 
     name: str
     places: tuple[int, ...]
-    has_own: bool
+    has_recording_coefficients: bool
 
 
 @dataclass(frozen=True)
-class Problem:
+class RegressionProblem:
     """`products` (recordings, parts, columns, columns): of columns with each other, and of the
     innovations (the last one). The first `parameters` columns are in units of priors. `samples`
     innovations there are, `inflation` of them count as one.
@@ -37,125 +37,144 @@ class Problem:
     products: Reals = field(repr=False)
     parameters: int
     samples: int
-    inflation: float
+    integrated_autocorrelation: float
 
 
 @dataclass(frozen=True)
-class Chosen:
+class SelectedTerm:
     """A term that was chosen: what it gains beside those before it [nats], after its price."""
 
-    columns: Columns
+    columns: TermColumns
     gain: float
-    left_out: float
+    cross_validated: float
 
 
-def problem_of(
+def build_problem(
     innovations: Sequence[Reals],
     parameters: Sequence[Reals],
-    waves: Sequence[Reals],
-    inflation: float,
-) -> Problem:
+    features: Sequence[Reals],
+    integrated_autocorrelation: float,
+) -> RegressionProblem:
     """Return the problem of innovations (samples,) of each recording, over their deviations.
 
-    `parameters` (samples, parameters) and `waves` (samples, columns) are how they fall with each.
+    `parameters` (samples, parameters) and `features` (samples, columns) are how they fall with each.
     """
     products = []
-    for e, moved, wave in zip(innovations, parameters, waves, strict=True):
+    for e, moved, wave in zip(innovations, parameters, features, strict=True):
         whole = np.column_stack([moved, wave, e])
         products.append([part.T @ part for part in np.array_split(whole, FOLDS)])
     count = sum(len(e) for e in innovations)
-    return Problem(np.array(products), parameters[0].shape[1], count, inflation)
+    return RegressionProblem(
+        np.array(products), parameters[0].shape[1], count, integrated_autocorrelation
+    )
 
 
-def ranking(problem: Problem, columns: Sequence[Columns]) -> list[tuple[float, Columns]]:
+def rank_terms(
+    problem: RegressionProblem, columns: Sequence[TermColumns]
+) -> list[tuple[float, TermColumns]]:
     """Return each term alone with what it gains [nats] after its price, the best first."""
     before = _cost(problem, [])
-    found = [(before - _cost(problem, [one]) - _price(problem, one), one) for one in columns]
-    return sorted(found, key=lambda pair: -pair[0])
+    ranked = [
+        (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
+    ]
+    return sorted(ranked, key=lambda pair: -pair[0])
 
 
-def forward(problem: Problem, columns: Sequence[Columns], most: int, least: float) -> list[Chosen]:
-    """Return the terms one after the other, as long as each gains `least` nats.
+def select_terms(
+    problem: RegressionProblem, columns: Sequence[TermColumns], max_terms: int, min_gain: float
+) -> list[SelectedTerm]:
+    """Return the terms one after the other, as long as each gains `min_gain` nats.
 
     Those behind the first have to gain as much in parts of the recordings that were left out.
     """
-    chosen: list[Chosen] = []
-    kept: list[Columns] = []
-    while len(chosen) < most:
-        before = _cost(problem, kept)
-        rest = [one for one in columns if one not in kept]
-        gains = [before - _cost(problem, [*kept, one]) - _price(problem, one) for one in rest]
-        if not gains or max(gains) < least:
+    chosen: list[SelectedTerm] = []
+    selected: list[TermColumns] = []
+    while len(chosen) < max_terms:
+        before = _cost(problem, selected)
+        rest = [one for one in columns if one not in selected]
+        gains = [
+            before - _cost(problem, [*selected, one]) - _complexity_penalty(problem, one)
+            for one in rest
+        ]
+        if not gains or max(gains) < min_gain:
             break
         best = rest[int(np.argmax(gains))]
-        left_out = _left_out(problem, kept) - _left_out(problem, [*kept, best])
-        if kept and left_out < least:
+        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(
+            problem, [*selected, best]
+        )
+        if selected and left_out < min_gain:
             break
-        kept.append(best)
-        chosen.append(Chosen(best, max(gains), left_out))
+        selected.append(best)
+        chosen.append(SelectedTerm(best, max(gains), left_out))
     return chosen
 
 
-def weights(problem: Problem, kept: Sequence[Columns]) -> list[Reals]:
+def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
     """Return the coefficients of each term (recordings, waves)."""
-    fit = _fitted(problem, kept, np.sum(problem.products, axis=1))
+    fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     shared, own = problem.parameters, 0
-    found = []
-    for one in kept:
+    coefficients = []
+    for one in selected:
         width = len(one.places)
-        if one.has_own:
-            found.append(fit.own[:, own : own + width])
+        if one.has_recording_coefficients:
+            coefficients.append(fit.per_recording[:, own : own + width])
             own += width
         else:
             part = fit.shared[shared : shared + width]
-            found.append(np.tile(part, (len(problem.products), 1)))
+            coefficients.append(np.tile(part, (len(problem.products), 1)))
             shared += width
-    return found
+    return coefficients
 
 
-def _price(problem: Problem, one: Columns) -> float:
-    count = len(one.places) * (len(problem.products) if one.has_own else 1)
-    return float(0.5 * count * np.log(max(problem.samples / problem.inflation, 2.0)))
+def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
+    count = len(term.places) * (len(problem.products) if term.has_recording_coefficients else 1)
+    return float(
+        0.5 * count * np.log(max(problem.samples / problem.integrated_autocorrelation, 2.0))
+    )
 
 
-def _cost(problem: Problem, kept: Sequence[Columns]) -> float:
+def _cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
     """Return half the squares that are left [nats], over the inflation."""
-    fit = _fitted(problem, kept, np.sum(problem.products, axis=1))
-    return 0.5 * fit.left / problem.inflation
+    fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
+    return 0.5 * fit.residual_squares / problem.integrated_autocorrelation
 
 
-def _left_out(problem: Problem, kept: Sequence[Columns]) -> float:
+def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
     """Return half the squares of each part as the other parts foresee it [nats]."""
     total = 0.0
     recordings = np.arange(len(problem.products))
     for fold in range(FOLDS):
         tested = (fold + recordings) % FOLDS
         part = problem.products[recordings, tested]
-        fit = _fitted(problem, kept, np.sum(problem.products, axis=1) - part)
+        fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1) - part)
         for r in recordings:
-            inner, right = _chosen(problem, kept, part[r])
-            x = np.concatenate([fit.shared, fit.own[r]])
+            inner, right = _selected_products(problem, selected, part[r])
+            x = np.concatenate([fit.shared, fit.per_recording[r]])
             total += float(part[r][-1, -1] - 2.0 * right @ x + x @ inner @ x)
-    return 0.5 * total / problem.inflation
+    return 0.5 * total / problem.integrated_autocorrelation
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _LeastSquaresFit:
     """Coefficients: `shared`, `own` (recordings, own); the squares that are `left`, with priors."""
 
     shared: Reals
-    own: Reals
-    left: float
+    per_recording: Reals
+    residual_squares: float
 
 
-def _fitted(problem: Problem, kept: Sequence[Columns], products: Reals) -> _Fit:
+def _solve_least_squares(
+    problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
+) -> _LeastSquaresFit:
     """Return the coefficients by least squares; those of one recording are eliminated first."""
-    shared = problem.parameters + sum(len(one.places) for one in kept if not one.has_own)
+    shared = problem.parameters + sum(
+        len(one.places) for one in selected if not one.has_recording_coefficients
+    )
     a, g, whole = np.zeros((shared, shared)), np.zeros(shared), 0.0
     a[: problem.parameters, : problem.parameters] = np.eye(problem.parameters)
     inside = []
     for one in products:
-        gram, right = _chosen(problem, kept, one)
+        gram, right = _selected_products(problem, selected, one)
         gram = gram + RIDGE * np.diag(np.diag(gram) + 1e-12)
         cross, rest = gram[:shared, shared:], right[shared:]
         solved = np.linalg.solve(gram[shared:, shared:], np.column_stack([cross.T, rest]))
@@ -165,12 +184,16 @@ def _fitted(problem: Problem, kept: Sequence[Columns], products: Reals) -> _Fit:
         inside.append(solved)
     common = np.asarray(np.linalg.solve(a, g), dtype=np.float64)
     own = np.array([one[:, -1] - one[:, :-1] @ common for one in inside])
-    return _Fit(common, own, whole - float(g @ common))
+    return _LeastSquaresFit(common, own, whole - float(g @ common))
 
 
-def _chosen(problem: Problem, kept: Sequence[Columns], products: Reals) -> tuple[Reals, Reals]:
+def _selected_products(
+    problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
+) -> tuple[Reals, Reals]:
     """Return the products of the columns in use: parameters, shared terms, terms of a recording."""
-    shared = [place for one in kept if not one.has_own for place in one.places]
-    own = [place for one in kept if one.has_own for place in one.places]
+    shared = [
+        place for one in selected if not one.has_recording_coefficients for place in one.places
+    ]
+    own = [place for one in selected if one.has_recording_coefficients for place in one.places]
     places = [*range(problem.parameters), *shared, *own]
     return products[np.ix_(places, places)], products[places, -1]

@@ -4,36 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.digits import per_cent, significant
-from diagnosis.whiteness import Whiteness
+from diagnosis.digits import format_percent, format_significant
+from diagnosis.whiteness import WhitenessTest
 
 
 def whiteness_rows(
-    before: Sequence[Whiteness], after: Sequence[Whiteness], units: Sequence[str], is_same: bool
+    before: Sequence[WhitenessTest],
+    after: Sequence[WhitenessTest],
+    units: Sequence[str],
+    is_base_only: bool,
 ) -> list[tuple[str, ...]]:
     """Return a row by signal and model: size, what its past tells, lags outside, chance."""
-    models = [("recalibrated", before)] if is_same else [("without", before), ("with", after)]
+    models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
     rows: list[tuple[str, ...]] = []
     for k, unit in enumerate(units):
         for words, found in models:
             one = found[k]
-            chance = "< 0.001" if one.chance < 0.001 else f"{one.chance:.2g}"
+            chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
             rows.append(
                 (
                     one.signal,
                     words,
-                    f"{significant(one.rms)} {unit}",
-                    per_cent(one.foretold),
-                    f"{one.outside} of {len(one.lags)}",
+                    f"{format_significant(one.rms)} {unit}",
+                    format_percent(one.predictable_fraction),
+                    f"{one.lags_outside_band} of {len(one.lags)}",
                     chance,
-                    one.words,
+                    one.rating,
                 )
             )
     return rows
 
 
-def left_words(
-    before: Sequence[Whiteness], after: Sequence[Whiteness], is_same: bool
+def describe_residuals(
+    before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> list[tuple[str, str]]:
     """Return for each signal what is left of it, in words."""
     says = {
@@ -43,7 +46,7 @@ def left_words(
     }
     found = []
     for old, new in zip(before, after, strict=True):
-        was = "" if is_same else f" (without {per_cent(old.foretold)})"
-        told = f"its past tells {per_cent(new.foretold)} of it{was}"
-        found.append((new.signal, f"{says[new.words]}; {told}"))
+        was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
+        told = f"its past tells {format_percent(new.predictable_fraction)} of it{was}"
+        found.append((new.signal, f"{says[new.rating]}; {told}"))
     return found

@@ -11,122 +11,146 @@ from typing import Any
 import jinja2
 
 from diagnosis import listing, wording
-from diagnosis.cards import cards_of
-from diagnosis.change import changes
-from diagnosis.digits import probability
-from diagnosis.dossier import Dossier, verdict_json
-from diagnosis.drawing import drawings_of, embedded
-from diagnosis.finding import told
-from diagnosis.parameter_list import astray, fixed, parameter_rows, text_of
-from diagnosis.remainder import left_words, whiteness_rows
-from diagnosis.rerun import SCENARIO, WINDOW, commands, made_by, scenario_text, window_table
-from diagnosis.shown import Shown, shown_of
-from diagnosis.sources import sources, tools
-from language.known import unit_text
+from diagnosis.cards import summary_cards
+from diagnosis.change import equation_changes
+from diagnosis.digits import format_probability
+from diagnosis.dossier import DiagnosisReport, verdict_to_json
+from diagnosis.drawing import embed_svg, report_figures
+from diagnosis.finding import format_findings
+from diagnosis.parameter_list import (
+    format_biased_parameters,
+    format_fixed_parameters,
+    parameter_rows,
+    text_of,
+)
+from diagnosis.remainder import describe_residuals, whiteness_rows
+from diagnosis.rerun import (
+    SCENARIO,
+    WINDOW,
+    format_scenario,
+    format_window_csv,
+    report_command,
+    reproduction_commands,
+)
+from diagnosis.shown import ModelComparison, compare_models
+from diagnosis.sources import provenance_rows, tool_versions
+from language.known import format_si_unit
 
 
-def report_files(dossier: Dossier, variant: str, folder: Path = Path()) -> dict[str, bytes]:
+def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:
     """Return the files of a diagnosis by name, as they are in `folder`; the verdict is the last."""
-    shown = shown_of(dossier)
-    drawings = drawings_of(dossier, shown) if shown else []
+    shown = compare_models(report)
+    figures = report_figures(report, shown) if shown else []
     files = {"variant.yaml": variant.encode()}
-    if dossier.diagnosis and dossier.diagnosis.description:
-        formula = dossier.diagnosis.description.formula
-        files[f"{formula.layer.effect.name}.yaml"] = formula.text.encode()
-    for one in drawings:
+    if report.diagnosis and report.diagnosis.equation:
+        formula = report.diagnosis.equation.formula
+        files[f"{formula.placed_effect.effect.name}.yaml"] = formula.text.encode()
+    for one in figures:
         files[f"{one.name}.svg"] = one.picture.data("svg")
         files[f"{one.name}.png"] = one.picture.data("png")
     if shown:
-        inputs = {n: unit_text(i.unit.dimension) for n, i in dossier.automaton.inputs.items()}
-        files[WINDOW] = window_table(shown[0].window, inputs).encode()
-        files[SCENARIO] = scenario_text(dossier, shown[0].window).encode()
-    svg = {one.name: embedded(one, files[f"{one.name}.svg"]) for one in drawings}
+        inputs = {n: format_si_unit(i.unit.dimension) for n, i in report.automaton.inputs.items()}
+        files[WINDOW] = format_window_csv(shown[0].window, inputs).encode()
+        files[SCENARIO] = format_scenario(report, shown[0].window).encode()
+    svg = {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures}
     context = {
-        **_about_verdict(dossier, shown),
-        **_about_models(dossier, shown),
-        **_about_data(dossier),
-        **_about_use(dossier, folder),
+        **_verdict_context(report, shown),
+        **_model_context(report, shown),
+        **_data_context(report),
+        **_usage_context(report, folder),
         "variant": variant,
-        "drawings": {one.name: one for one in drawings},
+        "drawings": {one.name: one for one in figures},
         "svg": svg,
     }
-    files["report.html"] = _page(context).encode()
-    verdict = json.dumps(verdict_json(dossier.verdict), indent=2, allow_nan=False) + "\n"
+    files["report.html"] = _render_page(context).encode()
+    verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
     files["verdict.json"] = verdict.encode()
     return files
 
 
-def _about_verdict(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
-    verdict, found = dossier.verdict, dossier.diagnosis
-    layers = [one.layer for one in found.selection.accepted] if found else []
+def _verdict_context(
+    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
+) -> dict[str, Any]:
+    verdict, found = report.verdict, report.diagnosis
+    placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
     return {
-        "name": dossier.name,
-        "about": text_of(dossier.case.document.root, "about"),
+        "name": report.name,
+        "about": text_of(report.case.document.root, "about"),
         "verdict": verdict,
-        "has_model": bool(layers),
-        "laid": [layer.id for layer in layers],
-        "headline": listing.in_parts(wording.headline(dossier)),
-        "cards": cards_of(dossier, shown[0].after if shown else ()),
-        "location": wording.location(dossier) if found else "",
+        "has_model": bool(placed_effects),
+        "laid": [placed_effect.id for placed_effect in placed_effects],
+        "headline": listing.split_code_spans(wording.format_headline(report)),
+        "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
+        "location": wording.format_missing_location(report) if found else "",
         "messages": verdict.messages,
-        "abouts": _abouts(dossier),
-        "changes": changes(dossier.case.document, layers),
-        "places": listing.place_rows(verdict.location[0]) if verdict.location else [],
-        "rivals": [wording.effect_at(one) for one in verdict.ambiguous_with],
-        "separation": wording.separation(dossier),
-        "signals": list(zip(shown[0].runs.signals, shown[0].units, strict=True)) if shown else [],
+        "abouts": _effect_summaries(report),
+        "changes": equation_changes(report.case.document, placed_effects),
+        "places": listing.location_rows(verdict.location[0]) if verdict.location else [],
+        "rivals": [wording.format_effect(one) for one in verdict.ambiguous_with],
+        "separation": wording.format_separation(report),
+        "signals": list(zip(comparisons[0].runs.signals, comparisons[0].units, strict=True))
+        if comparisons
+        else [],
     }
 
 
-def _abouts(dossier: Dossier) -> list[tuple[str, str, str]]:
+def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
     """Return name, what it is, and how it shows, of each accepted effect."""
-    found = dossier.diagnosis
+    found = report.diagnosis
     accepted = found.selection.accepted if found else ()
-    effects = [one.layer.effect for one in accepted]
+    effects = [one.placed_effect.effect for one in accepted]
     return [(one.name.replace("_", " "), one.about, one.signature) for one in effects]
 
 
-def _about_models(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
-    found = dossier.diagnosis
+def _model_context(
+    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
+) -> dict[str, Any]:
+    found = report.diagnosis
     if found is None:
         return {"fit": [], "candidates": [], "unfitted": [], "parameters": [], "whiteness": []}
     selection = found.selection
-    one = shown[0]
+    one = comparisons[0]
     return {
-        "fit": [row for s in shown for row in listing.fit_rows(dossier, s.words, s.part, s.runs)],
-        "noise": listing.noise_words(selection, one.runs.signals, one.units),
-        "candidates": listing.candidate_rows(dossier, selection),
-        "unfitted": listing.unfitted(dossier, selection),
-        "other": probability(dossier.verdict.other),
-        "parameters": parameter_rows(dossier, selection),
-        "astray": astray(selection),
+        "fit": [
+            row
+            for s in comparisons
+            for row in listing.misfit_rows(report, s.label, s.dataset, s.runs)
+        ],
+        "noise": listing.format_noise(selection, one.runs.signals, one.units),
+        "candidates": listing.candidate_rows(report, selection),
+        "unfitted": listing.unfitted_candidates(report, selection),
+        "other": format_probability(report.verdict.other),
+        "parameters": parameter_rows(report, selection),
+        "astray": format_biased_parameters(selection),
         "whiteness": whiteness_rows(one.before, one.after, one.units, not selection.accepted),
-        "whiteness_of": one.words,
-        "left": left_words(one.before, one.after, not selection.accepted),
+        "whiteness_of": one.label,
+        "left": describe_residuals(one.before, one.after, not selection.accepted),
     }
 
 
-def _about_data(dossier: Dossier) -> dict[str, Any]:
+def _data_context(report: DiagnosisReport) -> dict[str, Any]:
     return {
-        "unread": dossier.diagnosis.unread if dossier.diagnosis else (),
-        "findings": [(s, listing.in_parts(text)) for s, text in told(dossier.findings)],
-        "recordings": listing.recording_rows(dossier),
-        "untestable": listing.untestable(dossier),
-        "fixed": fixed(dossier),
-        "thresholds": dossier.case.thresholds,
+        "unread": report.diagnosis.unread if report.diagnosis else (),
+        "findings": [
+            (s, listing.split_code_spans(text)) for s, text in format_findings(report.findings)
+        ],
+        "recordings": listing.recording_rows(report),
+        "untestable": listing.untestable_effects(report),
+        "fixed": format_fixed_parameters(report),
+        "thresholds": report.case.thresholds,
     }
 
 
-def _about_use(dossier: Dossier, folder: Path) -> dict[str, Any]:
+def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
     return {
-        "commands": commands(dossier, folder),
-        "made_by": made_by(dossier, folder),
-        "tools": tools(),
-        "sources": sources(dossier),
+        "commands": reproduction_commands(report, folder),
+        "made_by": report_command(report, folder),
+        "tools": tool_versions(),
+        "sources": provenance_rows(report),
     }
 
 
-def _page(context: Mapping[str, Any]) -> str:
+def _render_page(context: Mapping[str, Any]) -> str:
     folder = resources.files("diagnosis").joinpath("templates")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),

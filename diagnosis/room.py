@@ -10,62 +10,80 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.bench import Bench
-from diagnosis.estimate import Estimate, looked_like
-from diagnosis.evidence import inflation
-from diagnosis.layers import DRIFT, Layer
-from diagnosis.level import units_of
-from diagnosis.location import places_of_freedom
-from diagnosis.point import extended
-from diagnosis.tuning import tuned
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import Estimate, evaluate_near
+from diagnosis.evidence import integrated_autocorrelation
+from diagnosis.layers import DISTURBANCE_STATE, PlacedEffect
+from diagnosis.level import disturbance_units
+from diagnosis.location import disturbance_locations
+from diagnosis.point import extend_vector
+from diagnosis.tuning import fit_noise_covariance
 from language.problem import SpecError
 
-FREE = 1000.0
+FREE_LEVEL = 1000.0
 """Units that such a drift may have."""
-LOUD = 1.6
+MAX_AUTOCORRELATION = 1.6
 """Innovations that count as one from which on a model may be so far astray that drifts which are
 let free do not find their way."""
-HIGH = 0.5
+MAX_DISTURBANCE_LEVEL = 0.5
 """Units of a drift from which on it may stand for an effect: free ones then gain nothing more, and
 the effect gains what it explains better."""
 
 
-def is_full(bench: Bench, model: Estimate, units: Mapping[str, float], needed: float) -> bool:
-    """Tell whether a further effect cannot gain what is `needed` [nats].
+def meets_stopping_rule(
+    model_set: ModelSet, model: Estimate, units: Mapping[str, float], min_gain: float
+) -> bool:
+    """Tell whether a further effect cannot gain what is `min_gain` [nats].
 
     Drifts that lose much when they are let free did not find their way: they tell nothing.
     """
-    drifts = model.noises.drifts
-    is_low = all(drifts.get(name, 0.0) < HIGH * unit for name, unit in units.items())
-    if not is_low or inflation(model, bench.series) >= LOUD:
+    drifts = model.noise_levels.process
+    is_low = all(
+        drifts.get(name, 0.0) < MAX_DISTURBANCE_LEVEL * unit for name, unit in units.items()
+    )
+    if not is_low or integrated_autocorrelation(model, model_set.series) >= MAX_AUTOCORRELATION:
         return False
-    return abs(room_left(bench, model)) < needed
+    return abs(further_gain_bound(model_set, model)) < min_gain
 
 
-def room_left(bench: Bench, model: Estimate) -> float:
+def further_gain_bound(model_set: ModelSet, model: Estimate) -> float:
     """Return what drifts at all places gain [nats]: balances, elements and outputs, but for those
     where the model has effects if they do not go along with these; infinity where none do.
     """
-    inside = [layer for section, layer in places_of_freedom(bench) if section != "flow"]
-    taken = {layer.place for layer in model.candidate.layers}
-    beside = [layer for layer in inside if layer.place not in taken]
-    gains = (drifts_gain(bench, model, (*bench.drifts, *some)) for some in (inside, beside))
+    inside = [
+        placed_effect
+        for section, placed_effect in disturbance_locations(model_set)
+        if section != "flow"
+    ]
+    taken = {placed_effect.place for placed_effect in model.candidate.placed_effects}
+    beside = [placed_effect for placed_effect in inside if placed_effect.place not in taken]
+    gains = (
+        disturbance_gain(model_set, model, (*model_set.disturbances, *some))
+        for some in (inside, beside)
+    )
     return next((gain for gain in gains if np.isfinite(gain)), np.inf)
 
 
-def drifts_gain(
-    bench: Bench, model: Estimate, drifts: Sequence[Layer], held: Collection[str] = ()
+def disturbance_gain(
+    model_set: ModelSet,
+    model: Estimate,
+    disturbances: Sequence[PlacedEffect],
+    fixed_places: Collection[str] = (),
 ) -> float:
-    """Return what some drifts gain [nats] that are let free, but for those of `held` places; -inf
+    """Return what some drifts gain [nats] that are let free, but for those of `fixed_places` places; -inf
     where they do not go along.
     """
     try:
-        candidate = bench.candidate(model.candidate.layers, drifts)
+        candidate = model_set.compile_candidate(model.candidate.placed_effects, disturbances)
     except SpecError:
         return -np.inf
-    units = units_of(candidate, bench.series, model.values(0))
-    most = {layer.named(DRIFT): FREE for layer in drifts if layer.place not in held}
-    point = extended(candidate, model.candidate, model.point, {})
-    quiet = looked_like(candidate, bench.series, model.noises, point, model)
-    found = tuned(quiet, bench.series, units, most)
+    units = disturbance_units(candidate, model_set.series, model.values(0))
+    most = {
+        placed_effect.qualified_name(DISTURBANCE_STATE): FREE_LEVEL
+        for placed_effect in disturbances
+        if placed_effect.place not in fixed_places
+    }
+    point = extend_vector(candidate, model.candidate, model.point, {})
+    quiet = evaluate_near(candidate, model_set.series, model.noise_levels, point, model)
+    found = fit_noise_covariance(quiet, model_set.series, units, most)
     return model.cost - found.cost

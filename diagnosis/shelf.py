@@ -19,81 +19,85 @@ from typing import Any
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, outcome_at
-from diagnosis.normal import Normal
-from diagnosis.point import Point
-from diagnosis.prediction import Gains, Noises
-from diagnosis.recipe import code_digest, write_whole
-from diagnosis.series import Series
+from diagnosis.estimate import Estimate, predict_with_gains_of
+from diagnosis.normal import NormalEquations
+from diagnosis.point import ParameterVector
+from diagnosis.prediction import KalmanGains, NoiseLevels
+from diagnosis.recipe import code_digest, write_atomically
+from diagnosis.series import SampledRecording
 
 Arrays = Mapping[str, Any]
-NORMAL = tuple(field.name for field in dataclasses.fields(Normal))
+NORMAL_FIELDS = tuple(field.name for field in dataclasses.fields(NormalEquations))
 
 
 @dataclasses.dataclass(frozen=True)
-class Shelf:
+class FitCache:
     """Where fits are kept; nowhere without a folder. `key` is the hash of the model.
 
     `before` is called before a fit is made: it may raise what ends the diagnosis.
     """
 
     folder: Path | None = None
-    key: str = ""
-    before: Callable[[], None] = lambda: None
+    model_key: str = ""
+    before_fit: Callable[[], None] = lambda: None
 
-    def kept(
+    def load_or_fit(
         self,
-        words: str,
+        label: str,
         candidate: Candidate,
-        series: Sequence[Series],
-        given: Sequence[object],
-        make: Callable[[], Estimate],
+        series: Sequence[SampledRecording],
+        dependencies: Sequence[object],
+        fit: Callable[[], Estimate],
     ) -> Estimate:
-        """Return a fit of a candidate that follows from `given`: as it was kept, else made now."""
+        """Return a fit of a candidate that follows from `dependencies`: as it was kept, else made now."""
         if self.folder is None:
-            self.before()
-            return make()
-        name = hash_of(words, code_digest(), self.key, candidate, tuple(series), *given)
+            self.before_fit()
+            return fit()
+        name = hash_of(
+            label, code_digest(), self.model_key, candidate, tuple(series), *dependencies
+        )
         path = self.folder / f"{name}.npz"
         with suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return _estimate(candidate, series, dict(np.load(io.BytesIO(path.read_bytes()))))
-        self.before()
-        found = make()
+            return _from_arrays(candidate, series, dict(np.load(io.BytesIO(path.read_bytes()))))
+        self.before_fit()
+        estimate = fit()
         with suppress(OSError):  # a full disk is no reason to stop
             data = io.BytesIO()
-            np.savez(data, **_arrays(found))
+            np.savez(data, **_to_arrays(estimate))
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(path, data.getvalue())
-        return found
+            write_atomically(path, data.getvalue())
+        return estimate
 
 
-NOWHERE = Shelf()
+NO_CACHE = FitCache()
 
 
 def hash_of(*values: object) -> str:
     """Return a hash of values; equal bits have equal hashes."""
     digest = hashlib.sha256()
     for value in values:
-        _into(digest, value)
+        _update_digest(digest, value)
     return digest.hexdigest()[:32]
 
 
-def _into(digest: Any, value: object) -> None:
+def _update_digest(digest: Any, value: object) -> None:
     digest.update(f"{type(value).__name__}(".encode())
     if isinstance(value, Candidate):
-        _into(digest, (*(layer.id for layer in value.layers), value.recipe))
+        _update_digest(
+            digest, (*(placed_effect.id for placed_effect in value.placed_effects), value.compiled)
+        )
     elif isinstance(value, np.ndarray):
         digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
     elif isinstance(value, Mapping):
         for key in sorted(value):
-            _into(digest, key)
-            _into(digest, value[key])
+            _update_digest(digest, key)
+            _update_digest(digest, value[key])
     elif isinstance(value, (tuple, list)):
         for one in value:
-            _into(digest, one)
+            _update_digest(digest, one)
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
-            _into(digest, getattr(value, field.name))
+            _update_digest(digest, getattr(value, field.name))
     elif value is None or isinstance(value, (str, int, float, Fraction)):
         digest.update(repr(value).encode())
     else:
@@ -101,45 +105,56 @@ def _into(digest: Any, value: object) -> None:
     digest.update(b")")
 
 
-def _arrays(one: Estimate) -> Arrays:
+def _to_arrays(estimate: Estimate) -> Arrays:
     """Return an estimate as arrays, but for what its outcome follows from."""
-    drifts = one.noises.drifts
-    found: dict[str, Any] = {
-        "shared": one.point.shared,
-        "own": one.point.own,
-        "cost": one.cost,
-        "first": one.gains.first,
-        "steady": one.gains.steady,
-        "noise_seen": one.noises.seen,
-        "noise_inputs": one.noises.inputs,
-        "noise_limits": one.noises.limits,
-        "is_alone": one.noises.is_alone,
+    drifts = estimate.noise_levels.process
+    arrays: dict[str, Any] = {
+        "shared": estimate.point.shared,
+        "own": estimate.point.per_recording,
+        "cost": estimate.cost,
+        "first": estimate.gains.transient,
+        "steady": estimate.gains.steady_state,
+        "noise_seen": estimate.noise_levels.outputs,
+        "noise_inputs": estimate.noise_levels.inputs,
+        "noise_limits": estimate.noise_levels.huber_limits,
+        "is_alone": estimate.noise_levels.is_output_error,
         "drift_names": np.array(list(drifts), dtype=str),
         "drift_levels": np.array(list(drifts.values()), dtype=float),
-        "limits": one.outcome.limits,
-        "columns": np.array(list(one.columns), dtype=str),
+        "limits": estimate.prediction.huber_limits,
+        "columns": np.array(list(estimate.jacobian), dtype=str),
     }
-    if one.normal is not None:
-        found |= {f"normal_{name}": getattr(one.normal, name) for name in NORMAL}
-    found |= {f"column_{name}": changes for name, changes in one.columns.items()}
-    return found
+    if estimate.normal_equations is not None:
+        arrays |= {
+            f"normal_{name}": getattr(estimate.normal_equations, name) for name in NORMAL_FIELDS
+        }
+    arrays |= {f"column_{name}": changes for name, changes in estimate.jacobian.items()}
+    return arrays
 
 
-def _estimate(candidate: Candidate, series: Sequence[Series], of: Arrays) -> Estimate:
+def _from_arrays(
+    candidate: Candidate, series: Sequence[SampledRecording], arrays: Arrays
+) -> Estimate:
     """Return the estimate that arrays were made from."""
     drifts = {
         str(name): float(level)
-        for name, level in zip(of["drift_names"], of["drift_levels"], strict=True)
+        for name, level in zip(arrays["drift_names"], arrays["drift_levels"], strict=True)
     }
-    is_alone = bool(of["is_alone"])
-    noises = Noises(of["noise_seen"], of["noise_inputs"], drifts, of["limits"], is_alone)
-    point, gains = Point(of["shared"], of["own"]), Gains(of["first"], of["steady"])
+    is_alone = bool(arrays["is_alone"])
+    noise_levels = NoiseLevels(
+        arrays["noise_seen"], arrays["noise_inputs"], drifts, arrays["limits"], is_alone
+    )
+    point, gains = (
+        ParameterVector(arrays["shared"], arrays["own"]),
+        KalmanGains(arrays["first"], arrays["steady"]),
+    )
     normal = None
-    if "normal_a" in of:
-        normal = Normal(**{name: of[f"normal_{name}"] for name in NORMAL})
-    columns = {str(name): of[f"column_{name}"] for name in of["columns"]}
+    if "normal_a" in arrays:
+        normal = NormalEquations(**{name: arrays[f"normal_{name}"] for name in NORMAL_FIELDS})
+    columns = {str(name): arrays[f"column_{name}"] for name in arrays["columns"]}
     blank: Any = None
-    found = Estimate(candidate, point, float(of["cost"]), blank, gains, noises, normal, columns)
-    outcome = outcome_at(found, series, point)
-    noises = dataclasses.replace(noises, limits=of["noise_limits"])
-    return dataclasses.replace(found, outcome=outcome, noises=noises)
+    estimate = Estimate(
+        candidate, point, float(arrays["cost"]), blank, gains, noise_levels, normal, columns
+    )
+    prediction = predict_with_gains_of(estimate, series, point)
+    noise_levels = dataclasses.replace(noise_levels, huber_limits=arrays["noise_limits"])
+    return dataclasses.replace(estimate, prediction=prediction, noise_levels=noise_levels)

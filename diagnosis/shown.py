@@ -5,58 +5,58 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.adaptation import adapted
-from diagnosis.dossier import Dossier
+from diagnosis.adaptation import reestimate_per_recording
+from diagnosis.dossier import DiagnosisReport
 from diagnosis.estimate import Estimate
-from diagnosis.series import Series
-from diagnosis.whiteness import Whiteness, whiteness_of
-from diagnosis.worst_window import FreeRuns, WorstWindow, free_runs, worst_window
-from language.known import unit_text
+from diagnosis.series import SampledRecording
+from diagnosis.whiteness import WhitenessTest, innovation_whiteness
+from diagnosis.worst_window import FreeRuns, WorstWindow, find_worst_window, simulate_free_runs
+from language.known import format_si_unit
 from language.map import column_dimension
 
 
 @dataclass(frozen=True)
-class Shown:
+class ModelComparison:
     """One set of recordings: `part` as verdicts call it, `words` for a reader; `units` by signal.
 
     `before` and `after` say how white the innovations of both models are.
     """
 
-    part: str
-    words: str
+    dataset: str
+    label: str
     runs: FreeRuns = field(repr=False)
     units: tuple[str, ...]
     window: WorstWindow = field(repr=False)
-    before: tuple[Whiteness, ...] = field(repr=False)
-    after: tuple[Whiteness, ...] = field(repr=False)
+    before: tuple[WhitenessTest, ...] = field(repr=False)
+    after: tuple[WhitenessTest, ...] = field(repr=False)
 
 
-def shown_of(dossier: Dossier) -> list[Shown]:
+def compare_models(report: DiagnosisReport) -> list[ModelComparison]:
     """Return what was held out, then what was trained on; nothing without a diagnosis."""
-    found = dossier.diagnosis
+    found = report.diagnosis
     if found is None:
         return []
     base, model = found.selection.base, found.selection.model
-    sets = [_shown(dossier, "train", "training", base, model, found.bench.series)]
+    sets = [_compare_on(report, "train", "training", base, model, found.model_set.series)]
     if found.held_out:
         held = found.held_out
-        both = adapted(base, held), adapted(model, held)
-        sets.insert(0, _shown(dossier, "held_out", "held-out", *both, held))
+        both = reestimate_per_recording(base, held), reestimate_per_recording(model, held)
+        sets.insert(0, _compare_on(report, "held_out", "held-out", *both, held))
     return sets
 
 
-def _shown(
-    dossier: Dossier,
-    part: str,
-    words: str,
+def _compare_on(
+    report: DiagnosisReport,
+    dataset: str,
+    label: str,
     base: Estimate,
     model: Estimate,
-    series: Sequence[Series],
-) -> Shown:
-    runs = free_runs(base, model, series)
-    columns = {one.compare: one for one in dossier.case.mapping.columns.values()}
-    units = tuple(unit_text(column_dimension(columns[name])) for name in runs.signals)
+    series: Sequence[SampledRecording],
+) -> ModelComparison:
+    runs = simulate_free_runs(base, model, series)
+    columns = {one.compare: one for one in report.case.mapping.columns.values()}
+    units = tuple(format_si_unit(column_dimension(columns[name])) for name in runs.signals)
     period = float(series[0].period)
-    window = worst_window(runs, units, words)
-    white = [tuple(whiteness_of(one, period)) for one in (base, model)]
-    return Shown(part, words, runs, units, window, *white)
+    window = find_worst_window(runs, units, label)
+    white = [tuple(innovation_whiteness(one, period)) for one in (base, model)]
+    return ModelComparison(dataset, label, runs, units, window, *white)

@@ -14,67 +14,71 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimate import Estimate
-from diagnosis.joined import burnt
-from diagnosis.prediction import predicted
-from diagnosis.series import Series
+from diagnosis.joined import burn_in_samples
+from diagnosis.prediction import predict
+from diagnosis.series import SampledRecording
 from diagnosis.verdict import Misfit
 
 Reals = NDArray[np.float64]
-OBSERVED = 1.0
+OBSERVED_TIME = 1.0
 """Seconds in which the observer follows."""
-FREE = 1.5
+FREE_TIME = 1.5
 """Seconds in which the model is alone."""
 
 
-def misfits(before: Estimate, after: Estimate, series: Sequence[Series]) -> dict[str, Misfit]:
+def compare_misfits(
+    before: Estimate, after: Estimate, series: Sequence[SampledRecording]
+) -> dict[str, Misfit]:
     """Return the misfit of each compared signal, of two models that are fitted to `series`."""
     first, second = nrmse(before, series), nrmse(after, series)
-    names = before.candidate.predictor.seen
+    names = before.candidate.predictor.outputs
     return {
-        name: Misfit(float(a), float(b), float(a * of), float(b * of))
-        for name, a, b, of in zip(names, first, second, spread_of(series), strict=True)
+        name: Misfit(float(a), float(b), float(a * scale), float(b * scale))
+        for name, a, b, scale in zip(names, first, second, output_stds(series), strict=True)
     }
 
 
-def nrmse(model: Estimate, series: Sequence[Series]) -> Reals:
+def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
     """Return the normalised root mean square of free simulation by signal (seen,)."""
     squares, counts = [], []
-    for one, simulated in zip(series, free(model, series), strict=True):
-        counted = is_later(one) if model.noises.is_alone else is_free(one)
+    for one, simulated in zip(series, simulate_free(model, series), strict=True):
+        counted = is_after_burn_in(one) if model.noise_levels.is_output_error else is_free(one)
         alone = counted[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
         error = np.where(alone, one.measured - simulated, 0.0)
         squares.append(np.sum(error**2, axis=0))
         counts.append(np.sum(alone, axis=0))
     mean = np.sum(squares, axis=0) / np.maximum(np.sum(counts, axis=0), 1)
-    return np.asarray(np.sqrt(mean) / spread_of(series), dtype=np.float64)
+    return np.asarray(np.sqrt(mean) / output_stds(series), dtype=np.float64)
 
 
-def spread_of(series: Sequence[Series]) -> Reals:
+def output_stds(series: Sequence[SampledRecording]) -> Reals:
     """Return the standard deviation of each compared signal [SI] (seen,)."""
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
 
-def free(model: Estimate, series: Sequence[Series]) -> list[Reals]:
+def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
     """Return what a model shows for each recording (samples, seen): followed, then alone."""
-    hidden = [
+    masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
         for one in series
     ]
     values = [model.values(k) for k in range(len(series))]
-    hidden = [
-        dataclasses.replace(one, measured=np.ascontiguousarray(one.measured)) for one in hidden
+    masked = [
+        dataclasses.replace(one, measured=np.ascontiguousarray(one.measured)) for one in masked
     ]
-    outcome = predicted(model.candidate, hidden, values, model.gains, model.noises.limits)
-    return [p.seen for p in outcome.predictions]
+    prediction = predict(
+        model.candidate, masked, values, model.gains, model.noise_levels.huber_limits
+    )
+    return [p.outputs for p in prediction.predictions]
 
 
-def is_later(series: Series) -> NDArray[np.bool_]:
+def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
     """Return the samples (samples,) behind those in which the states are found."""
-    return np.asarray(np.arange(series.count) >= burnt(series))
+    return np.asarray(np.arange(series.count) >= burn_in_samples(series))
 
 
-def is_free(series: Series) -> NDArray[np.bool_]:
+def is_free(series: SampledRecording) -> NDArray[np.bool_]:
     """Return the samples (samples,) at which the model is alone."""
     time = np.arange(series.count) * float(series.period)
-    return np.asarray(np.mod(time, OBSERVED + FREE) >= OBSERVED)
+    return np.asarray(np.mod(time, OBSERVED_TIME + FREE_TIME) >= OBSERVED_TIME)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 Reals = NDArray[np.float64]
 
 
-def spectrum(values: Reals, rate: float, longest: int) -> tuple[Reals, Reals]:
+def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
     """Return frequencies [Hz] and the one-sided power density there, by Welch's method.
 
-    Of `values` (samples,) at `rate` [Hz], in Hann windows of at most `longest` samples that overlap
+    Of `values` (samples,) at `rate` [Hz], in Hann windows of at most `max_window` samples that overlap
     by half, each without its mean.
     """
-    length = min(len(values), longest)
+    length = min(len(values), max_window)
     power, frequencies = mlab.psd(values, length, rate, mlab.detrend_mean, noverlap=length // 2)
     return np.asarray(frequencies), np.asarray(power)

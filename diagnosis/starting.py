@@ -12,53 +12,57 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimate import Estimate, outcome_at
-from diagnosis.point import Point
-from diagnosis.series import Series
+from diagnosis.estimate import Estimate, predict_with_gains_of
+from diagnosis.point import ParameterVector
+from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]
-SETTLED = 0.1
+AVERAGING_TIME = 0.1
 """Seconds at the start over which inputs are taken for constant."""
-APART = 4.0
+HYPOTHESIS_STDS = 4.0
 """Standard deviations of its noise by which a first input may be another one."""
-CLEARLY = 3.0
+MIN_GAIN = 3.0
 """Nats by which another start must foresee better."""
 
 
-def settled_at_start(series: Series) -> Series:
+def average_initial_inputs(series: SampledRecording) -> SampledRecording:
     """Return a recording whose first inputs are the means of its first ones."""
-    count = max(1, round(SETTLED / float(series.period)))
+    count = max(1, round(AVERAGING_TIME / float(series.period)))
     inputs = series.inputs.copy()
     inputs[0] = np.mean(inputs[:count], axis=0)
     return dataclasses.replace(series, inputs=inputs)
 
 
-def started(model: Estimate, series: Sequence[Series]) -> tuple[Series, ...]:
+def choose_initial_inputs(
+    model: Estimate, series: Sequence[SampledRecording]
+) -> tuple[SampledRecording, ...]:
     """Return recordings with the first inputs with which a base foresees them best.
 
     They need not be those that it was fitted to: a base has no parameters of single recordings.
     """
-    variances = model.outcome.variances
-    alone = Point(model.point.shared, model.point.shared[np.newaxis])
-    found = []
+    variances = model.prediction.variances
+    shared_point = ParameterVector(model.point.shared, model.point.shared[np.newaxis])
+    chosen = []
     for one in series:
         costs = []
-        trials = [one, *_others(one, model.noises.inputs)]
+        trials = [one, *_initial_input_hypotheses(one, model.noise_levels.inputs)]
         for trial in trials:
-            outcome = outcome_at(model, [trial], alone)
-            squares = outcome.runs.squares[0]
-            costs.append(0.5 * float(np.sum(squares / variances)) if outcome.is_whole else np.inf)
+            prediction = predict_with_gains_of(model, [trial], shared_point)
+            squares = prediction.runs.squared_sums[0]
+            costs.append(
+                0.5 * float(np.sum(squares / variances)) if prediction.is_complete else np.inf
+            )
         best = int(np.argmin(costs))
-        found.append(trials[best] if costs[best] < costs[0] - CLEARLY else one)
-    return tuple(found)
+        chosen.append(trials[best] if costs[best] < costs[0] - MIN_GAIN else one)
+    return tuple(chosen)
 
 
-def _others(series: Series, noise: Reals) -> list[Series]:
+def _initial_input_hypotheses(series: SampledRecording, noise: Reals) -> list[SampledRecording]:
     """Return a recording with each of its first inputs more and less by its noise."""
-    found = []
+    hypotheses = []
     for column in range(series.inputs.shape[1]):
         for sign in (1.0, -1.0):
             inputs = series.inputs.copy()
-            inputs[0, column] += sign * APART * noise[column]
-            found.append(dataclasses.replace(series, inputs=inputs))
-    return found
+            inputs[0, column] += sign * HYPOTHESIS_STDS * noise[column]
+            hypotheses.append(dataclasses.replace(series, inputs=inputs))
+    return hypotheses

@@ -12,85 +12,96 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.joined import burnt
-from diagnosis.series import Series
+from diagnosis.joined import burn_in_samples
+from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]
-WITHIN = (0.3, 1.0)
+WINDOW_TIMES = (0.3, 1.0)
 """Seconds in which an answer to a moved input is heard: at once, or as long as a limit acts."""
-SMOOTH = 0.05
+SMOOTHING_TIME = 0.05
 """Seconds over which an input is averaged before its rate is taken: it has noise."""
-REST = 0.1
+STANDSTILL_STDS = 0.1
 """Standard deviations of a signal within which it is near rest."""
 
 
-def stirring(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
+def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[Reals]) -> float:
     """Return how loudness goes with the movement or the amount of an input: a correlation.
 
-    `unknown` (samples,) in each recording is known from where its states were found.
+    `disturbances` (samples,) in each recording is known from where its states were found.
     """
-    pairs = list(zip(series, unknown, strict=True))
+    pairs = list(zip(series, disturbances, strict=True))
     columns = range(series[0].inputs.shape[1])
     return max(
         (
-            _with_loudness(series, unknown, [found(one, k, len(u)) for one, u in pairs], within)
+            _amplitude_correlation(
+                series, disturbances, [found(one, k, len(u)) for one, u in pairs], within
+            )
             for k in columns
-            for found in (_movement, _amount)
-            for within in WITHIN
+            for found in (_input_rate, _input_amplitude)
+            for within in WINDOW_TIMES
         ),
         default=0.0,
     )
 
 
-def resting(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
+def standstill_dependence(
+    series: Sequence[SampledRecording], disturbances: Sequence[Reals]
+) -> float:
     """Return how loudness goes with a compared signal being near rest, at most: a correlation."""
     most = 0.0
     for column in range(series[0].measured.shape[1]):
         spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
         near = [
-            _nearness(one, column, len(u), REST * float(spread))
-            for one, u in zip(series, unknown, strict=True)
+            _nearness_to_standstill(one, column, len(u), STANDSTILL_STDS * float(spread))
+            for one, u in zip(series, disturbances, strict=True)
         ]
-        most = max(most, _with_loudness(series, unknown, near, WITHIN[0]))
+        most = max(most, _amplitude_correlation(series, disturbances, near, WINDOW_TIMES[0]))
     return most
 
 
-def _with_loudness(
-    series: Sequence[Series], unknown: Sequence[Reals], other: Sequence[Reals], within: float
+def _amplitude_correlation(
+    series: Sequence[SampledRecording],
+    disturbances: Sequence[Reals],
+    features: Sequence[Reals],
+    window: float,
 ) -> float:
     """Return the correlation of loudness with something else, 0 where one of both is still.
 
     Both are averaged over some seconds around each sample.
     """
-    loud = [_around(np.abs(u), one, within) for u, one in zip(unknown, series, strict=True)]
-    near = [_around(values, one, within) for values, one in zip(other, series, strict=True)]
+    loud = [
+        _moving_mean(np.abs(u), one, window) for u, one in zip(disturbances, series, strict=True)
+    ]
+    near = [_moving_mean(values, one, window) for values, one in zip(features, series, strict=True)]
     whole, along = np.concatenate(loud), np.concatenate(near)
     if np.std(along) > 0.0 and np.std(whole) > 0.0:
         return float(np.corrcoef(whole, along)[0, 1])
     return 0.0
 
 
-def _nearness(series: Series, column: int, count: int, width: float) -> Reals:
+def _nearness_to_standstill(
+    series: SampledRecording, column: int, count: int, width: float
+) -> Reals:
     """Return 1 where a compared signal is at rest, 0 far from it (count,)."""
-    values = series.measured[burnt(series) : burnt(series) + count, column]
+    values = series.measured[burn_in_samples(series) : burn_in_samples(series) + count, column]
     near = np.exp(-((np.nan_to_num(values, nan=np.inf) / max(width, 1e-300)) ** 2))
     return np.asarray(near, dtype=np.float64)
 
 
-def _movement(series: Series, column: int, count: int) -> Reals:
+def _input_rate(series: SampledRecording, column: int, count: int) -> Reals:
     """Return how much an input moves at each sample (count,)."""
-    values = series.inputs[burnt(series) : burnt(series) + count, column]
-    even = _around(values, series, SMOOTH)
+    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
+    even = _moving_mean(values, series, SMOOTHING_TIME)
     return np.asarray(np.abs(np.diff(even, prepend=even[:1])), dtype=np.float64)
 
 
-def _amount(series: Series, column: int, count: int) -> Reals:
+def _input_amplitude(series: SampledRecording, column: int, count: int) -> Reals:
     """Return how large an input is at each sample (count,)."""
-    values = series.inputs[burnt(series) : burnt(series) + count, column]
+    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
     return np.asarray(np.abs(values), dtype=np.float64)
 
 
-def _around(values: Reals, series: Series, seconds: float) -> Reals:
+def _moving_mean(values: Reals, series: SampledRecording, seconds: float) -> Reals:
     """Return means over some seconds around each sample."""
     count = max(3, round(seconds / float(series.period)))
     padded = np.pad(values, (count // 2, count - 1 - count // 2), mode="edge")

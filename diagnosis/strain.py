@@ -11,70 +11,75 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimate import Estimate
-from diagnosis.layers import Layer
-from diagnosis.naming import brought_by, place_path
-from diagnosis.normal import solution
+from diagnosis.layers import PlacedEffect
+from diagnosis.naming import effect_names, place_path
+from diagnosis.normal import solve
 from diagnosis.point import bounds_of
-from diagnosis.rival import NEARLY
-from diagnosis.search import Tried
+from diagnosis.rival import CONFUSION_FRACTION
+from diagnosis.search import CandidateFit
 
-STRAINED, STRAINED_PART = 60.0, 0.03
+MIN_SCORE, MIN_SCORE_FRACTION = 60.0, 0.03
 """Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
 they gained, from which on they are pulled out of these: what imitates another effect is."""
 
 
-def is_strained(model: Estimate, accepted: Sequence[Tried]) -> bool:
+def rejects_bounds(model: Estimate, accepted: Sequence[CandidateFit]) -> bool:
     """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
-    gained = sum(tried.evidence.train for tried in accepted if tried.evidence)
-    return strain(model, accepted) > max(STRAINED, STRAINED_PART * gained)
+    gained = sum(tried.likelihood_gain.penalised for tried in accepted if tried.likelihood_gain)
+    return bound_score(model, accepted) > max(MIN_SCORE, MIN_SCORE_FRACTION * gained)
 
 
-def strain(model: Estimate, accepted: Sequence[Tried]) -> float:
+def bound_score(model: Estimate, accepted: Sequence[CandidateFit]) -> float:
     """Return what accepted effects would gain [nats] if their own parameters that are at the end of
     a range had none, as the normal equations foresee it.
     """
-    if model.normal is None:
+    if model.normal_equations is None:
         return 0.0
-    brought = {name for tried in accepted for name in brought_by(tried.layer)}
+    brought = {name for tried in accepted for name in effect_names(tried.placed_effect)}
     low, high = bounds_of(model.candidate).T
     at_end = (model.point.shared <= low) | (model.point.shared >= high)
     is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
-    within = ~model.normal.own & ~at_end
-    beyond = ~model.normal.own & (is_brought | ~at_end)
-    return _foreseen(model, beyond) - _foreseen(model, within)
+    within = ~model.normal_equations.own & ~at_end
+    beyond = ~model.normal_equations.own & (is_brought | ~at_end)
+    return _predicted_gain(model, beyond) - _predicted_gain(model, within)
 
 
-def within_range(best: Tried, tried: Sequence[Tried]) -> Tried:
+def prefer_interior(best: CandidateFit, candidate_fits: Sequence[CandidateFit]) -> CandidateFit:
     """Return the best candidate, or where it is at a limit one at its place that is at none and
     gains nearly as much.
     """
-    if best.evidence is None or not is_at_limit(best.estimate, best.layer):
+    if best.likelihood_gain is None or not is_at_bound(best.estimate, best.placed_effect):
         return best
-    least = NEARLY * best.evidence.train
-    near = (t for t in tried if t.evidence and t.evidence.train >= least)
-    beside = (t for t in near if place_path(t.layer) == place_path(best.layer))
-    return next((t for t in beside if not is_at_limit(t.estimate, t.layer)), best)
+    least = CONFUSION_FRACTION * best.likelihood_gain.penalised
+    near = (t for t in candidate_fits if t.likelihood_gain and t.likelihood_gain.penalised >= least)
+    beside = (t for t in near if place_path(t.placed_effect) == place_path(best.placed_effect))
+    return next((t for t in beside if not is_at_bound(t.estimate, t.placed_effect)), best)
 
 
-def is_at_limit(model: Estimate | None, layer: Layer) -> bool:
+def is_at_bound(model: Estimate | None, placed_effect: PlacedEffect) -> bool:
     """Tell whether a parameter of an effect is at an end of its range that was set to it: nothing
     ends a quantity but zero, and one where it is a share.
     """
     if model is None:
         return False
-    brought = brought_by(layer)
+    brought = effect_names(placed_effect)
     return any(
         (z <= low and one.low != 0.0) or (z >= high and (one.high, one.unit) != (1.0, "1"))
         for one, z, (low, high) in zip(
-            model.candidate.uncertain, model.point.shared, bounds_of(model.candidate), strict=True
+            model.candidate.free_parameters,
+            model.point.shared,
+            bounds_of(model.candidate),
+            strict=True,
         )
         if one.name in brought and not one.per_recording
     )
 
 
-def _foreseen(model: Estimate, free: NDArray[np.bool_]) -> float:
+def _predicted_gain(model: Estimate, is_free: NDArray[np.bool_]) -> float:
     """Return what a step of the free shared coordinates (parameters,) gains, without ranges."""
-    assert model.normal is not None
-    slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
-    matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
-    return 0.5 * float(slope @ solution(matrix, slope))
+    assert model.normal_equations is not None
+    slope = model.normal_equations.g.sum(axis=0)[is_free] + model.point.shared[is_free]
+    matrix = model.normal_equations.a.sum(axis=0)[np.ix_(is_free, is_free)] + np.eye(
+        int(is_free.sum())
+    )
+    return 0.5 * float(slope @ solve(matrix, slope))

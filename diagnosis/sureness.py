@@ -6,36 +6,38 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from diagnosis.bench import Bench
-from diagnosis.constancy import varies
-from diagnosis.search import Tell
+from diagnosis.bench import ModelSet
+from diagnosis.constancy import has_varying_parameters
+from diagnosis.search import LogCallback
 from diagnosis.selection import Selection
-from diagnosis.series import Series
+from diagnosis.series import SampledRecording
 
-UNSURE = 0.88
+PROBABILITY_CAP = 0.88
 """Probability that a first name then has at most: of 170 that were unsure in a study, 158 were
 right; the twelve others were wrong, nine of them where the library lacked the effect."""
 
 
-def less_sure(bench: Bench, selection: Selection, tell: Tell) -> Selection:
+def cap_probability(model_set: ModelSet, selection: Selection, log: LogCallback) -> Selection:
     """Return a selection whose first effect is less sure if it is not alone or its parameters vary
     from recording to recording.
 
     What goes along with it may take up what its form gets wrong. Physics does come in pairs; but so
     does what imitates an effect that the library lacks.
     """
-    scores = [tried.score for tried in selection.first_round if tried.evidence]
-    why = _why(bench.series, selection)
+    scores = [tried.score for tried in selection.first_round if tried.likelihood_gain]
+    why = _cap_reason(model_set.series, selection)
     if not scores or not why:
         return selection
-    tell(f"less sure: {selection.accepted[0].layer.id}: {why}")
-    apart = 2.0 * math.log(UNSURE / (1.0 - UNSURE))  # weights are those of Selection
+    log(f"less sure: {selection.accepted[0].placed_effect.id}: {why}")
+    apart = 2.0 * math.log(
+        PROBABILITY_CAP / (1.0 - PROBABILITY_CAP)
+    )  # weights are those of Selection
     return dataclasses.replace(selection, other=max(selection.other, max(scores) - apart))
 
 
-def _why(series: Sequence[Series], selection: Selection) -> str:
+def _cap_reason(series: Sequence[SampledRecording], selection: Selection) -> str:
     """Return why the first effect may be an imitation; nothing where it seems not to be."""
-    if varies(selection.model, selection.accepted[0], series):
+    if has_varying_parameters(selection.model, selection.accepted[0], series):
         return "its parameters are not the same in each recording"
     if len(selection.accepted) > 1:
         return "it needs others beside it"

@@ -8,34 +8,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, looked_like
-from diagnosis.evidence import Evidence, evidence, more
-from diagnosis.layers import Layer
-from diagnosis.level import fitted
-from diagnosis.plainer import may_be_plainer
-from diagnosis.point import Point, extended
-from diagnosis.rival import NEARLY
-from diagnosis.screening import starts_of
-from diagnosis.search import Tell, Tried
-from diagnosis.strain import is_at_limit
+from diagnosis.estimate import Estimate, evaluate_near
+from diagnosis.evidence import LikelihoodGain, add_gains, likelihood_gain
+from diagnosis.layers import PlacedEffect
+from diagnosis.level import fit_candidate
+from diagnosis.plainer import accepts_restriction
+from diagnosis.point import ParameterVector, extend_vector
+from diagnosis.rival import CONFUSION_FRACTION
+from diagnosis.screening import start_values
+from diagnosis.search import CandidateFit, LogCallback
+from diagnosis.strain import is_at_bound
 
-CLEARLY = 3.0
+MIN_EXCHANGE_GAIN = 3.0
 """Nats by which the model must be better with the other effect."""
-RIVAL_PART, CONFUSED_PART = 0.5, 0.25
+RIVAL_FRACTION, CONFUSED_FRACTION = 0.5, 0.25
 """Part of what an accepted effect gained that another one gained alone, if it may stand for it; and
 one that it is known to be confused with."""
 
 
-def swapped(
-    bench: Bench,
+def exchange_effects(
+    model_set: ModelSet,
     model: Estimate,
-    accepted: Sequence[Tried],
-    rivals: Sequence[Tried],
+    accepted: Sequence[CandidateFit],
+    rivals: Sequence[CandidateFit],
     units: Mapping[str, float],
-    tell: Tell,
-) -> tuple[list[Tried], Estimate]:
+    log: LogCallback,
+) -> tuple[list[CandidateFit], Estimate]:
     """Return the accepted effects and their model, each but the last swapped where that is better.
 
     What it is swapped with are `rivals` at the same place; what is known to be confused with it is
@@ -44,59 +44,84 @@ def swapped(
     kept = list(accepted)
     for k, old in enumerate(accepted[:-1]):
         for rival in rivals:
-            ids = {tried.layer.id for tried in kept}
-            if rival.layer.id in ids or not _may_stand_for(rival, old):
+            ids = {tried.placed_effect.id for tried in kept}
+            if rival.placed_effect.id in ids or not _is_exchangeable(rival, old):
                 continue
-            layers = [rival.layer if tried is kept[k] else tried.layer for tried in kept]
-            candidate = bench.possible(layers)
+            placed_effects = [
+                rival.placed_effect if tried is kept[k] else tried.placed_effect for tried in kept
+            ]
+            candidate = model_set.try_compile(placed_effects)
             if candidate is None:
                 continue
-            start = _start(bench, candidate, rival, model)
-            tried = fitted(candidate, bench.series, model.noises, start, units, like=model)
-            if may_be_plainer(tried, rival.layer, bench.series):
+            start = _start_point(model_set, candidate, rival, model)
+            tried = fit_candidate(
+                candidate, model_set.series, model.noise_levels, start, units, nearby=model
+            )
+            if accepts_restriction(tried, rival.placed_effect, model_set.series):
                 continue
-            gained = evidence(tried, model, bench.series)  # prices counted
-            if gained.train > _needed(kept[k], tried, rival.layer):
-                tell(f"{rival.layer.id} goes better with the others than {kept[k].layer.id}")
-                kept[k], model = _credited(rival, kept[k], tried, gained), tried
+            gained = likelihood_gain(tried, model, model_set.series)  # prices counted
+            if gained.penalised > _required_gain(kept[k], tried, rival.placed_effect):
+                log(
+                    f"{rival.placed_effect.id} goes better with the others than {kept[k].placed_effect.id}"
+                )
+                kept[k], model = _assign_gain(rival, kept[k], tried, gained), tried
     return kept, model
 
 
-def _needed(old: Tried, model: Estimate, layer: Layer) -> float:
+def _required_gain(
+    accepted_fit: CandidateFit, model: Estimate, placed_effect: PlacedEffect
+) -> float:
     """Return what a model with a rival in the place of an accepted effect has to gain [nats]: where
     the rival is at a limit, more than what keeps nearly as good ones apart.
     """
-    gained = old.evidence.train if old.evidence else 0.0
-    return max(CLEARLY, (1.0 - NEARLY) * gained) if is_at_limit(model, layer) else CLEARLY
+    gained = accepted_fit.likelihood_gain.penalised if accepted_fit.likelihood_gain else 0.0
+    return (
+        max(MIN_EXCHANGE_GAIN, (1.0 - CONFUSION_FRACTION) * gained)
+        if is_at_bound(model, placed_effect)
+        else MIN_EXCHANGE_GAIN
+    )
 
 
-def _may_stand_for(rival: Tried, old: Tried) -> bool:
+def _is_exchangeable(rival: CandidateFit, accepted_fit: CandidateFit) -> bool:
     """Tell whether a rival is at the place of an accepted effect, and gained not much less or is
     one that this is confused with.
     """
-    if rival.layer.place != old.layer.place or old.evidence is None:
+    if (
+        rival.placed_effect.place != accepted_fit.placed_effect.place
+        or accepted_fit.likelihood_gain is None
+    ):
         return False
-    is_confused = rival.layer.effect.name in old.layer.effect.confused_with
-    if rival.evidence is None:
+    is_confused = rival.placed_effect.effect.name in accepted_fit.placed_effect.effect.confused_with
+    if rival.likelihood_gain is None:
         return is_confused
-    part = CONFUSED_PART if is_confused else RIVAL_PART
-    return rival.evidence.train > part * old.evidence.train
+    part = CONFUSED_FRACTION if is_confused else RIVAL_FRACTION
+    return rival.likelihood_gain.penalised > part * accepted_fit.likelihood_gain.penalised
 
 
-def _credited(rival: Tried, old: Tried, model: Estimate, gained: Evidence) -> Tried:
+def _assign_gain(
+    rival: CandidateFit, accepted_fit: CandidateFit, model: Estimate, gain: LikelihoodGain
+) -> CandidateFit:
     """Return a rival with what it gains alone, or what it gains in the place of the old one."""
-    if rival.evidence is not None or old.evidence is None:
+    if rival.likelihood_gain is not None or accepted_fit.likelihood_gain is None:
         return rival
-    return Tried(rival.layer, rival.promised, model, more(old.evidence, gained))
+    return CandidateFit(
+        rival.placed_effect,
+        rival.screening_gain,
+        model,
+        add_gains(accepted_fit.likelihood_gain, gain),
+    )
 
 
-def _start(bench: Bench, candidate: Candidate, rival: Tried, model: Estimate) -> Point:
+def _start_point(
+    model_set: ModelSet, candidate: Candidate, rival: CandidateFit, model: Estimate
+) -> ParameterVector:
     """Return where a fit with a rival begins: where it was alone, or the best of its starts."""
     given = candidate, model.candidate, model.point
     if rival.estimate is not None:
         alone = rival.estimate
-        return extended(*given, extended(candidate, alone.candidate, alone.point, {}))
-    starts = [extended(*given, start) for start in starts_of(candidate, model.values(0))]
+        return extend_vector(*given, extend_vector(candidate, alone.candidate, alone.point, {}))
+    starts = [extend_vector(*given, start) for start in start_values(candidate, model.values(0))]
     return min(
-        starts, key=lambda p: looked_like(candidate, bench.series, model.noises, p, model).cost
+        starts,
+        key=lambda p: evaluate_near(candidate, model_set.series, model.noise_levels, p, model).cost,
     )

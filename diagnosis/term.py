@@ -16,14 +16,14 @@ ORDERS = (1, 2, 3, 4, 5, 6, 8, 9, 10, 12, 16, 18, 24, 36, 48)
 """Periods per turn that are tried."""
 LAGS = (0.005, 0.02, 0.06)
 """Time constants [s] by which an input may be late."""
-RISES = (0.15, 0.4, 1.0)
+RISE_TIMES = (0.15, 0.4, 1.0)
 """Times [s] in which the largest value may be reached at a limited rate."""
-PARTS = (0.4, 0.6, 0.8)
+LIMIT_FRACTIONS = (0.4, 0.6, 0.8)
 """Limits that are tried, as parts of the largest value."""
 
 
 @dataclass(frozen=True)
-class Term:
+class LibraryTerm:
     """One summand without its coefficient.
 
     `text` is an expression; with an `angle` (a state that the term brings) it is what stands
@@ -37,13 +37,13 @@ class Term:
     values: tuple[tuple[Reals, ...], ...] = field(repr=False)
     states: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     order: int = 0
-    each: bool = False
-    like: str = ""
+    per_recording: bool = False
+    unit_expression: str = ""
 
     @property
-    def has_own(self) -> bool:
+    def has_recording_coefficients(self) -> bool:
         """Whether each recording has a coefficient or phase of its own."""
-        return self.each or self.order > 0
+        return self.per_recording or self.order > 0
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Signals:
     units: Mapping[str, str]
     speeds: tuple[str, ...]
     torques: tuple[str, ...]
-    stretches: tuple[str, ...]
+    deflections: tuple[str, ...]
     angle_rates: tuple[str, ...]
     period: float
 
@@ -63,137 +63,137 @@ class Signals:
         return float(max(np.max(np.abs(values)) for values in self.values[name])) or 1.0
 
 
-def terms_of(signals: Signals, section: str, shown: str = "") -> Iterator[Term]:
-    """Yield the terms that may stand at a place; at an output `shown` is what it shows."""
+def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator[LibraryTerm]:
+    """Yield the terms that may stand at a place; at an output `output` is what it shows."""
     count = {name: [len(one) for one in values] for name, values in signals.values.items()}
     lengths = next(iter(count.values()))
     ones = [np.ones(n) for n in lengths]
-    yield _plain("a constant", "1", ones)
-    yield Term("a constant of each recording", "1", (tuple(ones),), each=True)
+    yield _linear_term("a constant", "1", ones)
+    yield LibraryTerm("a constant of each recording", "1", (tuple(ones),), per_recording=True)
     if section == "outputs":
-        yield from _of_signal(signals, shown)
+        yield from _signal_terms(signals, output)
         return
-    yield from _of_speeds(signals)
+    yield from _speed_terms(signals)
     for name in signals.torques:
-        yield from _of_torque(signals, name)
-    for name in signals.stretches:
-        yield from _powers(signals, name, (2, 3))
-        yield from _late(signals, name)
+        yield from _torque_terms(signals, name)
+    for name in signals.deflections:
+        yield from _power_terms(signals, name, (2, 3))
+        yield from _lag_terms(signals, name)
     for rate in signals.angle_rates:
-        yield from _of_angle(signals, rate, "1", ones)
+        yield from _order_terms(signals, rate, "1", ones)
         for name in signals.torques:
-            yield from _of_angle(signals, rate, name, signals.values[name])
+            yield from _order_terms(signals, rate, name, signals.values[name])
 
 
-def _plain(name: str, text: str, values: Sequence[Reals]) -> Term:
-    return Term(name, text, (tuple(values),))
+def _linear_term(name: str, text: str, values: Sequence[Reals]) -> LibraryTerm:
+    return LibraryTerm(name, text, (tuple(values),))
 
 
-def _of_signal(signals: Signals, shown: str) -> Iterator[Term]:
-    yield _plain(shown, shown, signals.values[shown])
-    yield from _late(signals, shown)
+def _signal_terms(signals: Signals, output: str) -> Iterator[LibraryTerm]:
+    yield _linear_term(output, output, signals.values[output])
+    yield from _lag_terms(signals, output)
     for rate in signals.angle_rates:
-        yield from _of_angle(signals, rate, shown, signals.values[shown])
+        yield from _order_terms(signals, rate, output, signals.values[output])
 
 
-def _of_speeds(signals: Signals) -> Iterator[Term]:
+def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
     for name in signals.speeds:
         values, unit = signals.values[name], signals.units[name]
-        bend = _rounded(0.005 * signals.largest(name))
+        bend = _round_two_digits(0.005 * signals.largest(name))
         sign = [np.tanh(x / bend) for x in values]
-        yield _plain(f"the sign of {name}", f"tanh({name} / ({bend:g} {unit}))", sign)
-        yield from _powers(signals, name, (1, 2))
+        yield _linear_term(f"the sign of {name}", f"tanh({name} / ({bend:g} {unit}))", sign)
+        yield from _power_terms(signals, name, (1, 2))
 
 
-def _powers(signals: Signals, name: str, powers: Sequence[int]) -> Iterator[Term]:
+def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator[LibraryTerm]:
     values = signals.values[name]
     if 1 in powers:
-        yield _plain(name, name, values)
+        yield _linear_term(name, name, values)
     if 2 in powers:
         squares = [x * np.abs(x) for x in values]
-        yield _plain(f"the square of {name}", f"{name} * abs({name})", squares)
+        yield _linear_term(f"the square of {name}", f"{name} * abs({name})", squares)
     if 3 in powers:
-        yield _plain(f"the cube of {name}", f"{name}^3", [x**3 for x in values])
+        yield _linear_term(f"the cube of {name}", f"{name}^3", [x**3 for x in values])
 
 
-def _of_torque(signals: Signals, name: str) -> Iterator[Term]:
+def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
     values = signals.values[name]
-    yield from _powers(signals, name, (1, 2, 3))
-    yield _plain(f"the amount of {name}", f"abs({name})", [np.abs(x) for x in values])
+    yield from _power_terms(signals, name, (1, 2, 3))
+    yield _linear_term(f"the amount of {name}", f"abs({name})", [np.abs(x) for x in values])
     unit = signals.units[name]
-    for part in PARTS:
-        most = _rounded(part * signals.largest(name))
+    for part in LIMIT_FRACTIONS:
+        most = _round_two_digits(part * signals.largest(name))
         over = [x - np.clip(x, -most, most) for x in values]
         text = f"({name} - clip({name}, -{most:g} {unit}, {most:g} {unit}))"
-        yield _plain(f"{name} beyond {most:g} {unit}", text, over)
+        yield _linear_term(f"{name} beyond {most:g} {unit}", text, over)
     for speed in signals.speeds:
-        yield from _of_both(signals, name, speed)
-    yield from _late(signals, name)
-    yield from _slow(signals, name)
+        yield from _torque_speed_terms(signals, name, speed)
+    yield from _lag_terms(signals, name)
+    yield from _rate_limit_terms(signals, name)
     period = signals.period
     clock = {"t": ("s", "der(t) = 1")}
     growing = [x * period * np.arange(len(x)) for x in values]
-    yield Term(
+    yield LibraryTerm(
         f"{name} that grows with time",
         f"{name} * t",
         (tuple(growing),),
         clock,
-        like=f"{name} * (1 s)",
+        unit_expression=f"{name} * (1 s)",
     )
 
 
-def _of_both(signals: Signals, torque: str, speed: str) -> Iterator[Term]:
+def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[LibraryTerm]:
     values = list(zip(signals.values[torque], signals.values[speed], strict=True))
     unit, of_speed = signals.units[torque], signals.units[speed]
-    bend = _rounded(0.005 * signals.largest(speed))
+    bend = _round_two_digits(0.005 * signals.largest(speed))
     sign = f"tanh({speed} / ({bend:g} {of_speed}))"
     lost = [np.abs(x) * np.tanh(w / bend) for x, w in values]
-    yield _plain(f"the amount of {torque} against {speed}", f"abs({torque}) * {sign}", lost)
-    yield _plain(f"{torque} times {speed}", f"{torque} * {speed}", [x * w for x, w in values])
+    yield _linear_term(f"the amount of {torque} against {speed}", f"abs({torque}) * {sign}", lost)
+    yield _linear_term(f"{torque} times {speed}", f"{torque} * {speed}", [x * w for x, w in values])
     power = max(float(np.max(np.abs(x * w))) for x, w in values)
-    for part in PARTS:
-        most = _rounded(part * power)
-        floor = _rounded(0.02 * signals.largest(speed))
+    for part in LIMIT_FRACTIONS:
+        most = _round_two_digits(part * power)
+        floor = _round_two_digits(0.02 * signals.largest(speed))
         limit = [most / np.maximum(np.abs(w), floor) for _, w in values]
         over = [x - np.clip(x, -b, b) for (x, _), b in zip(values, limit, strict=True)]
         bound = f"{most:g} W / max(abs({speed}), {floor:g} {of_speed})"
         text = f"({torque} - clip({torque}, -({bound}), {bound}))"
         if (unit, of_speed) == ("N*m", "rad/s"):
-            yield _plain(f"{torque} where its power is beyond {most:g} W", text, over)
+            yield _linear_term(f"{torque} where its power is beyond {most:g} W", text, over)
 
 
-def _late(signals: Signals, name: str) -> Iterator[Term]:
+def _lag_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
     for lag in LAGS:
-        late = [_lagged(x, lag, signals.period) for x in signals.values[name]]
+        late = [_low_pass(x, lag, signals.period) for x in signals.values[name]]
         less = [b - a for a, b in zip(signals.values[name], late, strict=True)]
         states = {"late": (signals.units[name], f"{lag:g} s * der(late) = {name} - late")}
         text = f"(late - {name})"
         told = f"{name} that is late by {1000 * lag:g} ms"
-        yield Term(told, text, (tuple(less),), states, like=name)
+        yield LibraryTerm(told, text, (tuple(less),), states, unit_expression=name)
 
 
-def _slow(signals: Signals, name: str) -> Iterator[Term]:
+def _rate_limit_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
     """What follows at a limited rate: the rates that would take some tenths of a second."""
     unit = signals.units[name]
-    for span in RISES:
-        rate = _rounded(signals.largest(name) / span)
-        less = [_followed(x, rate * signals.period) - x for x in signals.values[name]]
+    for span in RISE_TIMES:
+        rate = _round_two_digits(signals.largest(name) / span)
+        less = [_limit_rate(x, rate * signals.period) - x for x in signals.values[name]]
         bound = f"({rate:g} {unit}) / (1 s)"
         flow = f"der(late) = clip(({name} - late) / (2 ms), -{bound}, {bound})"
         told = f"{name} that follows at most {rate:g} {unit}/s"
         states = {"late": (unit, flow)}
-        yield Term(told, f"(late - {name})", (tuple(less),), states, like=name)
+        yield LibraryTerm(told, f"(late - {name})", (tuple(less),), states, unit_expression=name)
 
 
-def _followed(values: Reals, most: float) -> Reals:
+def _limit_rate(values: Reals, max_change: float) -> Reals:
     found, now = np.empty_like(values), float(values[0])
     for k, value in enumerate(values):
-        now += min(max(float(value) - now, -most), most)
+        now += min(max(float(value) - now, -max_change), max_change)
         found[k] = now
     return found
 
 
-def _lagged(values: Reals, lag: float, period: float) -> Reals:
+def _low_pass(values: Reals, lag: float, period: float) -> Reals:
     kept = np.exp(-period / lag)
     found, now = np.empty_like(values), float(values[0])
     for k, value in enumerate(values):
@@ -202,7 +202,9 @@ def _lagged(values: Reals, lag: float, period: float) -> Reals:
     return found
 
 
-def _of_angle(signals: Signals, rate: str, name: str, factor: Sequence[Reals]) -> Iterator[Term]:
+def _order_terms(
+    signals: Signals, rate: str, name: str, factor: Sequence[Reals]
+) -> Iterator[LibraryTerm]:
     angles = [np.cumsum(w) * signals.period for w in signals.values[rate]]
     fastest = signals.largest(rate) / (2.0 * np.pi)
     for order in ORDERS:
@@ -215,8 +217,8 @@ def _of_angle(signals: Signals, rate: str, name: str, factor: Sequence[Reals]) -
         told = f"order {order} of the angle of {rate}"
         told = told if name == "1" else f"{name} times {told}"
         turned = {"th": ("rad", f"der(th) = {rate}")}
-        yield Term(told, name, tuple(waves), turned, order)
+        yield LibraryTerm(told, name, tuple(waves), turned, order)
 
 
-def _rounded(value: float) -> float:
+def _round_two_digits(value: float) -> float:
     return float(f"{value:.2g}")

@@ -14,20 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from language.declaration import Parameter
-from language.known import unit_text
+from language.known import format_si_unit
 from language.model import Automaton
 
 Reals = NDArray[np.float64]
-PRIOR = 0.15
+PRIOR_STD = 0.15
 """Standard deviation of a base parameter, as a part of its value (in its logarithm)."""
-NEAR = 0.02
+NEUTRAL_OFFSET = 0.02
 """A start near the neutral value: this part of the way to the next one."""
-WIDE = 0.5
+EFFECT_PRIOR_STD = 0.5
 """Standard deviation of an effect's parameter, as a part of its range."""
 
 
 @dataclass(frozen=True)
-class Uncertain:
+class FreeParameter:
     """A parameter [SI] in its coordinate: value = start exp(sd z), or start + sd z.
 
     At `plain` the effect that brought it is a plainer one.
@@ -62,43 +62,49 @@ class Uncertain:
         return self.coordinate(self.low), self.coordinate(self.high)
 
 
-def uncertain_of(automaton: Automaton, effects: Sequence[str] = ()) -> tuple[Uncertain, ...]:
+def free_parameters_of(
+    automaton: Automaton, effects: Sequence[str] = ()
+) -> tuple[FreeParameter, ...]:
     """Return the uncertain parameters; `effects` are the names that effects have brought."""
     found = []
     for name, parameter in automaton.parameters.items():
         is_number = parameter.type == "real" and parameter.table is None
         if is_number and parameter.range and parameter.value is not None:
-            found.append(_of_effect(parameter) if name in effects else _of_base(parameter))
+            found.append(
+                _effect_parameter(parameter) if name in effects else _base_parameter(parameter)
+            )
     return tuple(found)
 
 
-def _of_base(parameter: Parameter) -> Uncertain:
+def _base_parameter(parameter: Parameter) -> FreeParameter:
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     value, unit = float(parameter.value), si_unit(parameter)
     if low >= 0.0 and value > 0.0:
         low = low if low > 0.0 else 1e-3 * value
-        return Uncertain(parameter.name, value, low, high, PRIOR, True, unit=unit)
-    return Uncertain(parameter.name, value, low, high, PRIOR * (high - low), False, unit=unit)
+        return FreeParameter(parameter.name, value, low, high, PRIOR_STD, True, unit=unit)
+    return FreeParameter(
+        parameter.name, value, low, high, PRIOR_STD * (high - low), False, unit=unit
+    )
 
 
-def _of_effect(parameter: Parameter) -> Uncertain:
+def _effect_parameter(parameter: Parameter) -> FreeParameter:
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     fitting = parameter.fitting
     value = float(parameter.value)
-    starts = _starts(parameter, value)
+    starts = _start_values(parameter, value)
     each = fitting.per == "recording"
     place = (parameter.name, value, low, high)
     unit = si_unit(parameter)
     plain = None if fitting.plain is None else float(fitting.plain)
     if low > 0.0 and value > 0.0:
-        sd = WIDE * math.log(high / low)
-        return Uncertain(*place, sd, True, each, starts, unit, plain)
-    return Uncertain(*place, WIDE * (high - low), False, each, starts, unit, plain)
+        sd = EFFECT_PRIOR_STD * math.log(high / low)
+        return FreeParameter(*place, sd, True, each, starts, unit, plain)
+    return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit, plain)
 
 
-def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:
+def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
     """Return where fits start: at the declared starts, or near the neutral value and away from it,
     or at the value.
     """
@@ -109,11 +115,11 @@ def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:
     if neutral is None or neutral == "absent" or not parameter.range:
         return (value,)
     far = 0.1 * float(parameter.range[1] - neutral)
-    return (float(neutral) + NEAR * far, float(neutral) + far)
+    return (float(neutral) + NEUTRAL_OFFSET * far, float(neutral) + far)
 
 
 def si_unit(parameter: Parameter) -> str:
     """Return the unit of a parameter's value: as it is written where that is SI."""
     unit = parameter.unit
     is_si = unit.factor == 1 and unit.offset == 0
-    return unit.text if is_si else unit_text(unit.dimension)
+    return unit.text if is_si else format_si_unit(unit.dimension)

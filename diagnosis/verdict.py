@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from diagnosis.locus import Locus
+from diagnosis.locus import Location
 
 FORMAT = "modewright-verdict/1"
-Says = Literal["effect", "nothing_missing", "unknown", "ambiguous"]
+DecisionOutcome = Literal["effect", "nothing_missing", "unknown", "ambiguous"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedEffect:
     """An effect at a place (`section.name`) with its fitted parameters."""
 
     id: str
@@ -32,7 +32,7 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedCandidate:
     """A candidate: its probability, and what it gained in training [nats], give or take `std`."""
 
     id: str
@@ -63,12 +63,12 @@ class Verdict:
     and after the effects were accepted.
     """
 
-    verdict: Says
-    effects: tuple[Named, ...]
-    candidates: tuple[Ranked, ...]
+    verdict: DecisionOutcome
+    effects: tuple[NamedEffect, ...]
+    candidates: tuple[RankedCandidate, ...]
     other: float
-    ambiguous_with: tuple[Named, ...]
-    location: tuple[Locus, ...]
+    ambiguous_with: tuple[NamedEffect, ...]
+    location: tuple[Location, ...]
     fit: Mapping[str, Mapping[str, Misfit]]
     base: Mapping[str, tuple[Quantity, Quantity]]
     confirmed: bool | None
@@ -76,14 +76,16 @@ class Verdict:
     messages: tuple[str, ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
 
-    def json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the verdict as written to `verdict.json`."""
-        loci = [locus for locus in self.location if locus.gain > 0.0 or locus.named]
-        worst = loci[0] if loci else None
+        locations = [
+            location for location in self.location if location.gain > 0.0 or location.is_accepted
+        ]
+        worst = locations[0] if locations else None
         return {
             "format": FORMAT,
             "verdict": self.verdict,
-            "effects": [_named(one) for one in self.effects],
+            "effects": [_effect_to_json(one) for one in self.effects],
             "candidates": [
                 {
                     "id": one.id,
@@ -97,8 +99,8 @@ class Verdict:
             "other": self.other,
             "ambiguous_with": [{"id": one.id, "place": one.place} for one in self.ambiguous_with],
             "location": {
-                "places": [locus.path for locus in loci],
-                "signals": [name for name, _ in worst.along] if worst else [],
+                "places": [location.path for location in locations],
+                "signals": [name for name, _ in worst.correlates] if worst else [],
                 "modes": dict(worst.modes) if worst else {},
                 "windows": [list(window) for window in worst.windows] if worst else [],
             },
@@ -107,7 +109,7 @@ class Verdict:
                 for part, signals in self.fit.items()
             },
             "base": {
-                name: {"before": _quantity(before), "after": _quantity(after)}
+                name: {"before": _quantity_to_json(before), "after": _quantity_to_json(after)}
                 for name, (before, after) in self.base.items()
             },
             "confirmed": self.confirmed,
@@ -117,13 +119,13 @@ class Verdict:
         }
 
 
-def _named(one: Named) -> dict[str, Any]:
+def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
     return {
-        "id": one.id,
-        "place": one.place,
-        "parameters": {name: _quantity(q) for name, q in one.parameters.items()},
+        "id": effect.id,
+        "place": effect.place,
+        "parameters": {name: _quantity_to_json(q) for name, q in effect.parameters.items()},
     }
 
 
-def _quantity(one: Quantity) -> dict[str, Any]:
-    return {"value": one.value, "unit": one.unit, "std": one.std}
+def _quantity_to_json(quantity: Quantity) -> dict[str, Any]:
+    return {"value": quantity.value, "unit": quantity.unit, "std": quantity.std}

@@ -10,20 +10,22 @@ import dataclasses
 from collections.abc import Sequence
 from functools import partial
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.level import first_fit, recalibrated, settled, units_of
-from diagnosis.point import extended
-from diagnosis.search import Tell, Tried
-from diagnosis.selection import Selection, selected
-from diagnosis.series import paced, require_one_pace
-from diagnosis.starting import settled_at_start, started
+from diagnosis.level import disturbance_units, fit_base, fit_with_noise, recalibrate
+from diagnosis.point import extend_vector
+from diagnosis.search import CandidateFit, LogCallback
+from diagnosis.selection import Selection, select_effects
+from diagnosis.series import require_equal_periods, resample
+from diagnosis.starting import average_initial_inputs, choose_initial_inputs
 from diagnosis.threshold import Thresholds
 
-Way = tuple[Bench, Estimate]
+RecalibratedSet = tuple[ModelSet, Estimate]
 
 
-def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
+def recalibrate_by_hold(
+    model_set: ModelSet, log: LogCallback = lambda text: None
+) -> list[RecalibratedSet]:
     """Return benches of paced recordings with their recalibrated bases, to be tried in turn.
 
     With inputs that run straight between samples the truth is reached sooner; held ones are tried
@@ -31,65 +33,69 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
     """
     firsts = []
     for is_linear in (True, False):
-        paced_ones = paced(bench.series, bench.automaton, bench.seen, is_linear)
-        require_one_pace(paced_ones)
-        own = tuple(settled_at_start(one) for one in paced_ones)
-        way = dataclasses.replace(bench, series=own)
-        candidate = way.candidate(())
-        units = units_of(candidate, own, {})
-        make = partial(first_fit, candidate, own, units)
-        first = way.kept("first fit", candidate, [units], make)
-        way = dataclasses.replace(way, series=started(first, own))
+        paced_ones = resample(
+            model_set.series, model_set.automaton, model_set.output_names, is_linear
+        )
+        require_equal_periods(paced_ones)
+        own = tuple(average_initial_inputs(one) for one in paced_ones)
+        way = dataclasses.replace(model_set, series=own)
+        candidate = way.compile_candidate(())
+        units = disturbance_units(candidate, own, {})
+        make = partial(fit_base, candidate, own, units)
+        first = way.load_or_fit("first fit", candidate, [units], make)
+        way = dataclasses.replace(way, series=choose_initial_inputs(first, own))
         firsts.append((way, first, units))
     straight, held = firsts
-    if straight[1].likelihood <= held[1].likelihood:
+    if straight[1].negative_log_likelihood <= held[1].negative_log_likelihood:
         firsts = [straight]
     found = []
     for way, first, units in firsts:
-        make = partial(recalibrated, first, way.series, units)
-        given = [first.point, first.noises, units]
-        found.append((way, way.kept("recalibrated", first.candidate, given, make)))
+        make = partial(recalibrate, first, way.series, units)
+        given = [first.point, first.noise_levels, units]
+        found.append((way, way.load_or_fit("recalibrated", first.candidate, given, make)))
     for way, base in found:
-        text = "straight between samples" if way.series[0].is_linear else "held"
-        tell(f"recalibrated, inputs {text}: {base.cost:.0f} nats")
-    is_straight = better_way(found)[0].series[0].is_linear
+        text = "straight between samples" if way.series[0].is_first_order_hold else "held"
+        log(f"recalibrated, inputs {text}: {base.cost:.0f} nats")
+    is_straight = best_hold(found)[0].series[0].is_first_order_hold
     return found[:1] if is_straight else found
 
 
-def better_way(ways: Sequence[Way]) -> Way:
+def best_hold(recalibrated: Sequence[RecalibratedSet]) -> RecalibratedSet:
     """Return the way whose base foresees the recordings better."""
-    return min(ways, key=lambda way: way[1].likelihood)
+    return min(recalibrated, key=lambda way: way[1].negative_log_likelihood)
 
 
-def chosen(
-    ways: Sequence[Way], thresholds: Thresholds, tell: Tell = lambda text: None
-) -> tuple[Bench, Estimate, Selection]:
+def select_hold(
+    recalibrated: Sequence[RecalibratedSet],
+    thresholds: Thresholds,
+    log: LogCallback = lambda text: None,
+) -> tuple[ModelSet, Estimate, Selection]:
     """Return the way in which the recordings are foreseen best with what is missing, and that.
 
     Where something was accepted in one way another is gone only if that fits better there.
     """
-    found: list[tuple[float, Bench, Estimate, Selection]] = []
-    known: tuple[Tried, ...] = ()
-    for bench, base in ways:
-        if any(not _fits_better(bench, base, selection) for *_, selection in found):
+    found: list[tuple[float, ModelSet, Estimate, Selection]] = []
+    known: tuple[CandidateFit, ...] = ()
+    for model_set, base in recalibrated:
+        if any(not _is_improved_by(model_set, base, selection) for *_, selection in found):
             continue
-        units = units_of(base.candidate, bench.series, base.values(0))
-        selection = selected(bench, base, units, thresholds, tell, known=known)
+        units = disturbance_units(base.candidate, model_set.series, base.values(0))
+        selection = select_effects(model_set, base, units, thresholds, log, earlier=known)
         known = selection.first_round if selection.accepted else ()
-        cost = selection.model.cost + thresholds.usual * len(selection.accepted)
-        found.append((cost, bench, base, selection))
-    _, bench, base, selection = min(found, key=lambda one: one[0])
-    return bench, base, selection
+        cost = selection.model.cost + thresholds.default * len(selection.accepted)
+        found.append((cost, model_set, base, selection))
+    _, model_set, base, selection = min(found, key=lambda one: one[0])
+    return model_set, base, selection
 
 
-def _fits_better(bench: Bench, base: Estimate, selection: Selection) -> bool:
+def _is_improved_by(model_set: ModelSet, base: Estimate, selection: Selection) -> bool:
     """Tell whether what was accepted in another way fits better in this one; nothing may."""
-    candidate = bench.possible([tried.layer for tried in selection.accepted])
+    candidate = model_set.try_compile([tried.placed_effect for tried in selection.accepted])
     if candidate is None or not selection.accepted:
         return True
     model = selection.model
-    units = units_of(base.candidate, bench.series, base.values(0))
-    start = extended(candidate, model.candidate, model.point, {})
-    given = (model.noises, start, units)
-    make = partial(settled, candidate, bench.series, *given)
-    return bench.kept("settled", candidate, given, make).cost < model.cost
+    units = disturbance_units(base.candidate, model_set.series, base.values(0))
+    start = extend_vector(candidate, model.candidate, model.point, {})
+    given = (model.noise_levels, start, units)
+    make = partial(fit_with_noise, candidate, model_set.series, *given)
+    return model_set.load_or_fit("settled", candidate, given, make).cost < model.cost

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimate import Estimate
-from diagnosis.series import Series
-from diagnosis.simulation import FREE, OBSERVED, free, is_free
+from diagnosis.series import SampledRecording
+from diagnosis.simulation import FREE_TIME, OBSERVED_TIME, is_free, simulate_free
 
 Reals = NDArray[np.float64]
 
@@ -25,8 +25,8 @@ class WorstWindow:
     """
 
     recording: str
-    words: str
-    alone: float
+    title: str
+    free_from: float
     times: Reals
     inputs: Reals
     measured: Reals
@@ -40,19 +40,21 @@ class WorstWindow:
 class FreeRuns:
     """Free simulations of recordings: `before` and `after`, (samples, seen) of each, in SI."""
 
-    series: Sequence[Series]
+    series: Sequence[SampledRecording]
     before: Sequence[Reals]
     after: Sequence[Reals]
     signals: tuple[str, ...]
 
 
-def free_runs(base: Estimate, model: Estimate, series: Sequence[Series]) -> FreeRuns:
+def simulate_free_runs(
+    base: Estimate, model: Estimate, series: Sequence[SampledRecording]
+) -> FreeRuns:
     """Return how both models go where they are alone."""
-    names = tuple(base.candidate.predictor.seen)
-    return FreeRuns(series, free(base, series), free(model, series), names)
+    names = tuple(base.candidate.predictor.outputs)
+    return FreeRuns(series, simulate_free(base, series), simulate_free(model, series), names)
 
 
-def by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
+def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
     """Return name and root mean squares of what is missed, before and after (seen,), in SI."""
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
@@ -62,31 +64,31 @@ def by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
     return found
 
 
-def worst_window(runs: FreeRuns, units: Sequence[str], which: str) -> WorstWindow:
+def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
     """Return the window in which the base, alone, misses most: squares over those of a signal.
 
-    `which` says in words which recordings these are.
+    `label` says in words which recordings these are.
     """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     scale = np.maximum(spread, 1e-12)
     most, place = -1.0, (0, 0)
     for k, one in enumerate(series):
-        for start in _starts(one):
-            window = _window(one, start)
-            alone = slice(start + _samples(one, OBSERVED), window.stop)
+        for start in _window_starts(one):
+            window = _window_slice(one, start)
+            alone = slice(start + _sample_count(one, OBSERVED_TIME), window.stop)
             missed = (one.measured[alone] - before[k][alone]) / scale
             squares = float(np.nansum(missed**2))
             if squares > most:
                 most, place = squares, (k, start)
     k, start = place
-    one, window = series[k], _window(series[k], start)
+    one, window = series[k], _window_slice(series[k], start)
     period = float(one.period)
     times = float(one.start) + np.arange(window.start, window.stop) * period
     return WorstWindow(
         one.name,
-        f"worst window of the {which} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
-        float(one.start) + (start + _samples(one, OBSERVED)) * period,
+        f"worst window of the {label} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
+        float(one.start) + (start + _sample_count(one, OBSERVED_TIME)) * period,
         times,
         one.inputs[window],
         one.measured[window],
@@ -97,15 +99,15 @@ def worst_window(runs: FreeRuns, units: Sequence[str], which: str) -> WorstWindo
     )
 
 
-def _samples(series: Series, seconds: float) -> int:
+def _sample_count(series: SampledRecording, seconds: float) -> int:
     return round(seconds / float(series.period))
 
 
-def _starts(series: Series) -> range:
+def _window_starts(series: SampledRecording) -> range:
     """Return the first samples of the windows that have a part in which the model is alone."""
-    last = max(1, series.count - _samples(series, OBSERVED) - 1)
-    return range(0, last, max(1, _samples(series, OBSERVED + FREE)))
+    last = max(1, series.count - _sample_count(series, OBSERVED_TIME) - 1)
+    return range(0, last, max(1, _sample_count(series, OBSERVED_TIME + FREE_TIME)))
 
 
-def _window(series: Series, start: int) -> slice:
-    return slice(start, min(series.count, start + _samples(series, OBSERVED + FREE)))
+def _window_slice(series: SampledRecording, start: int) -> slice:
+    return slice(start, min(series.count, start + _sample_count(series, OBSERVED_TIME + FREE_TIME)))

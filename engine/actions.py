@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from engine.shapes import Frame, Read
+from engine.shapes import ExpressionClosure, Frame
 
-Action = Callable[[Frame], None]
+StatementClosure = Callable[[Frame], None]
 
 
-def nothing(v: Frame) -> None:
+def no_op(v: Frame) -> None:
     """Do nothing."""
 
 
-def in_turn(actions: Sequence[Action]) -> Action:
+def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
     """Return what does some actions one after the other."""
-    match [action for action in actions if action is not nothing]:
+    match [action for action in statements if action is not no_op]:
         case []:
-            return nothing
+            return no_op
         case [only]:
             return only
         case [first, second]:
@@ -35,16 +35,16 @@ def in_turn(actions: Sequence[Action]) -> Action:
                 third(v)
 
             return three
-        case every:
+        case all_statements:
 
             def act(v: Frame) -> None:
-                for action in every:
+                for action in all_statements:
                     action(v)
 
             return act
 
 
-def assign(targets: Sequence[int], values: Sequence[Read]) -> Action:
+def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> StatementClosure:
     """Return what sets one to four variables, one after the other."""
     match targets, values:
         case [s], [a]:
@@ -80,7 +80,7 @@ def assign(targets: Sequence[int], values: Sequence[Read]) -> Action:
     raise ValueError(f"{len(targets)} variables")
 
 
-def copy(targets: Sequence[int], sources: Sequence[int]) -> Action:
+def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
     """Return what copies one to four variables, one after the other."""
     match targets, sources:
         case [s], [a]:
@@ -116,7 +116,7 @@ def copy(targets: Sequence[int], sources: Sequence[int]) -> Action:
     raise ValueError(f"{len(targets)} variables")
 
 
-def store(slot: int, index: Read, value: Read) -> Action:
+def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> StatementClosure:
     """Return what sets one element of an array."""
 
     def act(v: Frame) -> None:
@@ -125,39 +125,41 @@ def store(slot: int, index: Read, value: Read) -> Action:
     return act
 
 
-def branch(condition: Read, then: Action, other: Action) -> Action:
+def branch(
+    condition: ExpressionClosure, if_true: StatementClosure, if_false: StatementClosure
+) -> StatementClosure:
     """Return what does one of two actions; a condition changes nothing."""
-    if then is nothing and other is nothing:
-        return nothing
-    if other is nothing:
+    if if_true is no_op and if_false is no_op:
+        return no_op
+    if if_false is no_op:
 
         def act_or_not(v: Frame) -> None:
             if condition(v):
-                then(v)
+                if_true(v)
 
         return act_or_not
 
     def act(v: Frame) -> None:
         if condition(v):
-            then(v)
+            if_true(v)
         else:
-            other(v)
+            if_false(v)
 
     return act
 
 
-def choose(slot: int, table: Mapping[int, Action]) -> Action:
+def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementClosure:
     """Return what does the action of the number that a variable has."""
-    if all(action is nothing for action in table.values()):
-        return nothing
+    if all(action is no_op for action in table.values()):
+        return no_op
 
     def act(v: Frame) -> None:
-        table.get(v[slot], nothing)(v)
+        table.get(v[slot], no_op)(v)
 
     return act
 
 
-def loop(count: int, slot: int, body: Action) -> Action:
+def loop(count: int, slot: int, body: StatementClosure) -> StatementClosure:
     """Return what does an action a number of times."""
 
     def act(v: Frame) -> None:
@@ -168,7 +170,9 @@ def loop(count: int, slot: int, body: Action) -> Action:
     return act
 
 
-def loop_while(count: int, slot: int, condition: Read, body: Action) -> Action:
+def loop_while(
+    count: int, slot: int, condition: ExpressionClosure, body: StatementClosure
+) -> StatementClosure:
     """Return what does an action a number of times, but no longer than a condition holds.
 
     Once that is false it stays so: nothing else is done in the loop.
@@ -184,7 +188,7 @@ def loop_while(count: int, slot: int, condition: Read, body: Action) -> Action:
     return act
 
 
-def count(slot: int, condition: Read, limit: int) -> Action:
+def count_while(slot: int, condition: ExpressionClosure, limit: int) -> StatementClosure:
     """Return what counts up to a limit while a condition holds, else back to 0."""
 
     def act(v: Frame) -> None:
@@ -197,18 +201,18 @@ def count(slot: int, condition: Read, limit: int) -> Action:
     return act
 
 
-def fault(slot: int, bit: int, signal: str, left: int) -> Action:
+def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> StatementClosure:
     """Return what sets a fault bit, and notes the signal that left its range."""
 
     def act(v: Frame) -> None:
         v[slot] |= bit
         if signal:
-            v[left][signal] = None
+            v[violations_slot][signal] = None
 
     return act
 
 
-def clear(slot: int, bit: int) -> Action:
+def clear_fault(slot: int, bit: int) -> StatementClosure:
     """Return what clears a fault bit."""
 
     def act(v: Frame) -> None:

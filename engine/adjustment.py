@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from engine.batch import Batch
 from engine.starting import programs_of
-from engine.stimulus import resolved
+from engine.stimulus import resolve_recording
 from language.declaration import Formula, Parameter
 from language.experiment import Scenario, System
 from language.model import Automaton
@@ -27,14 +27,14 @@ from language.problem import SpecError
 from language.program import Program
 from language.syntax import Name
 
-Ends = tuple[float, float]
+Bounds = tuple[float, float]
 """The least and the largest value of a parameter."""
-START = "start_of_{}"
+INITIAL_PARAMETER = "start_of_{}"
 """The name of the parameter that a swept initial value becomes."""
 
 
 @dataclass(frozen=True)
-class Adjustment:
+class ParameterBinding:
     """How a batch is carried out: `system` and `scenario` in which swept values are tunable.
 
     `tuned` gives for each swept name its instance and tunable parameter; `rebuilt` says why a name
@@ -45,101 +45,115 @@ class Adjustment:
     system: System
     scenario: Scenario
     programs: Mapping[str, Program]
-    tuned: Mapping[str, tuple[str, str]]
-    rebuilt: Mapping[str, str]
-    ends: Mapping[str, Ends] = field(default_factory=dict)
+    tunables: Mapping[str, tuple[str, str]]
+    rebuild_reasons: Mapping[str, str]
+    bounds: Mapping[str, Bounds] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Group:
+class ProgramGroup:
     """Variants (places in the batch) that share their Programs."""
 
     variants: NDArray[np.int64]
-    adjustment: Adjustment
+    binding: ParameterBinding
 
 
-def adjusted(batch: Batch) -> Adjustment:
+def bind_parameters(batch: Batch) -> ParameterBinding:
     """Return how the names of a batch are swept.
 
     Raises ValueError for a name that is not there, SpecError for a value that no Program takes.
     """
-    require_known(batch)
-    scenario = _without_initial(resolved(batch.system, batch.scenario), batch)
-    met = ends_of(batch)
-    for ends in (declared, met) if (declared := _declared(batch, met)) != met else (met,):
-        at_once = _all_tunable(batch, scenario, ends)
-        if at_once:
-            return at_once
+    require_known_names(batch)
+    scenario = _without_initial(resolve_recording(batch.system, batch.scenario), batch)
+    seen_bounds = value_bounds(batch)
+    for ends in (
+        (declared, seen_bounds)
+        if (declared := _declared_bounds(batch, seen_bounds)) != seen_bounds
+        else (seen_bounds,)
+    ):
+        shared_binding = _bind_all_tunable(batch, scenario, ends)
+        if shared_binding:
+            return shared_binding
     arrays = {**batch.parameters, **batch.initial}
-    rebuilt: dict[str, str] = {}
-    system, tuned = batch.system, {}
+    rebuild_reasons: dict[str, str] = {}
+    system, tunables = batch.system, {}
     for name in dict.fromkeys([*batch.parameters, *batch.initial]):
-        reason = None if name in batch.initial else _why_rebuilt(batch, scenario, name)
+        reason = None if name in batch.initial else _rebuild_reason(batch, scenario, name)
         if reason:
-            rebuilt[name] = reason
+            rebuild_reasons[name] = reason
         else:
-            tuned[name] = _tunable_of(name, batch)
-            system = _tuned(system, name, batch, float(arrays[name][0]))
-    return Adjustment(system, scenario, programs_of(system, scenario), tuned, rebuilt)
+            tunables[name] = _tunable_of(name, batch)
+            system = _with_tunable(system, name, batch, float(arrays[name][0]))
+    return ParameterBinding(
+        system, scenario, programs_of(system, scenario), tunables, rebuild_reasons
+    )
 
 
-def ends_of(batch: Batch) -> dict[str, Ends]:
+def value_bounds(batch: Batch) -> dict[str, Bounds]:
     """Return between which values [SI] the parameters of a batch are."""
     return {name: (float(min(v)), float(max(v))) for name, v in batch.parameters.items()}
 
 
-def _declared(batch: Batch, met: Mapping[str, Ends]) -> dict[str, Ends]:
+def _declared_bounds(batch: Batch, seen_bounds: Mapping[str, Bounds]) -> dict[str, Bounds]:
     """Return the declared ranges of parameters that have one, where all values are inside."""
-    found = {}
-    for name, (low, high) in met.items():
+    bounds = {}
+    for name, (low, high) in seen_bounds.items():
         owner, _, short = name.partition(".")
         declared = batch.system.instances[owner].automaton.parameters[short].range
         first, last = map(float, declared) if declared else (low, high)
-        found[name] = (first, last) if first <= low and high <= last else (low, high)
-    return found
+        bounds[name] = (first, last) if first <= low and high <= last else (low, high)
+    return bounds
 
 
-def _all_tunable(batch: Batch, scenario: Scenario, ends: Mapping[str, Ends]) -> Adjustment | None:
+def _bind_all_tunable(
+    batch: Batch, scenario: Scenario, bounds: Mapping[str, Bounds]
+) -> ParameterBinding | None:
     """Return the Programs in which all names are tunable, where nothing but values differs."""
     names = list(dict.fromkeys([*batch.parameters, *batch.initial]))
-    systems, made = [], []
+    systems, program_sets = [], []
     try:
         for end in range(2):
             system = batch.system
             for name in names:
-                value = ends[name][end] if name in ends else 0.0
-                system = _tuned(system, name, batch, value)
+                value = bounds[name][end] if name in bounds else 0.0
+                system = _with_tunable(system, name, batch, value)
             systems.append(system)
-            made.append(programs_of(system, scenario))
+            program_sets.append(programs_of(system, scenario))
     except SpecError:
         return None
-    if any(_is_no_real(made[0], name) for name in names):
+    if any(_is_not_real(program_sets[0], name) for name in names):
         return None
-    low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in made)
-    tuned = {name: _tunable_of(name, batch) for name in names}
-    return Adjustment(systems[0], scenario, made[0], tuned, {}, ends) if low == high else None
+    low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in program_sets)
+    tunables = {name: _tunable_of(name, batch) for name in names}
+    return (
+        ParameterBinding(systems[0], scenario, program_sets[0], tunables, {}, bounds)
+        if low == high
+        else None
+    )
 
 
-def groups(batch: Batch) -> list[Group]:
+def group_variants(batch: Batch) -> list[ProgramGroup]:
     """Return the variants of a batch by the values that need a Program of their own."""
-    adjustment = adjusted(batch)
-    if not adjustment.rebuilt:
-        return [Group(np.arange(batch.count), adjustment)]
-    names = list(adjustment.rebuilt)
+    binding = bind_parameters(batch)
+    if not binding.rebuild_reasons:
+        return [ProgramGroup(np.arange(batch.count), binding)]
+    names = list(binding.rebuild_reasons)
     table = np.stack([batch.parameters[name] for name in names], axis=1)
-    rows, of = np.unique(table, axis=0, return_inverse=True)
-    found = []
+    rows, row_of_variant = np.unique(table, axis=0, return_inverse=True)
+    result = []
     for number, row in enumerate(rows):
-        system = adjustment.system
+        system = binding.system
         for name, value in zip(names, row.tolist(), strict=True):
-            system = _valued(system, name, value)
-        programs = programs_of(system, adjustment.scenario)
-        own = dataclasses.replace(adjustment, system=system, programs=programs)
-        found.append(Group(np.flatnonzero(of.reshape(-1) == number), own))
-    return found
+            system = _with_parameter_value(system, name, value)
+        programs = programs_of(system, binding.scenario)
+        group_binding = dataclasses.replace(binding, system=system, programs=programs)
+        result.append(
+            ProgramGroup(np.flatnonzero(row_of_variant.reshape(-1) == number), group_binding)
+        )
+    return result
 
 
-def require_known(batch: Batch) -> None:
+def require_known_names(batch: Batch) -> None:
     """Raise ValueError for a name that is not there, or for arrays of another length."""
     for name in batch.parameters:
         owner, _, short = name.partition(".")
@@ -158,8 +172,10 @@ def require_known(batch: Batch) -> None:
     for name, values in arrays.items():
         if len(values) != batch.count or not np.all(np.isfinite(values)):
             raise ValueError(f"`{name}` needs {batch.count} finite values")
-    if len(batch.courses) not in (0, batch.count):
-        raise ValueError(f"{len(batch.courses)} courses are not those of {batch.count} variants")
+    if len(batch.variant_inputs) not in (0, batch.count):
+        raise ValueError(
+            f"{len(batch.variant_inputs)} courses are not those of {batch.count} variants"
+        )
     for name, table in batch.inputs.items():
         if name not in batch.system.inputs:
             raise ValueError(f"`{name}` is no input of {batch.system.name}")
@@ -170,30 +186,30 @@ def require_known(batch: Batch) -> None:
         ):
             raise ValueError(f"`{name}` needs a value for each start, the first at 0 s")
     known = (*batch.system.signals, *batch.system.inputs)
-    for name in (*batch.outputs, *(measure.signal for measure in batch.measures)):
+    for name in (*batch.outputs, *(measure.signal for measure in batch.statistics)):
         if name not in known:
             raise ValueError(f"`{name}` is no signal of {batch.system.name}")
 
 
 def _without_initial(scenario: Scenario, batch: Batch) -> Scenario:
     kept = {name: value for name, value in scenario.initial.items() if name not in batch.initial}
-    signals = tuple(dict.fromkeys([*batch.outputs, *(m.signal for m in batch.measures)]))
+    signals = tuple(dict.fromkeys([*batch.outputs, *(m.signal for m in batch.statistics)]))
     return dataclasses.replace(scenario, initial=kept, signals=signals or scenario.signals[:1])
 
 
 def _tunable_of(name: str, batch: Batch) -> tuple[str, str]:
     owner, _, short = name.partition(".")
-    return owner, START.format(short) if name in batch.initial else short
+    return owner, INITIAL_PARAMETER.format(short) if name in batch.initial else short
 
 
-def _tuned(system: System, name: str, batch: Batch, first: float) -> System:
+def _with_tunable(system: System, name: str, batch: Batch, first: float) -> System:
     """Return a system in which a name is tunable; a parameter has the value `first` until then."""
     owner, _, short = name.partition(".")
     automaton = system.instances[owner].automaton
     parameters, states = dict(automaton.parameters), dict(automaton.states)
     if name not in batch.initial:
-        return _as_tunable(_valued(system, name, first), owner, short)
-    state, fresh = states[short], START.format(short)
+        return _with_tunable_parameter(_with_parameter_value(system, name, first), owner, short)
+    state, fresh = states[short], INITIAL_PARAMETER.format(short)
     key, span = f"parameters.{fresh}", state.span
     parameters[fresh] = Parameter(fresh, "tunable", state.unit, Fraction(0), None, None, key, span)
     formula = Formula(Name(fresh, span), state.initial.key)
@@ -202,7 +218,7 @@ def _tuned(system: System, name: str, batch: Batch, first: float) -> System:
     return _with_automaton(system, owner, changed)
 
 
-def _valued(system: System, name: str, value: float) -> System:
+def _with_parameter_value(system: System, name: str, value: float) -> System:
     """Return the system with a parameter set, in an automaton and in the model that it knows."""
     owner, _, short = name.partition(".")
     exact = Fraction(repr(float(value)))  # the decimal that was meant: a wait of 2 ms is two ticks
@@ -225,33 +241,39 @@ def _with_automaton(system: System, owner: str, automaton: Automaton) -> System:
     return dataclasses.replace(system, instances={**system.instances, owner: instance})
 
 
-def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
+def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
     """Return why a parameter needs a Program per value: more than a calibration follows from it."""
     owner, _, short = name.partition(".")
     values = batch.parameters[name]
-    own = _alone(batch.system, owner)
-    ends = [_valued(own, name, end) for end in sorted({float(min(values)), float(max(values))})]
+    own = _single_instance_system(batch.system, owner)
+    ends = [
+        _with_parameter_value(own, name, end)
+        for end in sorted({float(min(values)), float(max(values))})
+    ]
     for system in ends:
         programs_of(system, scenario)
     try:
-        made = [programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends]
+        candidate_programs = [
+            programs_of(_with_tunable_parameter(system, owner, short), scenario)[owner]
+            for system in ends
+        ]
     except SpecError as error:
         return f"{error.problems[0].label}: a Program for each value"
-    if _is_no_real({owner: made[0]}, name):
+    if _is_not_real({owner: candidate_programs[0]}, name):
         return f"`{name}` is a whole number in C: a Program for each value"
-    if len({digest(_without_values(program)) for program in made}) == 1:
+    if len({digest(_without_values(program)) for program in candidate_programs}) == 1:
         return None
     return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
 
 
-def _is_no_real(programs: Mapping[str, Program], name: str) -> bool:
+def _is_not_real(programs: Mapping[str, Program], name: str) -> bool:
     """Tell whether a tunable is no real in its Program: a wait is kept in ticks."""
     owner, _, own = name.partition(".")
     constants = programs[owner].constants if owner in programs else ()
     return any(c.name == f"calibration.{own}" and c.type != "real" for c in constants)
 
 
-def _alone(system: System, owner: str) -> System:
+def _single_instance_system(system: System, owner: str) -> System:
     """Return a system of one instance: its Program does not depend on those of the others."""
     connections = {key: wire for key, wire in system.connections.items() if key[0] == owner}
     instances = {owner: system.instances[owner]}
@@ -267,7 +289,7 @@ def _without_values(program: Program) -> Program:
     return dataclasses.replace(program, constants=constants)
 
 
-def _as_tunable(system: System, owner: str, short: str) -> System:
+def _with_tunable_parameter(system: System, owner: str, short: str) -> System:
     automaton = system.instances[owner].automaton
     parameter = dataclasses.replace(automaton.parameters[short], kind="tunable")
     parameters = {**automaton.parameters, short: parameter}

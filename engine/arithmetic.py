@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from language.evaluate import EXACT, divide
+from language.evaluate import ELEMENTARY_BY_TYPE, divide
 from language.number import NumberType
 
 
@@ -27,34 +27,36 @@ class Arithmetic:
     real: Callable[[Any], Any]
     divide: Callable[[Any, Any], Any]
     elementary: Mapping[str, Callable[..., Any]]
-    quiet: Callable[[], AbstractContextManager[None]]
-    plain: Callable[[Any], Any]
+    suppress_warnings: Callable[[], AbstractContextManager[None]]
+    to_python: Callable[[Any], Any]
 
-    def value(self, value: float | int | bool) -> Any:
+    def to_frame_value(self, value: float | int | bool) -> Any:
         """Return a value as it stands in a frame: reals in the type, the others as they are."""
         return self.real(value) if isinstance(value, float) else value
 
 
-def _rounded(function: Callable[..., Any]) -> Callable[..., Any]:
+def _round_to_single(function: Callable[..., Any]) -> Callable[..., Any]:
     """An operation of doubles whose result is exact or rounded once, as one of float32."""
     return lambda *arguments: np.float32(function(*arguments))
 
 
-def _ieee() -> AbstractContextManager[None]:
+def _ignore_float_errors() -> AbstractContextManager[None]:
     """Overflow, division by zero and NaN are values, not warnings."""
     return np.errstate(all="ignore")
 
 
-ARITHMETIC: Mapping[NumberType, Arithmetic] = {
-    "float64": Arithmetic(float, divide, EXACT["float64"], nullcontext, lambda value: value),
+ARITHMETIC_OF_TYPE: Mapping[NumberType, Arithmetic] = {
+    "float64": Arithmetic(
+        float, divide, ELEMENTARY_BY_TYPE["float64"], nullcontext, lambda value: value
+    ),
     "float32": Arithmetic(
         np.float32,
         lambda a, b: a / b,
         {
-            name: function if name == "whole" else _rounded(function)
-            for name, function in EXACT["float32"].items()
+            name: function if name == "whole" else _round_to_single(function)
+            for name, function in ELEMENTARY_BY_TYPE["float32"].items()
         },
-        _ieee,
+        _ignore_float_errors,
         lambda value: value.item() if isinstance(value, np.generic) else value,
     ),
 }

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 
 
-def arrow_for(what: str, instead: str = "") -> ModuleType:
-    """Return pyarrow for what needs it. Raises ToolMissing, with what to do `instead`."""
+def import_pyarrow(feature: str, hint: str = "") -> ModuleType:
+    """Return pyarrow for what needs it. Raises ToolMissing, with what to do `hint`."""
     try:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise ToolMissing(
-            f"{what} needs the package `pyarrow`: pip install 'modewright[parquet]'{instead}"
+        raise MissingToolError(
+            f"{feature} needs the package `pyarrow`: pip install 'modewright[parquet]'{hint}"
         ) from None
     found: ModuleType = pyarrow
     return found

@@ -11,25 +11,25 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
-from engine.trajectory import Trajectory, Values
+from engine.trajectory import SignalArray, Trajectory
 from language.wiring import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
 """Colours that colour-blind readers tell apart (Tol 2021, bright)."""
 INACTIVE_COLOUR = "#dddddd"
 """Of a region that is in none of its modes, which is no mode of its own."""
-LIGHT, DARK = 0.55, 0.45
+LIGHTEN_SHARE, DARKEN_SHARE = 0.55, 0.45
 """By how much the palette is mixed with white, then with black, for more modes than colours."""
-LIGHTEST = 0.6
+BLACK_TEXT_BRIGHTNESS = 0.6
 """Brightness from which a name is written in black."""
-BORDER = 0.8
+BORDER_WIDTH = 0.8
 """Width of the line between two stretches, at most a quarter of a stretch [points]."""
-ROOM = 0.94
+LABEL_FILL = 0.94
 """The part of a stretch that its name may fill."""
 
 
 @dataclass(frozen=True)
-class Band:
+class ModeBand:
     """One strip: its label, the mode signal, and the run that it is of."""
 
     label: str
@@ -38,7 +38,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class ModeSegment:
     """A time in one mode [s], as far as it is shown."""
 
     start: float
@@ -48,90 +48,90 @@ class Stretch:
 
 
 def draw_band(
-    axis: Axes, trajectory: Trajectory, band: Band, window: tuple[float, float]
-) -> list[Stretch]:
+    axis: Axes, trajectory: Trajectory, band: ModeBand, window: tuple[float, float]
+) -> list[ModeSegment]:
     """Draw a strip with a legend of all its modes; return what `name_stretches` names."""
     names = trajectory.modes[band.signal]
-    runs = _runs(trajectory.times, trajectory.signals[band.signal])
-    colours = _colours(names, [number for *_, number in runs])
+    runs = _equal_mode_runs(trajectory.times, trajectory.signals[band.signal])
+    colours = _assign_colours(names, [number for *_, number in runs])
     width = 72.0 * axis.figure.get_figure(root=True).get_figwidth() / (window[1] - window[0])
-    found = []
+    segments = []
     for start, end, number in runs:
         left, right = max(start, window[0]), min(end, window[1])
         if right <= left and start != end:
             continue
         colour = colours[number]
-        border = min(BORDER, 0.25 * (right - left) * width)
+        border = min(BORDER_WIDTH, 0.25 * (right - left) * width)
         axis.axvspan(start, end, facecolor=colour, edgecolor="white", lw=border)
-        found.append(Stretch(left, right, names.get(number, str(number)), colour))
-    _legend(axis, {stretch.name: stretch.colour for stretch in found})
+        segments.append(ModeSegment(left, right, names.get(number, str(number)), colour))
+    _draw_legend(axis, {stretch.name: stretch.colour for stretch in segments})
     axis.set_yticks([0.5], [band.label], fontsize=8)
     axis.set_ylim(0.0, 1.0)
     axis.tick_params(length=0, labelbottom=False)
     for side in axis.spines.values():
         side.set_visible(False)
-    return found
+    return segments
 
 
-def name_stretches(axis: Axes, stretches: Sequence[Stretch]) -> None:
+def label_segments(axis: Axes, segments: Sequence[ModeSegment]) -> None:
     """Name the stretches into which their name fits whole; the legend keeps the other modes.
 
     The axes must have their places: the legend can only become narrower.
     """
     left, right = axis.get_xlim()
-    room = ROOM * axis.get_window_extent().width / (right - left)
-    named = set()
+    points_per_second = LABEL_FILL * axis.get_window_extent().width / (right - left)
+    labelled = set()
     widths: dict[str, float] = {}
-    for stretch in stretches:
+    for segment in segments:
         text = axis.text(
-            0.5 * (stretch.start + stretch.end), 0.5, stretch.name, fontsize=8,
-            ha="center", va="center", color=_ink(stretch.colour), parse_math=False,
+            0.5 * (segment.start + segment.end), 0.5, segment.name, fontsize=8,
+            ha="center", va="center", color=_text_colour(segment.colour), parse_math=False,
         )  # fmt: skip
-        if stretch.name not in widths:
-            widths[stretch.name] = text.get_window_extent().width
-        if widths[stretch.name] <= room * (stretch.end - stretch.start):
-            named.add(stretch.name)
+        if segment.name not in widths:
+            widths[segment.name] = text.get_window_extent().width
+        if widths[segment.name] <= points_per_second * (segment.end - segment.start):
+            labelled.add(segment.name)
         else:
             text.remove()
-    _legend(axis, {each.name: each.colour for each in stretches if each.name not in named})
+    _draw_legend(axis, {each.name: each.colour for each in segments if each.name not in labelled})
 
 
-def _colours(names: Mapping[int, str], shown: Sequence[int]) -> dict[int, str]:
+def _assign_colours(names: Mapping[int, str], sequence: Sequence[int]) -> dict[int, str]:
     """Return a colour for each mode; those that follow each other have never the same one."""
     wheel = [
         *PALETTE,
-        *(_mixed(colour, 1.0, LIGHT) for colour in PALETTE),
-        *(_mixed(colour, 0.0, DARK) for colour in PALETTE),
+        *(_mix_colour(colour, 1.0, LIGHTEN_SHARE) for colour in PALETTE),
+        *(_mix_colour(colour, 0.0, DARKEN_SHARE) for colour in PALETTE),
     ]
-    beside: dict[int, set[int]] = {}
-    for one, other in itertools.pairwise(shown):
-        beside.setdefault(one, set()).add(other)
-        beside.setdefault(other, set()).add(one)
-    found: dict[int, str] = {}
-    numbers = sorted({*names, *shown})
+    neighbours: dict[int, set[int]] = {}
+    for one, other in itertools.pairwise(sequence):
+        neighbours.setdefault(one, set()).add(other)
+        neighbours.setdefault(other, set()).add(one)
+    assigned: dict[int, str] = {}
+    numbers = sorted({*names, *sequence})
     active = [number for number in numbers if names.get(number) != INACTIVE]
     for k, number in enumerate(active):
-        taken = {found[other] for other in beside.get(number, ()) if other in found}
-        turned = wheel[k % len(wheel) :] + wheel[: k % len(wheel)]
-        found[number] = next((colour for colour in turned if colour not in taken), turned[0])
-    return dict.fromkeys(numbers, INACTIVE_COLOUR) | found
+        used = {assigned[other] for other in neighbours.get(number, ()) if other in assigned}
+        rotated = wheel[k % len(wheel) :] + wheel[: k % len(wheel)]
+        assigned[number] = next((colour for colour in rotated if colour not in used), rotated[0])
+    return dict.fromkeys(numbers, INACTIVE_COLOUR) | assigned
 
 
-def _mixed(colour: str, other: float, share: float) -> str:
+def _mix_colour(colour: str, brightness: float, share: float) -> str:
     """Return a colour mixed with white, 1, or black, 0."""
-    red, green, blue = ((1.0 - share) * part + share * other for part in to_rgb(colour))
+    red, green, blue = ((1.0 - share) * part + share * brightness for part in to_rgb(colour))
     return to_hex((red, green, blue))
 
 
-def _ink(colour: str) -> str:
+def _text_colour(colour: str) -> str:
     red, green, blue = to_rgb(colour)
-    return "black" if 0.3 * red + 0.59 * green + 0.11 * blue > LIGHTEST else "white"
+    return "black" if 0.3 * red + 0.59 * green + 0.11 * blue > BLACK_TEXT_BRIGHTNESS else "white"
 
 
-def _legend(axis: Axes, colours: dict[str, str]) -> None:
-    before = axis.get_legend()
-    if before:
-        before.remove()
+def _draw_legend(axis: Axes, colours: dict[str, str]) -> None:
+    old_legend = axis.get_legend()
+    if old_legend:
+        old_legend.remove()
     if colours:
         patches = [Patch(color=colour, label=name) for name, colour in colours.items()]
         axis.legend(
@@ -140,7 +140,7 @@ def _legend(axis: Axes, colours: dict[str, str]) -> None:
         )  # fmt: skip
 
 
-def _runs(times: Values, modes: Values) -> list[tuple[float, float, int]]:
+def _equal_mode_runs(times: SignalArray, modes: SignalArray) -> list[tuple[float, float, int]]:
     """Return the stretches of equal mode as start, end, number."""
     if len(times) == 0:
         return []

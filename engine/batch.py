@@ -20,13 +20,13 @@ from language.model import CHART
 from language.signal import Stimulus
 
 Reals = NDArray[np.float64]
-MeasureKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]
+StatisticKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]
 NO_EVENT = -1
 """What fills `BatchResult.event_kinds` behind the last event of a variant."""
 
 
 @dataclass(frozen=True)
-class Measure:
+class SignalStatistic:
     """One number of a signal over its rows from `since` to `until` [s], ends included.
 
     `peak` is the largest magnitude. Rows are those of the scenario's `record`. Without rows in the
@@ -35,7 +35,7 @@ class Measure:
 
     name: str
     signal: str
-    kind: MeasureKind
+    kind: StatisticKind
     since: Fraction = Fraction(0)
     until: Fraction | None = None
 
@@ -67,10 +67,10 @@ class Batch:
     initial: Mapping[str, Reals] = field(default_factory=dict)
     inputs: Mapping[str, InputTable] = field(default_factory=dict)
     seeds: NDArray[np.int64] | None = None
-    courses: Sequence[Mapping[str, Stimulus]] = ()
-    measures: tuple[Measure, ...] = ()
+    variant_inputs: Sequence[Mapping[str, Stimulus]] = ()
+    statistics: tuple[SignalStatistic, ...] = ()
     outputs: tuple[str, ...] = ()
-    most_events: int = 0
+    max_events: int = 0
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class BatchResult:
     what did the work.
     """
 
-    measures: Mapping[str, Reals]
+    statistics: Mapping[str, Reals]
     outputs: Mapping[str, Reals]
     times: Reals
     kinds: tuple[EventKind, ...]
@@ -108,7 +108,7 @@ class BatchResult:
     note: str = ""
 
 
-class Runner(Protocol):
+class BatchRunner(Protocol):
     """What carries a batch out; results do not depend on which one does, nor on threads."""
 
     def __call__(self, batch: Batch) -> BatchResult:

@@ -13,20 +13,20 @@ import numpy as np
 
 from engine.recorded_csv import DECIMAL
 from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
-from language.experiment import Column, RecordingMap
-from language.problem import Problems, Span, nearest
-from language.units import Unit, UnitError, fits, parse_unit
+from language.experiment import ColumnMapping, RecordingMap
+from language.problem import Problems, Span, suggest_name
+from language.units import Unit, UnitError, are_compatible, parse_unit
 
-LONGEST_STAMP = 40
-LATEST_TIME = 10**12
+MAX_STAMP_LENGTH = 40
+TIME_LIMIT = 10**12
 """Time stamps are below this, in their unit."""
-STAMP = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
-STAMPS = re.compile(rf"(?:{STAMP}\n)*+{STAMP}", re.ASCII)
+STAMP_PATTERN = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+STAMP_LINES = re.compile(rf"(?:{STAMP_PATTERN}\n)*+{STAMP_PATTERN}", re.ASCII)
 """Numbers without an exponent alone, one a line: most columns of time are such."""
-MOST_KEPT = 2**16
+STAMP_CACHE_SIZE = 2**16
 """Time stamps that are kept: recordings of one logger have the same ones."""
-TENS = [10**k for k in range(LONGEST_STAMP + 1)]
-OTHER_WORDS = {
+POWERS_OF_TEN = [10**k for k in range(MAX_STAMP_LENGTH + 1)]
+LOGGER_UNITS = {
     "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
     "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
 }  # fmt: skip
@@ -41,7 +41,7 @@ def require_names(
         count = list(file.names).count(name)
         if not count:
             label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
-            hint = file.lacking(name) or nearest(name, file.names)
+            hint = file.explain_missing(name) or suggest_name(name, file.names)
             problems.error("column", file.head, label, hint)
         elif count > 1:
             problems.error("column", file.head, f"there are two {file.noun}s `{name}`")
@@ -63,31 +63,31 @@ class ChannelReader:
         self.clock = [] if file.is_stamped else self.times(mapping.time)
 
     @cached_property
-    def whole(self) -> tuple[Fraction, ...]:
+    def shared_times(self) -> tuple[Fraction, ...]:
         """The time stamps that the rows share; empty where one is blank."""
         known = tuple(time for time in self.clock if time is not None)
         return known if len(known) == len(self.clock) else ()
 
     @property
-    def is_full(self) -> bool:
+    def has_max_problems(self) -> bool:
         """Tell whether so many problems were found that the rest is not looked at."""
-        return len(self.problems.found) >= MAX_PROBLEMS
+        return len(self.problems.reported) >= MAX_PROBLEMS
 
     def times(self, name: str) -> list[Fraction | None]:
         """Return the time stamps of a column [s]; None where it is blank."""
         samples = self.file.read(name)
         factor = self.mapping.time_unit.factor
-        plain = None if self.is_full else _plain(samples)
+        plain = None if self.has_max_problems else _parse_plain_stamps(samples)
         if plain is not None:
             return [value * factor for value in plain] if factor != 1 else [*plain]
         found: list[Fraction | None] = []
         last: Fraction | None = None
         rounded = -math.inf
         for k in range(len(samples.values)):
-            if self.is_full:
+            if self.has_max_problems:
                 break
             text = samples.text(k)
-            value = _exact(text)
+            value = _parse_stamp(text)
             if value is not None:
                 value = value * factor if factor != 1 else value
             elif name == self.mapping.time or text:
@@ -96,17 +96,19 @@ class ChannelReader:
             if value is not None:
                 number = samples.values[k] or 0.0
                 if last is not None and number <= rounded and value <= last:
-                    self._unsorted(text, last, samples.place(k))
+                    self._report_unsorted(text, last, samples.place(k))
                 last, rounded = value, number
             found.append(value)
         return found
 
-    def _unsorted(self, text: str, last: Fraction, place: Span) -> None:
+    def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
         label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
         hint = "sort the recording, and remove repeated rows"
         self.problems.error("time", place, label, hint)
 
-    def _own(self, column: Column, parts: Sequence[Samples]) -> Sequence[Fraction | None]:
+    def _own_stamps(
+        self, column: ColumnMapping, parts: Sequence[Samples]
+    ) -> Sequence[Fraction | None]:
         """Return the stamps that the parts of a column carry themselves."""
         stamps = parts[0].stamps or ()
         if any(part.stamps != stamps for part in parts[1:]):
@@ -114,15 +116,15 @@ class ChannelReader:
             hint = "a mean is taken of values that were measured together"
             self.problems.error("time", column.span, label, hint)
         for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
-            if after <= before and not self.is_full:
-                self._unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+            if after <= before and not self.has_max_problems:
+                self._report_unsorted(f"{float(after):.9g}", before, parts[0].place(k))
         return stamps
 
-    def samples(self, column: Column) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
+    def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
         """Return time stamps [s] and values in SI of a column of the map."""
         parts = [self.file.read(name) for name in column.columns]
         if self.file.is_stamped:
-            stamps = self._own(column, parts)
+            stamps = self._own_stamps(column, parts)
         else:
             stamps = self.times(column.time) if column.time else self.clock
         cells = [
@@ -130,13 +132,13 @@ class ChannelReader:
             for name, part in zip(column.columns, parts, strict=True)
         ]
         times: list[Fraction] = []
-        kept: list[float] = []
+        values_si: list[float] = []
         scale = float(column.scale[0]) * column.sign
-        means = cells[0] if len(cells) == 1 else _means(cells)
-        if stamps is self.clock and len(self.whole) == len(means) > 0 and not column.delay:
-            values = _scaled(means, scale)
+        means = cells[0] if len(cells) == 1 else _row_means(cells)
+        if stamps is self.clock and len(self.shared_times) == len(means) > 0 and not column.delay:
+            values = _scale_all(means, scale)
             if values is not None:
-                return self.whole, tuple(values)
+                return self.shared_times, tuple(values)
         for k, (stamp, mean) in enumerate(zip(stamps, means, strict=False)):
             if mean is None:
                 continue
@@ -150,21 +152,21 @@ class ChannelReader:
                 place = parts[0].place(k)
                 self.problems.error("value", place, f"`{column.name}` is {value} in SI")
             times.append(stamp + column.delay if column.delay else stamp)
-            kept.append(value)
+            values_si.append(value)
         if not times and not self.problems.has_errors:
             label = f"{self.file.noun} `{column.columns[0]}` has no values"
             self.problems.error("empty", self.file.head, label)
-        return tuple(times), tuple(kept)
+        return tuple(times), tuple(values_si)
 
-    def _values(self, name: str, samples: Samples, column: Column) -> list[float | None]:
+    def _values(self, name: str, samples: Samples, column: ColumnMapping) -> list[float | None]:
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
-        plain = None if self.is_full else _scaled(samples.values, factor, offset)
+        plain = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
         if plain is not None:
             return [*plain]
         found: list[float | None] = []
         for k, value in enumerate(samples.values):
-            if self.is_full:
+            if self.has_max_problems:
                 break
             if value is not None and not math.isfinite(value):
                 label = f"`{samples.text(k)}` in {self.file.noun} `{name}` is not a finite number"
@@ -177,13 +179,13 @@ class ChannelReader:
             found.append(None if value is None else value * factor + offset)
         return found
 
-    def _check_unit(self, name: str, written: str, column: Column) -> None:
+    def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
         """A unit that the file itself gives, where we know it, is that of the map."""
         unit = file_unit(written)
         if unit is None:
             return
         text = unit.text
-        same = fits(unit.dimension, column.unit.dimension)
+        same = are_compatible(unit.dimension, column.unit.dimension)
         if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
             label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
             self.problems.error("unit", column.span, label, f"`unit: {text}` in the map")
@@ -192,12 +194,12 @@ class ChannelReader:
 def file_unit(written: str) -> Unit | None:
     """Return the unit that a logger or a DBC file writes, where we know it."""
     try:
-        return parse_unit(OTHER_WORDS.get(written, written))
+        return parse_unit(LOGGER_UNITS.get(written, written))
     except UnitError:
         return None
 
 
-def _scaled(
+def _scale_all(
     values: Sequence[float | None], factor: float, offset: float | None = None
 ) -> list[float] | None:
     """Return values scaled, all at once; None where there is one that is none or is not finite."""
@@ -207,7 +209,7 @@ def _scaled(
     return found.tolist() if np.isfinite(known).all() and np.isfinite(found).all() else None
 
 
-def _means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
+def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
     """Return the mean of each row; None where one has no value."""
     found: list[float | None] = []
     for row in zip(*columns, strict=False):
@@ -218,29 +220,29 @@ def _means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
     return found
 
 
-def _plain(samples: Samples) -> list[Fraction] | None:
+def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
     """Return time stamps that grow and have no exponent, all at once; None for any others."""
     numbers = [value for value in samples.values if value is not None]
     is_growing = all(after > before for before, after in itertools.pairwise(numbers))
     if not numbers or len(numbers) < len(samples.values) or not is_growing:
         return None
     texts = [samples.text(k) for k in range(len(numbers))]
-    if not STAMPS.fullmatch("\n".join(texts)) or max(map(len, texts)) > LONGEST_STAMP:
+    if not STAMP_LINES.fullmatch("\n".join(texts)) or max(map(len, texts)) > MAX_STAMP_LENGTH:
         return None
-    found = [_stamp(text) for text in texts]
-    return found if max(-found[0], found[-1]) < LATEST_TIME else None
+    found = [_parse_plain_stamp(text) for text in texts]
+    return found if max(-found[0], found[-1]) < TIME_LIMIT else None
 
 
-@lru_cache(MOST_KEPT)
-def _stamp(text: str) -> Fraction:
+@lru_cache(STAMP_CACHE_SIZE)
+def _parse_plain_stamp(text: str) -> Fraction:
     whole, _, part = text.partition(".")
-    return Fraction(int(whole + part), TENS[len(part)])
+    return Fraction(int(whole + part), POWERS_OF_TEN[len(part)])
 
 
-def _exact(text: str) -> Fraction | None:
-    if len(text) > LONGEST_STAMP or not DECIMAL.fullmatch(text):
+def _parse_stamp(text: str) -> Fraction | None:
+    if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
         return None
     whole, _, part = text.partition(".")
     is_plain = "e" not in text and "E" not in text
     value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
-    return value if abs(value.numerator) < LATEST_TIME * value.denominator else None
+    return value if abs(value.numerator) < TIME_LIMIT * value.denominator else None

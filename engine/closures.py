@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from engine import actions, shapes
-from engine.actions import Action
-from engine.arithmetic import ARITHMETIC
-from engine.frame import LEFT_RANGE, Scope, scope_of
-from engine.shapes import Frame, Read
-from language.evaluate import OPERATIONS
+from engine.actions import StatementClosure
+from engine.arithmetic import ARITHMETIC_OF_TYPE
+from engine.frame import RANGE_VIOLATIONS, FrameLayout, frame_layout_of
+from engine.shapes import ExpressionClosure, Frame
+from language.evaluate import BINARY_OPERATIONS
 from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -26,55 +25,58 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
 )
 from language.program import Function, Program
-from language.traversal import expr_names, with_value
+from language.traversal import expr_names, substitute_variable
 
-AT_ONCE = 4
+MAX_FUSED_ASSIGNMENTS = 4
 """Most assignments in one function (engine/actions.py)."""
-UNROLLED = 8
+MAX_UNROLLED_TURNS = 8
 """Loops of at most so many turns have a copy of their body for each: indices become constants."""
 
 
-class _Inner(NamedTuple):
+class _InnerOperation(NamedTuple):
     """An operation inside another: both operators, and its slots."""
 
-    shape: tuple[str, str]
+    operators: tuple[str, str]
     slots: tuple[int, int]
 
 
-class Compiler:
+class BlockCompiler:
     """From operations to closures; constant parts are evaluated once, with the same operations."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
-        self.arithmetic = ARITHMETIC[program.number]
-        value = self.arithmetic.value
-        self.scope = scope_of(program)
+        self.arithmetic = ARITHMETIC_OF_TYPE[program.number_type]
+        value = self.arithmetic.to_frame_value
+        self.scope = frame_layout_of(program)
         fixed = ("constant.", "solved.")
         scalars = [c for c in program.constants if c.name.startswith(fixed) and not c.items]
         self.fixed = {c.name: value(c.value) for c in scalars}
         self.functions: dict[str, Callable[..., Any]] = {}
-        for function in sorted(program.functions, key=lambda f: _depth(f, program.functions)):
-            self.functions[function.name] = self._function(function)
+        for function in sorted(program.functions, key=lambda f: _call_depth(f, program.functions)):
+            self.functions[function.name] = self._compile_function(function)
         reals = [v.name for v in program.variables if v.type == "real"]
         reals += [c.name for c in program.constants if c.type == "real"]
         self.reals = frozenset(reals)
-        self._done: dict[str, Action] = {}
-        self.blocks = {name: self._named(name) for name in program.blocks}
+        self._done: dict[str, StatementClosure] = {}
+        self.blocks = {name: self._compile_named_block(name) for name in program.blocks}
 
-    def _function(self, function: Function) -> Callable[..., Any]:
+    def _compile_function(self, function: Function) -> Callable[..., Any]:
         """Return a function of Python: its frame is its arguments, then its own variables."""
-        names = _locals(function)
+        names = _local_names(function)
         outer = self.scope
-        self.scope = Scope({name: slot for slot, name in enumerate(names)}, [None] * len(names))
-        act = self._block(function.body)
+        self.scope = FrameLayout(
+            {name: slot for slot, name in enumerate(names)}, [None] * len(names)
+        )
+        act = self._compile_block(function.body)
         y, count = self.scope.slots["work.y"], len(function.parameters)
         rest = self.scope.values[count:]
         self.scope = outer
@@ -86,167 +88,185 @@ class Compiler:
 
         return call
 
-    def _named(self, name: str) -> Action:
+    def _compile_named_block(self, name: str) -> StatementClosure:
         if name not in self._done:
-            self._done[name] = self._block(self.program.blocks[name])
+            self._done[name] = self._compile_block(self.program.blocks[name])
         return self._done[name]
 
-    def _block(self, block: Block) -> Action:
-        found: list[Action] = []
-        row: list[Assign] = []
+    def _compile_block(self, block: Block) -> StatementClosure:
+        statements: list[StatementClosure] = []
+        pending: list[Assign] = []
         for op in block:
-            if row and not (isinstance(op, Assign) and self._go_on(row, op)):
-                found.append(self._row(row))
-                row = []
+            if pending and not (isinstance(op, Assign) and self._can_fuse(pending, op)):
+                statements.append(self._compile_assignments(pending))
+                pending = []
             if isinstance(op, Assign):
-                row.append(op)
+                pending.append(op)
             else:
-                found.append(self._action(op))
-        return actions.in_turn([*found, *([self._row(row)] if row else [])])
+                statements.append(self._compile_operation(op))
+        return actions.sequence(
+            [*statements, *([self._compile_assignments(pending)] if pending else [])]
+        )
 
-    def _go_on(self, row: Sequence[Assign], op: Assign) -> bool:
+    def _can_fuse(self, pending: Sequence[Assign], op: Assign) -> bool:
         """Tell whether an assignment is done in one function with those before it."""
-        alike = (self._slot(row[-1].value) is None) == (self._slot(op.value) is None)
-        return alike and len(row) < AT_ONCE
+        alike = (self._operand_slot(pending[-1].value) is None) == (
+            self._operand_slot(op.value) is None
+        )
+        return alike and len(pending) < MAX_FUSED_ASSIGNMENTS
 
-    def _row(self, row: Sequence[Assign]) -> Action:
-        targets = [self.scope.slots[op.target] for op in row]
-        sources = [self._slot(op.value) for op in row]
+    def _compile_assignments(self, assignments: Sequence[Assign]) -> StatementClosure:
+        targets = [self.scope.slots[op.target] for op in assignments]
+        sources = [self._operand_slot(op.value) for op in assignments]
         if None not in sources:
             return actions.copy(targets, [slot for slot in sources if slot is not None])
-        return actions.assign(targets, [self._read(op.value) for op in row])
+        return actions.assign(targets, [self._compile_expression(op.value) for op in assignments])
 
-    def _action(self, op: Op) -> Action:
+    def _compile_operation(self, op: Op) -> StatementClosure:
         slots = self.scope.slots
         match op:
             case Assign():
-                return self._row([op])
+                return self._compile_assignments([op])
             case Store(array, index, value):
-                return actions.store(slots[array], self._read(index), self._read(value))
+                return actions.store(
+                    slots[array], self._compile_expression(index), self._compile_expression(value)
+                )
             case Branch(condition, then, other):
-                two = self._block(then), self._block(other)
-                return actions.branch(self._read(condition), *two)
-            case Choose(selector, cases):
-                table = {number: self._block(block) for number, block in cases}
-                return actions.choose(slots[selector], table)
-            case Loop(count, index, body) if count <= UNROLLED and _is_indexed(body):
-                turns = [with_value(body, index, k) for k in range(count)]
+                two = self._compile_block(then), self._compile_block(other)
+                return actions.branch(self._compile_expression(condition), *two)
+            case Switch(selector, cases):
+                table = {number: self._compile_block(block) for number, block in cases}
+                return actions.switch_case(slots[selector], table)
+            case Loop(count, index, body) if count <= MAX_UNROLLED_TURNS and _is_indexed(body):
+                turns = [substitute_variable(body, index, k) for k in range(count)]
                 last = Assign(index, Value(count - 1))
-                return self._block((*(op for turn in turns for op in turn), last))
+                return self._compile_block((*(op for turn in turns for op in turn), last))
             case Loop(count, index, (Branch(condition, then, ()),)) if index not in expr_names(
                 condition
             ):
-                more = self._read(condition)
-                return actions.loop_while(count, slots[index], more, self._block(then))
+                more = self._compile_expression(condition)
+                return actions.loop_while(count, slots[index], more, self._compile_block(then))
             case Loop(count, index, body):
-                return actions.loop(count, slots[index], self._block(body))
+                return actions.loop(count, slots[index], self._compile_block(body))
             case Count(timer, condition, limit, _):
-                return actions.count(slots[timer], self._read(condition), limit)
+                return actions.count_while(slots[timer], self._compile_expression(condition), limit)
             case FaultBit(fault, signal, is_set):
                 slot, bit = slots["memory.faults"], self.faults[fault]
-                left = slots[LEFT_RANGE]
+                left = slots[RANGE_VIOLATIONS]
                 return (
-                    actions.fault(slot, bit, signal, left) if is_set else actions.clear(slot, bit)
+                    actions.set_fault(slot, bit, signal, left)
+                    if is_set
+                    else actions.clear_fault(slot, bit)
                 )
-            case Run(name):
-                return self._named(name)
+            case RunBlock(name):
+                return self._compile_named_block(name)
 
-    def _slot(self, expr: Expr) -> int | None:
+    def _operand_slot(self, expr: Expr) -> int | None:
         """Return the slot of an operand that is read without a function of its own."""
-        return self._place(expr)
+        return self._find_slot(expr)
 
-    def _place(self, expr: Expr) -> int | None:
+    def _find_slot(self, expr: Expr) -> int | None:
         """Return where a value stands that needs no operation."""
         if isinstance(expr, Ref) and expr.name in self.scope.slots:
             return self.scope.slots[expr.name]
-        if _is_fixed(expr, self.fixed):
-            return self.scope.literal(self._fold(expr))
+        if _is_constant(expr, self.fixed):
+            return self.scope.slot_of_literal(self._fold_constant(expr))
         return None
 
-    def _read(self, expr: Expr) -> Read:
-        place = self._place(expr)
+    def _compile_expression(self, expr: Expr) -> ExpressionClosure:
+        place = self._find_slot(expr)
         if place is not None:
-            return shapes.of_slot(place)
+            return shapes.load_slot(place)
         match expr:
-            case Item(name, index) if _is_fixed(index, {}):
-                return shapes.of_element(self.scope.slots[name], self._fold(index))
+            case Item(name, index) if _is_constant(index, {}):
+                return shapes.load_element(self.scope.slots[name], self._fold_constant(index))
             case Item(name, index):
-                return shapes.of_item(self.scope.slots[name], self._read(index))
+                return shapes.load_item(self.scope.slots[name], self._compile_expression(index))
             case Unary("-", operand):
-                return shapes.negative(self._read(operand))
+                return shapes.negate(self._compile_expression(operand))
             case Unary(_, operand):
-                return shapes.opposite(self._read(operand))
+                return shapes.logical_not(self._compile_expression(operand))
             case Binary("and", Compare(">=", a, low), Compare("<=", b, high)):
-                return self._range(a, low, b, high) or self._pair("and", expr.left, expr.right)
+                return self._compile_range_test(a, low, b, high) or self._compile_binary(
+                    "and", expr.left, expr.right
+                )
             case Binary(operator, left, right) | Compare(operator, left, right):
-                return self._pair(operator, left, right)
+                return self._compile_binary(operator, left, right)
             case Select(condition, then, other):
-                parts = [self._read(part) for part in (condition, then, other)]
-                return shapes.selected(*parts)
+                parts = [self._compile_expression(part) for part in (condition, then, other)]
+                return shapes.select(*parts)
             case Call(function, arguments):
                 known = self.functions.get(function) or self.arithmetic.elementary[function]
-                return shapes.called(known, [self._read(argument) for argument in arguments])
+                return shapes.call_function(
+                    known, [self._compile_expression(argument) for argument in arguments]
+                )
             case _:
                 raise TypeError(f"not an expression: {expr!r}")
 
-    def _range(self, *parts: Expr) -> Read | None:
-        slots = [self._slot(part) for part in parts]
+    def _compile_range_test(self, *parts: Expr) -> ExpressionClosure | None:
+        slots = [self._operand_slot(part) for part in parts]
         found = [slot for slot in slots if slot is not None]
-        return shapes.within(*found) if len(found) == len(slots) else None
+        return shapes.range_test(*found) if len(found) == len(slots) else None
 
-    def _pair(self, operator: str, left: Expr, right: Expr) -> Read:
+    def _compile_binary(self, operator: str, left: Expr, right: Expr) -> ExpressionClosure:
         """Return the function of two operands; an inner operation of two slots is part of it."""
-        a, b = self._slot(left), self._slot(right)
+        a, b = self._operand_slot(left), self._operand_slot(right)
         if a is not None and b is not None:
-            return shapes.SLOTS[operator](a, b)
+            return shapes.SLOT_SLOT[operator](a, b)
         if b is not None:
-            if inner := self._slots(operator, left):
-                return shapes.LEFT[inner.shape](*inner.slots, b)
-            return shapes.READ_SLOT[operator](self._read(left), b)
-        inner = self._slots(operator, right)
+            if inner := self._match_inner_operation(operator, left):
+                return shapes.FUSED_LEFT[inner.operators](*inner.slots, b)
+            return shapes.EXPRESSION_SLOT[operator](self._compile_expression(left), b)
+        inner = self._match_inner_operation(operator, right)
         if a is not None:
             if inner:
-                return shapes.RIGHT[inner.shape](a, *inner.slots)
-            return shapes.SLOT_READ[operator](a, self._read(right))
+                return shapes.FUSED_RIGHT[inner.operators](a, *inner.slots)
+            return shapes.SLOT_EXPRESSION[operator](a, self._compile_expression(right))
         if inner:
-            return shapes.READ_PAIR[inner.shape](self._read(left), *inner.slots)
-        return shapes.READS[operator](self._read(left), self._read(right))
+            return shapes.EXPRESSION_FUSED[inner.operators](
+                self._compile_expression(left), *inner.slots
+            )
+        return shapes.EXPRESSION_EXPRESSION[operator](
+            self._compile_expression(left), self._compile_expression(right)
+        )
 
-    def _slots(self, outer: str, expr: Expr) -> _Inner | None:
+    def _match_inner_operation(self, outer_operator: str, expr: Expr) -> _InnerOperation | None:
         """Return the operation of two slots that an operand is, if there is a shape for it."""
-        if not isinstance(expr, Binary) or (outer, expr.operator) not in shapes.LEFT:
+        if not isinstance(expr, Binary) or (outer_operator, expr.operator) not in shapes.FUSED_LEFT:
             return None
-        a, b = self._slot(expr.left), self._slot(expr.right)
+        a, b = self._operand_slot(expr.left), self._operand_slot(expr.right)
         if a is None or b is None:
             return None
-        return _Inner((outer, expr.operator), (a, b))
+        return _InnerOperation((outer_operator, expr.operator), (a, b))
 
-    def _fold(self, expr: Expr) -> Any:
+    def _fold_constant(self, expr: Expr) -> Any:
         match expr:
             case Value(value):
-                return self.arithmetic.value(value)
+                return self.arithmetic.to_frame_value(value)
             case Ref(name):
                 return self.fixed[name]
             case Unary("-", operand):
-                return -self._fold(operand)
+                return -self._fold_constant(operand)
             case Binary("/", left, right):
-                return self.arithmetic.divide(self._fold(left), self._fold(right))
+                return self.arithmetic.divide(self._fold_constant(left), self._fold_constant(right))
             case Binary(operator, left, right):
-                return OPERATIONS[operator](self._fold(left), self._fold(right))
+                return BINARY_OPERATIONS[operator](
+                    self._fold_constant(left), self._fold_constant(right)
+                )
             case _:
                 raise TypeError(f"not foldable: {expr!r}")
 
 
-def _is_fixed(expr: Expr, fixed: Mapping[str, float]) -> bool:
+def _is_constant(expr: Expr, constants: Mapping[str, float]) -> bool:
     match expr:
         case Value():
             return True
         case Ref(name):
-            return name in fixed
+            return name in constants
         case Unary("-", operand):
-            return _is_fixed(operand, fixed)
+            return _is_constant(operand, constants)
         case Binary(_, left, right):
-            return _is_fixed(left, fixed) and _is_fixed(right, fixed)
+            return _is_constant(left, constants) and _is_constant(right, constants)
         case _:
             return False
 
@@ -256,14 +276,14 @@ def _is_indexed(body: Block) -> bool:
     return all(isinstance(op, Assign | Store) for op in body) and "Item(" in repr(body)
 
 
-def _locals(function: Function) -> list[str]:
+def _local_names(function: Function) -> list[str]:
     targets = [op.target for op in function.body if isinstance(op, Assign)]
     parameters = [f"work.{name}" for name in function.parameters]
     return list(dict.fromkeys([*parameters, "work.y", *targets]))
 
 
-def _depth(function: Function, functions: tuple[Function, ...]) -> int:
+def _call_depth(function: Function, functions: tuple[Function, ...]) -> int:
     """How many functions a function calls, directly or through others: callees come first."""
     text = repr(function.body)
     called = [f for f in functions if f is not function and f"function='{f.name}'" in text]
-    return sum(1 + _depth(f, functions) for f in called)
+    return sum(1 + _call_depth(f, functions) for f in called)

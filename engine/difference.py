@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.trajectory import Event, Trajectory, Values
+from engine.trajectory import Event, SignalArray, Trajectory
 from language.model import CHART
 
 Reals = NDArray[np.float64]
@@ -85,7 +85,7 @@ class RunDifference:
         return min(found, default=None)
 
 
-def run_difference(
+def compare_runs(
     a: Trajectory,
     b: Trajectory,
     *,
@@ -109,36 +109,36 @@ def run_difference(
     signals = []
     for name in common:
         if name not in modes:
-            allowed = _allowed(name, a, relative, tolerances or {})
-            signals.append(_signal(name, a, b, times, allowed))
-    windows = [found for name in modes for found in _windows(name, a, b, times)]
+            allowed = _tolerance_of(name, a, relative, tolerances or {})
+            signals.append(_compare_signal(name, a, b, times, allowed))
+    windows = [found for name in modes for found in _mode_windows(name, a, b, times)]
     bounds = (float(times[0]), float(times[-1]))
     return RunDifference(
         span=bounds,
         samples=len(times),
         signals=tuple(signals),
         windows=tuple(found for found in windows if found.end - found.start > slack),
-        sequences=tuple(_sequences(a, b, common, bounds)),
+        sequences=tuple(_compare_mode_sequences(a, b, common, bounds)),
         only_a=tuple(name for name in names if name not in b.signals),
         only_b=tuple(n for n in b.signals if n not in a.signals and _matches(n, patterns)),
         uncovered=uncovered,
     )
 
 
-def at_times(run: Trajectory, name: str, times: Reals) -> Reals:
+def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
     """Return a signal at given times (n,): reals on straight lines, whole numbers held."""
-    values = run.signals[name]
-    if run.times.tobytes() == times.tobytes():
+    values = trajectory.signals[name]
+    if trajectory.times.tobytes() == times.tobytes():
         return values.astype(np.float64)
     if values.dtype == np.int64:
-        return _held(run.times, values, times).astype(np.float64)
+        return _hold_previous(trajectory.times, values, times).astype(np.float64)
     with np.errstate(invalid="ignore"):
-        found: Reals = np.interp(times, run.times, values)
+        found: Reals = np.interp(times, trajectory.times, values)
     return found
 
 
-def _held(own: Reals, values: Values, times: Reals) -> Values:
-    return values[np.maximum(np.searchsorted(own, times, side="right") - 1, 0)]
+def _hold_previous(sample_times: Reals, values: SignalArray, times: Reals) -> SignalArray:
+    return values[np.maximum(np.searchsorted(sample_times, times, side="right") - 1, 0)]
 
 
 def _common_times(
@@ -173,17 +173,19 @@ def _matches(name: str, patterns: Sequence[str]) -> bool:
     return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def _allowed(name: str, run: Trajectory, relative: float, tolerances: Mapping[str, float]) -> float:
+def _tolerance_of(
+    name: str, run: Trajectory, relative: float, tolerances: Mapping[str, float]
+) -> float:
     values = np.abs(run.signals[name].astype(np.float64))
     peak = float(np.max(values, initial=0.0, where=np.isfinite(values)))
     given = [value for pattern, value in tolerances.items() if fnmatch.fnmatchcase(name, pattern)]
     return max([relative * peak, *given])
 
 
-def _signal(
+def _compare_signal(
     name: str, a: Trajectory, b: Trajectory, times: Reals, allowed: float
 ) -> SignalDifference:
-    ours, theirs = at_times(a, name, times), at_times(b, name, times)
+    ours, theirs = resample_signal(a, name, times), resample_signal(b, name, times)
     same = (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.where(same, 0.0, np.abs(ours - theirs))
@@ -196,7 +198,7 @@ def _signal(
     return SignalDifference(name, a.units[name], rms, largest, float(times[worst]), allowed, first)
 
 
-def _windows(name: str, a: Trajectory, b: Trajectory, times: Reals) -> list[ModeWindow]:
+def _mode_windows(name: str, a: Trajectory, b: Trajectory, times: Reals) -> list[ModeWindow]:
     ours = _mode_names(a, b, name, times)
     theirs = _mode_names(b, a, name, times)
     found: list[ModeWindow] = []
@@ -215,11 +217,15 @@ def _windows(name: str, a: Trajectory, b: Trajectory, times: Reals) -> list[Mode
 def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> list[str]:
     names = run.modes.get(name) or other.modes[name]
     values = run.signals[name]
-    held = values if run.times.tobytes() == times.tobytes() else _held(run.times, values, times)
+    held = (
+        values
+        if run.times.tobytes() == times.tobytes()
+        else _hold_previous(run.times, values, times)
+    )
     return [names.get(int(number), str(number)) for number in held]
 
 
-def _sequences(
+def _compare_mode_sequences(
     a: Trajectory, b: Trajectory, common: Sequence[str], span: tuple[float, float]
 ) -> list[ModeSequence]:
     if not a.modes or not b.modes:
@@ -231,7 +237,11 @@ def _sequences(
         if compared != {""} and instance not in compared:
             continue
         ours, theirs = (
-            [event for event in _within(run.events_of(instance), span) if event.region == region]
+            [
+                event
+                for event in _events_within(run.events_of(instance), span)
+                if event.region == region
+            ]
             for run in (a, b)
         )
         pairs = list(zip(ours, theirs, strict=False))
@@ -246,5 +256,5 @@ def _sequences(
     return found
 
 
-def _within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
+def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
     return [event for event in events if span[0] <= event.time <= span[1]]

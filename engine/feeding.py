@@ -6,14 +6,14 @@ import math
 from collections.abc import Container, Mapping
 from fractions import Fraction
 
-from engine.continuous import Stopped
+from engine.continuous import SimulationStopped
 from engine.interpreter import Stepper
 from engine.signals import Signals
 from language.experiment import Connection, System
-from language.program import Program, short
+from language.program import Program, unqualified_name
 
 
-class Feeding:
+class InputWiring:
     """What is connected to each instance, and what a tick has seen of it."""
 
     def __init__(
@@ -32,24 +32,24 @@ class Feeding:
         for (owner, _), connection in system.connections.items():
             self.wires[owner].append(connection)
         self._seen: dict[tuple[str, str, str], int] = {}
-        self._flags = self._having("is_new.")
-        self._limited = self._having("latched.")
+        self._flags = self._inputs_with_variable("is_new.")
+        self._limited = self._inputs_with_variable("latched.")
 
-    def _having(self, group: str) -> set[tuple[str, str]]:
+    def _inputs_with_variable(self, group: str) -> set[tuple[str, str]]:
         """Return the inputs of all instances that have a variable of a group."""
         return {
-            (name, short(variable.name))
+            (name, unqualified_name(variable.name))
             for name, program in self.programs.items()
             for variable in program.variables
             if variable.name.startswith(group)
         }
 
-    def feed(self, name: str, time: Fraction) -> bool:
+    def set_inputs(self, name: str, time: Fraction) -> bool:
         """Set the inputs of an instance; tell whether one changed. Raises Stopped."""
         stepper, changed = self.steppers[name], False
         for connection in self.wires[name]:
             thing = connection.target[1]
-            value = self.signals.connected(connection)
+            value = self.signals.evaluate_connection(connection)
             kind = self.system.instances[name].automaton.inputs[thing].type
             if kind != "real":
                 value = bool(value) if kind == "bool" else int(value)
@@ -57,12 +57,12 @@ class Feeding:
             stepper.set(f"input.{thing}", value)
             now = stepper.get(f"input.{thing}")
             if not math.isfinite(now) and (name, thing) not in self._limited:
-                place = where(name, self.programs[name], stepper, time)
-                raise Stopped(f"{place}: input `{thing}` is {now}")
+                place = describe_instant(name, self.programs[name], stepper, time)
+                raise SimulationStopped(f"{place}: input `{thing}` is {now}")
             changed = changed or now != before
         return changed
 
-    def flag_new(self, name: str, sampling: Container[str]) -> None:
+    def flag_new_inputs(self, name: str, sampling: Container[str]) -> None:
         """A measured input is new where a sensor that it reads has sampled since the last tick.
 
         `sampling` are the sensors that sample.
@@ -77,7 +77,7 @@ class Feeding:
                 self.steppers[name].set(f"is_new.{thing}", any(news))
 
 
-def where(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:
+def describe_instant(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:
     """Return an instant of an instance in words."""
     mode = program.mode_name(stepper.get("memory.mode"))
     return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"

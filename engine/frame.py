@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from engine.arithmetic import ARITHMETIC
+from engine.arithmetic import ARITHMETIC_OF_TYPE
 from engine.shapes import Frame
 from language.program import Constant, Program
 
-INITIAL = {"real": 0.0, "truth": False, "whole": 0}
-LEFT_RANGE = "left range"
+INITIAL_VALUES = {"real": 0.0, "truth": False, "whole": 0}
+RANGE_VIOLATIONS = "left range"
 """Place of the signals that left their range, as keys of a dict."""
 
 
 @dataclass
-class Scope:
+class FrameLayout:
     """Where names stand in a frame, and the values that stand there from the start."""
 
     slots: dict[str, int]
     values: Frame
     literals: dict[str, int] = field(default_factory=dict)
 
-    def literal(self, value: Any) -> int:
+    def slot_of_literal(self, value: Any) -> int:
         """Return the slot of a value that never changes."""
         key = f"{type(value).__name__} {value!r}"  # 0, 0.0, -0.0 and False are four values
         if key not in self.literals:
@@ -30,25 +30,27 @@ class Scope:
             self.values.append(value)
         return self.literals[key]
 
-    def frame(self) -> Frame:
+    def new_frame(self) -> Frame:
         """Return a frame in which every variable has its first value."""
         return [list(v) if type(v) is list else {} if type(v) is dict else v for v in self.values]
 
 
-def scope_of(program: Program) -> Scope:
+def frame_layout_of(program: Program) -> FrameLayout:
     """Return where the variables and constants of a Program stand, in this order."""
-    value = ARITHMETIC[program.number].value
+    value = ARITHMETIC_OF_TYPE[program.number_type].to_frame_value
     names = [v.name for v in program.variables] + [c.name for c in program.constants]
-    initial = {kind: value(number) for kind, number in INITIAL.items()}
+    initial = {kind: value(number) for kind, number in INITIAL_VALUES.items()}
     values: Frame = [
         [initial[v.type]] * v.size if v.size else initial[v.type] for v in program.variables
     ]
-    values += [_constant(program, constant) for constant in program.constants]
-    return Scope({name: slot for slot, name in enumerate([*names, LEFT_RANGE])}, [*values, {}])
+    values += [_constant_value(program, constant) for constant in program.constants]
+    return FrameLayout(
+        {name: slot for slot, name in enumerate([*names, RANGE_VIOLATIONS])}, [*values, {}]
+    )
 
 
-def _constant(program: Program, constant: Constant) -> Any:
-    value = ARITHMETIC[program.number].value
+def _constant_value(program: Program, constant: Constant) -> Any:
+    value = ARITHMETIC_OF_TYPE[program.number_type].to_frame_value
     if constant.items:
         return tuple(value(item) for item in constant.items)
     return value(constant.value)

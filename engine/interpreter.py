@@ -7,9 +7,9 @@ from functools import lru_cache
 from operator import itemgetter
 from typing import Any, Protocol
 
-from engine.arithmetic import ARITHMETIC
-from engine.closures import Compiler
-from engine.frame import LEFT_RANGE
+from engine.arithmetic import ARITHMETIC_OF_TYPE
+from engine.closures import BlockCompiler
+from engine.frame import RANGE_VIOLATIONS
 from engine.shapes import Frame
 from language.program import Program
 
@@ -26,10 +26,10 @@ class Stepper(Protocol):
     def run(self, block: str) -> None:
         """Run a block of the Program."""
 
-    def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+    def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
 
-    def left(self) -> tuple[str, ...]:
+    def pop_range_violations(self) -> tuple[str, ...]:
         """Return the signals that left their range since this was asked last."""
 
 
@@ -39,13 +39,13 @@ class Interpreter:
     def __init__(self, program: Program) -> None:
         """Take the closures. `X_Derive` and `X_Init` of the C code are run here too."""
         self.program = program
-        compiler = _closures_of(_Same(program))
+        compiler = _compile_program(_ProgramIdentity(program))
         self._slots = compiler.scope.slots
         self._blocks = compiler.blocks
         self._real = compiler.reals
-        self._arithmetic = ARITHMETIC[program.number]
-        self._is_plain = program.number == "float64"
-        self._frame: Frame = compiler.scope.frame()
+        self._arithmetic = ARITHMETIC_OF_TYPE[program.number_type]
+        self._is_plain = program.number_type == "float64"
+        self._frame: Frame = compiler.scope.new_frame()
         for entry in ("derive", "init"):
             if entry in self._blocks:
                 self.run(entry)
@@ -53,7 +53,7 @@ class Interpreter:
     def get(self, name: str) -> Any:
         """Return the value of a variable or constant, `group.name`."""
         value = self._frame[self._slots[name]]
-        return value if self._is_plain else self._arithmetic.plain(value)
+        return value if self._is_plain else self._arithmetic.to_python(value)
 
     def set(self, name: str, value: float | int | bool) -> None:
         """Set a variable; a real is rounded to the number type, once."""
@@ -61,16 +61,16 @@ class Interpreter:
             if self._is_plain:
                 value = float(value)
             else:
-                with self._arithmetic.quiet():
+                with self._arithmetic.suppress_warnings():
                     value = self._arithmetic.real(value)
         self._frame[self._slots[name]] = value
 
-    def left(self) -> tuple[str, ...]:
+    def pop_range_violations(self) -> tuple[str, ...]:
         """Return the signals that left their range since this was asked last."""
-        noted = self._frame[self._slots[LEFT_RANGE]]
-        found = tuple(noted)
-        noted.clear()
-        return found
+        violations = self._frame[self._slots[RANGE_VIOLATIONS]]
+        names = tuple(violations)
+        violations.clear()
+        return names
 
     def has(self, name: str) -> bool:
         """Tell whether the Program has a variable or constant."""
@@ -81,20 +81,20 @@ class Interpreter:
         if self._is_plain:
             self._blocks[block](self._frame)
         else:
-            with self._arithmetic.quiet():
+            with self._arithmetic.suppress_warnings():
                 self._blocks[block](self._frame)
 
-    def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+    def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
         slots = [self._slots[name] for name in names]
-        frame, plain = self._frame, self._arithmetic.plain
+        frame, plain = self._frame, self._arithmetic.to_python
         if self._is_plain and len(slots) > 1:
             together = itemgetter(*slots)
             return lambda: together(frame)
         return lambda: tuple([plain(frame[slot]) for slot in slots])
 
 
-class _Same:
+class _ProgramIdentity:
     """A Program that equals itself alone: to tell whether two are equal takes longer than a run."""
 
     def __init__(self, program: Program) -> None:
@@ -104,11 +104,11 @@ class _Same:
         return id(self.program)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.program is self.program
+        return isinstance(other, _ProgramIdentity) and other.program is self.program
 
 
 @lru_cache(maxsize=64)
-def _closures_of(same: _Same) -> Compiler:
+def _compile_program(key: _ProgramIdentity) -> BlockCompiler:
     """Return the closures of a Program: all interpreters of one Program share them."""
-    with ARITHMETIC[same.program.number].quiet():
-        return Compiler(same.program)
+    with ARITHMETIC_OF_TYPE[key.program.number_type].suppress_warnings():
+        return BlockCompiler(key.program)

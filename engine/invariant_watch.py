@@ -9,10 +9,10 @@ from engine.interpreter import Stepper
 from engine.trajectory import Event
 from language.program import InvariantInfo, Program
 
-BLOCK = "invariants"
+INVARIANT_BLOCK = "invariants"
 
 
-class InvariantWatch:
+class InvariantMonitor:
     """The invariants of one automaton; each is reported when it ceases to hold."""
 
     def __init__(
@@ -23,21 +23,21 @@ class InvariantWatch:
         self._regions = program.mode_variables()
         self._broken: set[str] = set()
 
-    def look(self, time: Fraction) -> None:
+    def check(self, time: Fraction) -> None:
         """Report what has ceased to hold since the last look; equations are those of now."""
         if not self._program.invariants:
             return
-        self._stepper.run(BLOCK)
+        self._stepper.run(INVARIANT_BLOCK)
         for info in self._program.invariants:
             active = self._stepper.get(self._regions[info.region]) == info.mode
             if not active or self._stepper.get(info.variable):
                 self._broken.discard(info.variable)
             elif info.variable not in self._broken:
                 self._broken.add(info.variable)
-                self._log(broken(self._name, self._program, info, float(time)))
+                self._log(invariant_event(self._name, self._program, info, float(time)))
 
 
-def broken(name: str, program: Program, info: InvariantInfo, time: float) -> Event:
+def invariant_event(name: str, program: Program, info: InvariantInfo, time: float) -> Event:
     """Return the event of an invariant that ceases to hold at a time [s]."""
     mode = program.mode_name(info.mode, info.region)
     place = (name, f"invariant {info.name}", mode, mode, info.region)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 
 from engine.interpreter import Stepper
-from language.history import AGE
+from language.history import RECORD_AGE
 from language.program import Program
 
 
-class Records:
+class DelayRecorder:
     """Delayed quantities: recorded at each major step, before time leaves it."""
 
     def __init__(self, program: Program, stepper: Stepper) -> None:
@@ -23,7 +23,7 @@ class Records:
         """Begin anew: `start` fills every history with the value of now."""
         self._last = None
 
-    def leave(self, time: Fraction) -> None:
+    def record_step(self, time: Fraction) -> None:
         """Record at a major step that time is about to leave."""
         if self.is_needed and time != self._last and time % self._step == 0:
             self._stepper.run("record")
@@ -31,9 +31,9 @@ class Records:
 
     def age(self) -> float:
         """Return how long ago [s] the last record was."""
-        return float(self._stepper.get(AGE.name)) if self.is_needed else 0.0
+        return float(self._stepper.get(RECORD_AGE.name)) if self.is_needed else 0.0
 
-    def put_age(self, age: float) -> None:
+    def set_age(self, age: float) -> None:
         """Say how long ago [s] the last record was: to look at another time."""
         if self.is_needed:
-            self._stepper.set(AGE.name, age)
+            self._stepper.set(RECORD_AGE.name, age)

@@ -15,21 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from engine.continuous import Stopped
+from engine.continuous import SimulationStopped
 from engine.interpreter import Interpreter
 from language.model import CHART
-from language.program import ModeInfo, Program, short
+from language.program import ModeInfo, Program, unqualified_name
 
-Method = Literal["DOP853", "Radau", "LSODA"]
+ScipyMethod = Literal["DOP853", "Radau", "LSODA"]
 """Explicit of order 8 and implicit of order 5 (Hairer, Norsett, Wanner, Solving Ordinary
 Differential Equations I, II.5, and II, IV.8); switching between stiff and not (Petzold 1983)."""
-METHODS: tuple[Method, ...] = ("DOP853", "Radau", "LSODA")
-Point = list[float]
-Path = Callable[[float], Point]
+SCIPY_METHODS: tuple[ScipyMethod, ...] = ("DOP853", "Radau", "LSODA")
+StateVector = list[float]
+Solution = Callable[[float], StateVector]
 """The states in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
-OWN_MOTION = (
+INTEGRATION_BLOCKS = (
     "flow",
     "dense",
     "peek",
@@ -45,53 +45,57 @@ OWN_MOTION = (
 """What the blocks that integrate or locate are named, or how their names begin."""
 RTOL = 1e-11
 """Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
-SMALLEST_SCALE = 1e-9
+MIN_SCALE = 1e-9
 """Size in SI [unit of the state] below which a state counts as 0: keeps rounding out of steps."""
-EVALUATIONS = 100_000
+MAX_EVALUATIONS = 100_000
 """Rates evaluated in one flow: 6000 steps of DOP853 within a major step are no progress."""
-LOOKS = 4
+GUARD_CHECKS = 4
 """Looks at the guards per flow, evenly spread: shorter pulses than a quarter step may be missed."""
-HALVINGS = 52
+BISECTIONS = 52
 """Halvings of the bracket of a crossing: 1 ms / 4 / 2^52 = 6e-20 s, below one ULP of any time."""
 
 
-def without_motion(program: Program) -> Program:
+def without_integration(program: Program) -> Program:
     """Return a continuous Program without its blocks that integrate or locate."""
-    blocks = {n: block for n, block in program.blocks.items() if not n.startswith(OWN_MOTION)}
+    blocks = {
+        n: block for n, block in program.blocks.items() if not n.startswith(INTEGRATION_BLOCKS)
+    }
     return dataclasses.replace(program, blocks=blocks)
 
 
-def watched(program: Program, mode: ModeInfo) -> tuple[str, ...]:
+def evaluated_guards(program: Program, mode: ModeInfo) -> tuple[str, ...]:
     """Return the endings of the guard variables that are evaluated in a mode of the chart."""
     infos = program.transitions
     found = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
     return tuple(dict.fromkeys(found))
 
 
-class LibraryStepper:
+class ScipyStepper:
     """A continuous Program whose `flow` is scipy's; every other block is interpreted."""
 
-    def __init__(self, program: Program, method: Method = "DOP853") -> None:
+    def __init__(self, program: Program, method: ScipyMethod = "DOP853") -> None:
         """Take the Program; its own motion is left out, so it cannot be run by mistake."""
         self.program = program
         self.method = method
-        self._inner = Interpreter(without_motion(program))
+        self._inner = Interpreter(without_integration(program))
         names = [v.name for v in program.variables if v.name.startswith("state.")]
-        self._names = tuple(short(name) for name in names)
-        self._states = self._inner.reader(tuple(names))
-        self._rates = self._inner.reader(tuple(f"work.rate_{name}" for name in self._names))
-        self._sizes = np.full(len(names), SMALLEST_SCALE)
+        self._names = tuple(unqualified_name(name) for name in names)
+        self._states = self._inner.make_reader(tuple(names))
+        self._rates = self._inner.make_reader(tuple(f"work.rate_{name}" for name in self._names))
+        self._sizes = np.full(len(names), MIN_SCALE)
         self._time = 0.0
         timed = ("work.rise_", "memory.age")
         self._is_timed = any(v.name.startswith(timed) for v in program.variables)
         self._guards = {}
         levels = [v.name for v in program.variables if v.name.startswith("memory.level_")]
         for mode in program.modes:
-            slots = watched(program, mode)
+            slots = evaluated_guards(program, mode)
             guards = (f"work.guard_{slot}" for slot in slots)
             before = (f"memory.armed_{slot}" for slot in slots)
-            now = self._inner.reader((*guards, *(f"work.{short(name)}" for name in levels)))
-            armed = self._inner.reader((*before, *levels))
+            now = self._inner.make_reader(
+                (*guards, *(f"work.{unqualified_name(name)}" for name in levels))
+            )
+            armed = self._inner.make_reader((*before, *levels))
             self._guards[mode.name] = (now, armed)
 
     def get(self, name: str) -> Any:
@@ -102,11 +106,11 @@ class LibraryStepper:
         """Set a variable."""
         self._inner.set(name, value)
 
-    def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+    def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
-        return self._inner.reader(names)
+        return self._inner.make_reader(names)
 
-    def left(self) -> tuple[str, ...]:
+    def pop_range_violations(self) -> tuple[str, ...]:
         """Return nothing: a continuous automaton is never held in a range."""
         return ()
 
@@ -124,8 +128,8 @@ class LibraryStepper:
     def _flow(self, h: float) -> None:
         """Move the states over h [s], or to the first change of a guard before that."""
         mode = self.program.mode_name(self.get("memory.mode"))
-        path = self._path(mode, h)
-        change = self._first_change(mode, path, h)
+        path = self._solve(mode, h)
+        change = self._locate_first_change(mode, path, h)
         elapsed = h if change is None else change
         for name, value in zip(self._names, path(elapsed), strict=True):
             self.set(f"state.{name}", value)
@@ -136,32 +140,34 @@ class LibraryStepper:
     def _peek(self, h: float) -> None:
         """Move the states over h [s], whatever the guards do."""
         mode = self.program.mode_name(self.get("memory.mode"))
-        for name, value in zip(self._names, self._path(mode, h)(h), strict=True):
+        for name, value in zip(self._names, self._solve(mode, h)(h), strict=True):
             self.set(f"state.{name}", value)
 
-    def _path(self, mode: str, h: float) -> Path:
+    def _solve(self, mode: str, h: float) -> Solution:
         """Return the solution from the states over h [s]. Raises Stopped where there is none."""
-        start: Point = list(self._states())
+        start: StateVector = list(self._states())
         first = self._rates_at(mode, start, 0.0)
         for name, value, rate in zip(self._names, start, first, strict=True):
             if not (math.isfinite(value) and math.isfinite(rate)):
-                raise Stopped(f"{self._here(mode)}: state `{name}` is {value}, its rate {rate}")
+                raise SimulationStopped(
+                    f"{self._describe_instant(mode)}: state `{name}` is {value}, its rate {rate}"
+                )
         if not start:
             return lambda time: []
         moved = np.maximum(np.abs(start), h * np.abs(first))
         self._sizes = np.maximum(self._sizes, moved)
-        solution = self._solved(mode, start, h)
-        end: Point = solution.y[:, -1].tolist()
+        solution = self._solve_ivp(mode, start, h)
+        end: StateVector = solution.y[:, -1].tolist()
 
-        def path(time: float) -> Point:
+        def path(time: float) -> StateVector:
             if time == h:
                 return end
-            point: Point = solution.sol(time).tolist()
+            point: StateVector = solution.sol(time).tolist()
             return point
 
         return path
 
-    def _solved(self, mode: str, start: Point, h: float) -> Any:
+    def _solve_ivp(self, mode: str, start: StateVector, h: float) -> Any:
         """Return scipy's solution over h [s], with its polynomial.
 
         No step is longer than a major step; Radau and LSODA, whose polynomials are of lower order
@@ -169,14 +175,16 @@ class LibraryStepper:
         """
         evaluations = 0
 
-        def rates(time: float, point: Reals) -> Point:
+        def rates(time: float, point: Reals) -> StateVector:
             nonlocal evaluations
             evaluations += 1
-            if evaluations > EVALUATIONS:
-                raise Stopped(f"{self._here(mode)}: more than {EVALUATIONS} rates in one flow")
+            if evaluations > MAX_EVALUATIONS:
+                raise SimulationStopped(
+                    f"{self._describe_instant(mode)}: more than {MAX_EVALUATIONS} rates in one flow"
+                )
             return self._rates_at(mode, point.tolist(), float(time))
 
-        longest = h if self.method == "DOP853" else h / LOOKS
+        longest = h if self.method == "DOP853" else h / GUARD_CHECKS
         options = {"rtol": RTOL, "atol": RTOL * self._sizes, "max_step": longest}
         with np.errstate(over="ignore", invalid="ignore"):  # such a step is rejected by its error
             solution = solve_ivp(
@@ -189,47 +197,47 @@ class LibraryStepper:
                 **options,
             )
         if not solution.success:
-            raise Stopped(f"{self._here(mode)}: scipy: {solution.message}")
+            raise SimulationStopped(f"{self._describe_instant(mode)}: scipy: {solution.message}")
         return solution
 
-    def _first_change(self, mode: str, path: Path, h: float) -> float | None:
+    def _locate_first_change(self, mode: str, path: Solution, h: float) -> float | None:
         """Return when [s] the first guard changes, on the far side; None if none does."""
         if not self._guards[mode][0]():
             return None
         low = 0.0
-        for look in range(1, LOOKS + 1):
-            high = h * (look / LOOKS)
-            if self._changed(mode, path(high), high):
-                return self._halved(mode, path, low, high)
+        for look in range(1, GUARD_CHECKS + 1):
+            high = h * (look / GUARD_CHECKS)
+            if self._has_guard_changed(mode, path(high), high):
+                return self._bisect(mode, path, low, high)
             low = high
         return None
 
-    def _halved(self, mode: str, path: Path, low: float, high: float) -> float:
+    def _bisect(self, mode: str, path: Solution, low: float, high: float) -> float:
         """Return the upper end of the bracket (low, high] [s]: a guard has changed there."""
-        for _ in range(HALVINGS):
+        for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            if self._changed(mode, path(middle), middle):
+            if self._has_guard_changed(mode, path(middle), middle):
                 high = middle
             else:
                 low = middle
         return high
 
-    def _changed(self, mode: str, point: Point, time: float) -> bool:
+    def _has_guard_changed(self, mode: str, point: StateVector, time: float) -> bool:
         now, armed = self._guards[mode]
-        self._put(point, time)
+        self._set_point(point, time)
         self._inner.run(f"guards_{mode}")
         return now() != armed()
 
-    def _rates_at(self, mode: str, point: Point, time: float) -> Point:
-        self._put(point, time)
+    def _rates_at(self, mode: str, point: StateVector, time: float) -> StateVector:
+        self._set_point(point, time)
         self._inner.run(f"rates_{mode}")
         return list(self._rates())
 
-    def _put(self, point: Point, time: float) -> None:
+    def _set_point(self, point: StateVector, time: float) -> None:
         if self._is_timed:
             self._inner.set("work.s", time)
         for name, value in zip(self._names, point, strict=True):
             self._inner.set(f"work.at_{name}", value)
 
-    def _here(self, mode: str) -> str:
+    def _describe_instant(self, mode: str) -> str:
         return f"t = {self._time:.9g} s, `{self.program.name}` in mode `{mode}`"

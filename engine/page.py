@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from engine.interpreter import Stepper
-from language.number import rounded
+from language.number import round_to_type
 from language.program import Program
 
-AFTER = ("derive", "compare_stamps")
+DERIVE_BLOCKS = ("derive", "compare_stamps")
 """What runs after a change, as `X_Calibrate` does in C."""
 
 
@@ -19,8 +19,8 @@ def calibrate(stepper: Stepper, program: Program, values: Mapping[str, Fraction]
     known = {constant.name for constant in program.constants}
     used = {name: value for name, value in used.items() if name in known}
     for name, value in used.items():
-        stepper.set(name, rounded(value, program.number))
-    for block in AFTER if used else ():
+        stepper.set(name, round_to_type(value, program.number_type))
+    for block in DERIVE_BLOCKS if used else ():
         if block in program.blocks:
             stepper.run(block)
     return bool(used)

@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.assembling import assembly_of
-from engine.firing import event, mode_names
-from engine.invariant_watch import broken
-from engine.plan import plan_of
-from engine.range_watch import left_range, outside_text
-from engine.rows import recorded
+from engine.firing import mode_names, transition_event
+from engine.invariant_watch import invariant_event
+from engine.plan import build_run_plan
+from engine.range_watch import format_range_violation, range_event
+from engine.rows import recorded_columns
 from engine.trajectory import Event, Trajectory, column_array, fault_names
-from language.assembly import Assembly, ranged
+from language.assembly import SimulationAssembly, range_event_variables
 from language.experiment import Scenario, System
-from language.number import rounded
-from language.program import InvariantInfo, Program, short
+from language.number import round_to_type
+from language.program import InvariantInfo, Program, unqualified_name
 
-EVENT = np.dtype(
+EVENT_DTYPE = np.dtype(
     [
         ("time", "f8"),
         ("value", "f8"),
@@ -34,11 +34,11 @@ EVENT = np.dtype(
     ]
 )
 """`Event` of codegen/templates/run.h.jinja."""
-FIRST_EVENTS = 1000
+INITIAL_EVENT_CAPACITY = 1000
 """Events for which a single run has room at first; it is made again where there were more."""
 
 
-class Library(Protocol):
+class RunLibrary(Protocol):
     """Compiled runs of an assembly (codegen/library.py)."""
 
     @property
@@ -53,48 +53,52 @@ class Library(Protocol):
     def lanes(self) -> int:
         """How many variants may be carried out side by side."""
 
-    def bound(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
+    def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return what carries variants out, from a first to one behind the last."""
 
 
-Build = Callable[[Assembly], Library]
+BuildLibrary = Callable[[SimulationAssembly], RunLibrary]
 
 
-class PlannedRun:
+class CompiledRun:
     """One run that is planned: it can be carried out again and again."""
 
     def __init__(
-        self, system: System, scenario: Scenario, programs: Mapping[str, Program], build: Build
+        self,
+        system: System,
+        scenario: Scenario,
+        programs: Mapping[str, Program],
+        build: BuildLibrary,
     ) -> None:
         """Take a resolved scenario that can be planned."""
         self.scenario = scenario
         self.assembly = assembly_of(system, scenario, programs)
-        self.plan = plan_of(system, scenario, self.assembly)
+        self.plan = build_run_plan(system, scenario, self.assembly)
         self.library = build(self.assembly)
-        self.recorded = recorded(system, scenario, programs)
+        self.recorded = recorded_columns(system, scenario, programs)
         self._values = np.array(
-            [rounded(c.value) for _, c in self.assembly.tunables()], dtype=np.float64
+            [round_to_type(c.value) for _, c in self.assembly.tunables()], dtype=np.float64
         )
         self._rows = np.empty((len(self.plan.rows.high), self.library.width))
-        self._events = np.empty(FIRST_EVENTS, dtype=EVENT)
+        self._events = np.empty(INITIAL_EVENT_CAPACITY, dtype=EVENT_DTYPE)
         self._count = np.zeros(1, dtype=np.int64)
         self._is_left = np.zeros(1, dtype=np.uint8)
         self._faults = np.zeros(len(programs), dtype=np.uint32)
-        self._call = self.library.bound(self.plan, self._members())
+        self._call = self.library.bind(self.plan, self._members())
 
-    def carry_out(self) -> bool:
+    def run(self) -> bool:
         """Run in C; tell whether that was all. The numbers are in this object's arrays."""
         self._call(0, 1)
         count = int(self._count[0])
         if count > len(self._events):
-            self._events = np.empty(2 * count, dtype=EVENT)
-            self._call = self.library.bound(self.plan, self._members())
+            self._events = np.empty(2 * count, dtype=EVENT_DTYPE)
+            self._call = self.library.bind(self.plan, self._members())
             self._call(0, 1)
         return not self._is_left[0]
 
     def trajectory(self) -> Trajectory | None:
         """Return the trajectory; None where the interpreter has to tell what happened."""
-        if not self.carry_out():
+        if not self.run():
             return None
         programs = self.assembly.programs
         columns = zip(self.recorded, self.library.columns, strict=True)
@@ -139,23 +143,23 @@ class PlannedRun:
         }
 
 
-def _events(found: NDArray[np.void], assembly: Assembly) -> list[Event]:
+def _events(found: NDArray[np.void], assembly: SimulationAssembly) -> list[Event]:
     """Return what C wrote down as events."""
     known: list[tuple[str, Program, Any]] = []
     for name, program in assembly.programs.items():
         known += [(name, program, info) for info in program.transitions]
-        known += [(name, program, variable) for variable in ranged(program)]
+        known += [(name, program, variable) for variable in range_event_variables(program)]
         known += [(name, program, info) for info in program.invariants]
     events = []
     for one in found.tolist():
         time, value, number, micro_step, mode, _ = one
         name, program, what = known[number]
         if hasattr(what, "slot"):
-            events.append(event(name, program, what, time, micro_step))
+            events.append(transition_event(name, program, what, time, micro_step))
         elif isinstance(what, InvariantInfo):
-            events.append(broken(name, program, what, time))
+            events.append(invariant_event(name, program, what, time))
         else:
-            text = outside_text(what.name, value, *what.range)
-            signal = short(what.name)
-            events.append(left_range(time, name, signal, program.mode_name(mode), text))
+            text = format_range_violation(what.name, value, *what.range)
+            signal = unqualified_name(what.name)
+            events.append(range_event(time, name, signal, program.mode_name(mode), text))
     return events

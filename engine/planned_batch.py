@@ -13,59 +13,71 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from engine.adjustment import Adjustment, Group, ends_of, groups, require_known
+from engine.adjustment import (
+    ParameterBinding,
+    ProgramGroup,
+    group_variants,
+    require_known_names,
+    value_bounds,
+)
 from engine.batch import Batch, BatchResult
-from engine.plan import why_not_planned
-from engine.planned import Build
-from engine.planned_group import PlannedGroup
-from engine.variants import empty_result, keep_variant, run_variants, variant_scenario
+from engine.plan import planning_obstacle
+from engine.planned import BuildLibrary
+from engine.planned_group import CompiledGroup
+from engine.variants import allocate_result, run_interpreted_batch, run_variant, scenario_of_variant
 
-KEPT = 4
+MAX_CACHED = 4
 """Plans of a planner: the scenarios of a study take turns."""
 
 
-def planned_batch(
-    batch: Batch, build: Build, threads: int | None = None, least: int = 0
+def run_compiled_batch(
+    batch: Batch, build: BuildLibrary, threads: int | None = None, min_steps: int = 0
 ) -> BatchResult:
     """Return what is kept of each variant, by compiled C on several threads.
 
-    Variants that share a Program and have fewer than `least` steps in all are not compiled for.
+    Variants that share a Program and have fewer than `min_steps` steps in all are not compiled for.
     """
-    return PlannedBatch(batch, build, least).carry_out(threads)
+    return CompiledBatch(batch, build, min_steps).run(threads)
 
 
-class PlannedBatch:
+class CompiledBatch:
     """A batch that is planned: it can be carried out again and again.
 
     Variants with Programs of their own are compiled group by group.
     """
 
     def __init__(
-        self, batch: Batch, build: Build, least: int = 0, known: Adjustment | None = None
+        self,
+        batch: Batch,
+        build: BuildLibrary,
+        min_steps: int = 0,
+        binding: ParameterBinding | None = None,
     ) -> None:
         """Compile what the batch needs; `reason` says why it is left to the interpreter.
 
-        `known` is how a batch that differs in numbers alone is carried out.
+        `binding` is how a batch that differs in numbers alone is carried out.
         """
-        self.batch, self.build, self.least = batch, build, least
+        self.batch, self.build, self.least = batch, build, min_steps
         self.reason: str | None = None
-        self._parts: list[PlannedGroup] = []
-        found = [Group(np.arange(batch.count), known)] if known else groups(batch)
+        self._parts: list[CompiledGroup] = []
+        found = (
+            [ProgramGroup(np.arange(batch.count), binding)] if binding else group_variants(batch)
+        )
         like = None
-        self._few = [group for group in found if _steps(group) < least]
-        for group in _of_one_plan(batch, [g for g in found if _steps(g) >= least]):
-            adjustment = group.adjustment
-            scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
-            reason = why_not_planned(adjustment.system, scenario, adjustment.programs)
+        self._few = [group for group in found if _steps(group) < min_steps]
+        for group in _of_one_plan(batch, [g for g in found if _steps(g) >= min_steps]):
+            adjustment = group.binding
+            scenario = scenario_of_variant(batch, adjustment.scenario, int(group.variants[0]))
+            reason = planning_obstacle(adjustment.system, scenario, adjustment.programs)
             self.reason = reason or _why_not_tuned(group)
             if self.reason:
                 return
-            like = PlannedGroup(batch, group, build, like)
+            like = CompiledGroup(batch, group, build, like)
             self._parts.append(like)
         if not found:
             raise ValueError("a batch has at least one variant")
 
-    def again(self, batch: Batch) -> PlannedBatch | None:
+    def rebind(self, batch: Batch) -> CompiledBatch | None:
         """Return what is planned already for a batch that differs in numbers alone, else None.
 
         Where inputs step at times of their own the plan of each variant is made, for the same
@@ -75,53 +87,53 @@ class PlannedBatch:
         if self.reason or _form(batch) != _form(self.batch):
             return None
         first = self._parts[0].group if self._parts else self._few[0]
-        adjustment = first.adjustment
-        if adjustment.rebuilt:
+        adjustment = first.binding
+        if adjustment.rebuild_reasons:
             return None
-        ends = adjustment.ends
-        for name, (low, high) in ends_of(batch).items():
+        ends = adjustment.bounds
+        for name, (low, high) in value_bounds(batch).items():
             if name not in ends or not ends[name][0] <= low <= high <= ends[name][1]:
                 return None
-        require_known(batch)
-        if batch.courses or self._few:
+        require_known_names(batch)
+        if batch.variant_inputs or self._few:
             least = self.least - sum(map(_steps, self._few))
-            return PlannedBatch(batch, self.build, least, adjustment)
+            return CompiledBatch(batch, self.build, least, adjustment)
         found = copy.copy(self)
-        found.batch, found._parts = batch, [self._parts[0].of(batch)]
+        found.batch, found._parts = batch, [self._parts[0].rebind(batch)]
         return found
 
-    def carry_out(self, threads: int | None = None) -> BatchResult:
+    def run(self, threads: int | None = None) -> BatchResult:
         """Return what is kept of each variant."""
         if self.reason:
             note = f"interpreter: {self.reason}"
-            return BatchResult(**{**vars(run_variants(self.batch)), "note": note})
+            return BatchResult(**{**vars(run_interpreted_batch(self.batch)), "note": note})
         first = self._parts[0].group if self._parts else self._few[0]
         note = "compiled" if self._parts else "interpreter: too few steps to compile for"
-        result = empty_result(self.batch, first.adjustment, note)
+        result = allocate_result(self.batch, first.binding, note)
         for part in self._parts:
             part.run(result, threads or os.cpu_count() or 1)
         for group in self._few:
             for variant in group.variants.tolist():
-                keep_variant(self.batch, result, variant, group.adjustment)
+                run_variant(self.batch, result, variant, group.binding)
         return result
 
 
-class Planner:
+class CompiledBatchCache:
     """Plans batches; a batch like one of the last ones, but for its numbers, has its plan."""
 
-    def __init__(self, build: Build, least: int = 0) -> None:
-        """Plan nothing yet; `build` and `least` are those of a planned batch."""
-        self.build, self.least = build, least
-        self._kept: list[PlannedBatch] = []
+    def __init__(self, build: BuildLibrary, min_steps: int = 0) -> None:
+        """Plan nothing yet; `build` and `min_steps` are those of a planned batch."""
+        self.build, self.least = build, min_steps
+        self._kept: list[CompiledBatch] = []
 
-    def planned(self, batch: Batch) -> PlannedBatch:
+    def get_or_compile(self, batch: Batch) -> CompiledBatch:
         """Return a batch that is planned."""
         for place, known in enumerate(self._kept):
-            if found := known.again(batch):
+            if found := known.rebind(batch):
                 self._kept[place] = found
                 return found
-        fresh = PlannedBatch(batch, self.build, self.least)
-        self._kept = [fresh, *self._kept[: KEPT - 1]]
+        fresh = CompiledBatch(batch, self.build, self.least)
+        self._kept = [fresh, *self._kept[: MAX_CACHED - 1]]
         return fresh
 
 
@@ -132,7 +144,7 @@ def _form(batch: Batch) -> object:
     change in between, and by what formula.
     """
     scenario: object = batch.scenario
-    if batch.courses:
+    if batch.variant_inputs:
         moving = [
             (name, [piece.formula for piece in stimulus.pieces])
             for name, stimulus in batch.scenario.inputs.items()
@@ -141,33 +153,33 @@ def _form(batch: Batch) -> object:
         scenario = dataclasses.replace(batch.scenario, inputs={}), moving
     starts = [(name, table.starts) for name, table in batch.inputs.items()]
     names = list(batch.parameters), list(batch.initial), starts, batch.seeds is None
-    wanted = batch.measures, batch.outputs, batch.most_events
+    wanted = batch.statistics, batch.outputs, batch.max_events
     return batch.system, scenario, names, wanted
 
 
-def _steps(group: Group) -> int:
+def _steps(group: ProgramGroup) -> int:
     """Return how many steps and ticks the variants of a group have in all."""
-    horizon = group.adjustment.scenario.horizon
+    horizon = group.binding.scenario.horizon
     assert horizon is not None
-    programs = group.adjustment.programs.values()
+    programs = group.binding.programs.values()
     return len(group.variants) * sum(int(horizon / program.major_step) for program in programs)
 
 
-def _of_one_plan(batch: Batch, found: Sequence[Group]) -> list[Group]:
+def _of_one_plan(batch: Batch, found: Sequence[ProgramGroup]) -> list[ProgramGroup]:
     """Return the groups; where inputs step at other times, each variant is one."""
-    if not batch.courses:
+    if not batch.variant_inputs:
         return list(found)
-    pairs = ((group.adjustment, variant) for group in found for variant in group.variants)
-    return [Group(np.array([variant]), adjustment) for adjustment, variant in pairs]
+    pairs = ((group.binding, variant) for group in found for variant in group.variants)
+    return [ProgramGroup(np.array([variant]), adjustment) for adjustment, variant in pairs]
 
 
-def _why_not_tuned(group: Group) -> str | None:
+def _why_not_tuned(group: ProgramGroup) -> str | None:
     known = {
         (owner, c.name): c
-        for owner, program in group.adjustment.programs.items()
+        for owner, program in group.binding.programs.items()
         for c in program.constants
     }
-    for name, (owner, parameter) in group.adjustment.tuned.items():
+    for name, (owner, parameter) in group.binding.tunables.items():
         constant = known.get((owner, f"calibration.{parameter}"))
         if constant and (constant.type != "real" or constant.items):
             return f"`{name}` is not a real number"

@@ -11,78 +11,82 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.adjustment import Group
+from engine.adjustment import ProgramGroup
 from engine.assembling import assembly_of
 from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
-from engine.plan import Plan, noise_of, plan_of
-from engine.planned import EVENT, Build
+from engine.plan import RunPlan, build_run_plan, noise_samples
+from engine.planned import EVENT_DTYPE, BuildLibrary
 from engine.trajectory import fault_names
-from engine.variants import event_kinds, first_and_last_row, keep_variant, variant_scenario
-from language.assembly import Assembly, ranged
-from language.program import short
+from engine.variants import list_event_kinds, row_range, run_variant, scenario_of_variant
+from language.assembly import SimulationAssembly, range_event_variables
+from language.program import unqualified_name
 
-KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
-CHUNK = 2000
+STATISTIC_KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
+CHUNK_SIZE = 2000
 """Variants of one call: their events and values are a few megabytes."""
 
 
-class PlannedGroup:
+class CompiledGroup:
     """The variants of a batch that share their Programs."""
 
     def __init__(
-        self, batch: Batch, group: Group, build: Build, like: PlannedGroup | None = None
+        self,
+        batch: Batch,
+        group: ProgramGroup,
+        build: BuildLibrary,
+        like: CompiledGroup | None = None,
     ) -> None:
         """Plan and compile; of a group `like` it, with the same assembly, the library is shared."""
         self.batch, self.group = batch, group
-        adjustment = group.adjustment
+        adjustment = group.binding
         self.system, self.programs = adjustment.system, adjustment.programs
-        scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
+        scenario = scenario_of_variant(batch, adjustment.scenario, int(group.variants[0]))
         self.assembly = assembly_of(self.system, scenario, self.programs)
-        self.plan = plan_of(self.system, scenario, self.assembly)
+        self.plan = build_run_plan(self.system, scenario, self.assembly)
         is_same = like is not None and like.assembly == self.assembly
         self.library: Any = like.library if like and is_same else build(self.assembly)
         names = [column.name for column in self.assembly.columns]
         places = dict(zip(names, self.library.columns, strict=True))
         count = len(self.plan.rows.high)
-        spans = [first_and_last_row(m, scenario.every, count) for m in batch.measures]
+        spans = [row_range(m, scenario.every, count) for m in batch.statistics]
         self.fixed: dict[str, Any] = {
-            "measures": len(batch.measures),
-            "measure_columns": _wholes(places[m.signal] for m in batch.measures),
-            "measure_kinds": _wholes(KINDS.index(m.kind) for m in batch.measures),
+            "measures": len(batch.statistics),
+            "measure_columns": _wholes(places[m.signal] for m in batch.statistics),
+            "measure_kinds": _wholes(STATISTIC_KINDS.index(m.kind) for m in batch.statistics),
             "measure_firsts": _wholes(first for first, _ in spans),
             "measure_behinds": _wholes(behind for _, behind in spans),
             "outputs": len(batch.outputs),
             "output_columns": _wholes(places[name] for name in batch.outputs),
-            "most_events": batch.most_events,
+            "most_events": batch.max_events,
             **self._tables(),
         }
-        self.kinds = _kind_places(self.assembly, event_kinds(self.programs))
+        self.kinds = _kind_places(self.assembly, list_event_kinds(self.programs))
 
-    def of(self, batch: Batch) -> PlannedGroup:
+    def rebind(self, batch: Batch) -> CompiledGroup:
         """Return the same for all variants of another batch."""
         found = copy.copy(self)
-        found.batch, found.group = batch, Group(np.arange(batch.count), self.group.adjustment)
+        found.batch, found.group = batch, ProgramGroup(np.arange(batch.count), self.group.binding)
         return found
 
     def run(self, result: BatchResult, threads: int) -> None:
         """Carry all out, in chunks on threads; each chunk writes its own part of the result."""
         variants = self.group.variants
-        chunks = [variants[k : k + CHUNK] for k in range(0, len(variants), CHUNK)]
+        chunks = [variants[k : k + CHUNK_SIZE] for k in range(0, len(variants), CHUNK_SIZE)]
         if threads > 1 and len(variants) > threads:
-            size = min(CHUNK, -(-len(variants) // threads))
+            size = min(CHUNK_SIZE, -(-len(variants) // threads))
             chunks = [variants[k : k + size] for k in range(0, len(variants), size)]
         with ThreadPoolExecutor(threads) as pool:
             for left in pool.map(partial(self._chunk, result), chunks):
                 for variant in left:
-                    keep_variant(self.batch, result, variant, self.group.adjustment)
+                    run_variant(self.batch, result, variant, self.group.binding)
 
     def _chunk(self, result: BatchResult, variants: NDArray[np.int64]) -> list[int]:
         """Carry some variants out; return those that are left to the interpreter."""
         batch, count = self.batch, len(variants)
-        rows, most = len(self.plan.rows.high), batch.most_events
-        measured = np.empty((count, len(batch.measures)))
+        rows, most = len(self.plan.rows.high), batch.max_events
+        measured = np.empty((count, len(batch.statistics)))
         kept = np.empty((count, len(batch.outputs), rows))
-        events = np.empty((count, most), dtype=EVENT)
+        events = np.empty((count, most), dtype=EVENT_DTYPE)
         counts = np.zeros(count, dtype=np.int64)
         is_left = np.zeros(count, dtype=np.uint8)
         faults = np.zeros((count, len(self.programs)), dtype=np.uint32)
@@ -104,9 +108,9 @@ class PlannedGroup:
             "rows": np.empty((self.library.lanes, rows, self.library.width)),
             "inputs_room": np.empty((self.library.lanes, *self.plan.inputs.shape)),
         }
-        self.library.bound(plan, members)(0, count)
-        for place, measure in enumerate(batch.measures):
-            result.measures[measure.name][variants] = measured[:, place]
+        self.library.bind(plan, members)(0, count)
+        for place, measure in enumerate(batch.statistics):
+            result.statistics[measure.name][variants] = measured[:, place]
         for place, name in enumerate(batch.outputs):
             result.outputs[name][variants] = kept[:, place]
         result.event_counts[variants] = counts
@@ -134,31 +138,31 @@ class PlannedGroup:
         names = list(self.assembly.tunables())
         found = np.empty((len(variants), len(names)))
         arrays = {**self.batch.parameters, **self.batch.initial}
-        tuned = {place: arrays[name] for name, place in self.group.adjustment.tuned.items()}
+        tuned = {place: arrays[name] for name, place in self.group.binding.tunables.items()}
         for place, (owner, constant) in enumerate(names):
-            array = tuned.get((owner, short(constant.name)))
+            array = tuned.get((owner, unqualified_name(constant.name)))
             found[:, place] = constant.value if array is None else array[variants]
         return found
 
-    def _noise(self, variants: NDArray[np.int64]) -> tuple[Plan, NDArray[np.int64]]:
+    def _noise(self, variants: NDArray[np.int64]) -> tuple[RunPlan, NDArray[np.int64]]:
         strides = np.zeros(len(self.assembly.sensors) + 1, dtype=np.int64)
         if self.batch.seeds is None or not self.plan.noise:
             return self.plan, strides
         noise = {}
         for name, one in self.plan.noise.items():
             seeds = self.batch.seeds[variants].tolist()
-            noise[name] = np.stack([noise_of(seed, name, len(one)) for seed in seeds])
+            noise[name] = np.stack([noise_samples(seed, name, len(one)) for seed in seeds])
             strides[list(self.assembly.sensors).index(name)] = len(one)
-        return Plan(**{**vars(self.plan), "noise": noise}), strides
+        return RunPlan(**{**vars(self.plan), "noise": noise}), strides
 
     def _all_tables(self) -> list[Any]:
         """Return the table of each column of inputs that a variant changes."""
-        lines = self.system.lines
+        lines = self.system.delayed_signals
         sources = [lines[n].source if n in lines else n for n in self.assembly.inputs]
         return [self.batch.inputs[s] for s in sources if s in self.batch.inputs]
 
     def _tables(self) -> dict[str, Any]:
-        lines, tables = self.system.lines, self.batch.inputs
+        lines, tables = self.system.delayed_signals, self.batch.inputs
         inputs, pieces, widths = [], [], []
         for place, name in enumerate(self.assembly.inputs):
             line = lines.get(name)
@@ -180,15 +184,15 @@ def _wholes(values: Any) -> NDArray[np.int64]:
     return np.array([*values, 0], dtype=np.int64)
 
 
-def _kind_places(assembly: Assembly, kinds: Sequence[EventKind]) -> NDArray[np.int32]:
+def _kind_places(assembly: SimulationAssembly, kinds: Sequence[EventKind]) -> NDArray[np.int32]:
     """Return the place among the kinds of each event number in C."""
     found = []
     for name, program in assembly.programs.items():
         for info in program.transitions:
-            source, target = program.ends(info)
+            source, target = program.endpoint_names(info)
             found.append(EventKind(name, info.name, source, target, info.region))
-        for variable in ranged(program):
-            found.append(EventKind(name, f"range {short(variable.name)}", kind="range"))
+        for variable in range_event_variables(program):
+            found.append(EventKind(name, f"range {unqualified_name(variable.name)}", kind="range"))
         for invariant in program.invariants:
             text, region = f"invariant {invariant.name}", invariant.region
             found.append(EventKind(name, text, region=region, kind="invariant"))

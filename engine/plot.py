@@ -13,11 +13,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine.band import PALETTE, Band, draw_band, name_stretches
+from engine.band import PALETTE, ModeBand, draw_band, label_segments
 from engine.trajectory import Trajectory
-from language.mode import ALWAYS
-from language.problem import nearest
-from language.text import visible
+from language.mode import IMPLICIT_MODE
+from language.problem import suggest_name
+from language.text import escape_invisible
 
 QUANTITIES = {
     "1": "number", "A": "current", "K": "temperature", "N": "force", "N*m": "torque",
@@ -26,14 +26,14 @@ QUANTITIES = {
     "rad/s^2": "angular acceleration", "s": "time",
 }  # fmt: skip
 """What is written beside a unit on an axis."""
-FAR = 6.0
+MAX_PEAK_RATIO = 6.0
 """Ratio of peaks from which two neighbours in size do not share an axis: the smaller looks flat."""
-MOST_MARKERS = 200
+MAX_MARKERS = 200
 """Most mode changes marked in a panel; beyond, lines would be a grey area."""
 
 
 @dataclass(frozen=True)
-class Line:
+class PlotLine:
     """One curve: its signal, its label, a factor to the shown unit, the run that it is of."""
 
     signal: str
@@ -49,7 +49,7 @@ class Panel:
     """Curves over one axis; `height` in inches."""
 
     title: str
-    lines: Sequence[Line]
+    lines: Sequence[PlotLine]
     height: float = 2.0
 
 
@@ -75,10 +75,10 @@ class Picture:
         return self.data()
 
 
-def picture(
+def draw_picture(
     runs: Sequence[Trajectory],
     panels: Sequence[Panel],
-    bands: Sequence[Band],
+    bands: Sequence[ModeBand],
     title: str,
     span: tuple[float, float] | None = None,
     shaded: Sequence[tuple[float, float]] = (),
@@ -91,28 +91,28 @@ def picture(
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
-    window = _window(runs, span)
+    window = _time_window(runs, span)
     strips = [
         draw_band(axis, runs[band.run], band, window)
         for axis, band in zip(axes, bands, strict=False)
     ]
     for axis, panel in zip(axes[len(bands) :], panels, strict=True):
-        _panel(axis, runs, panel, window)
+        _draw_panel(axis, runs, panel, window)
         for start, end in shaded:
             axis.axvspan(start, end, color=PALETTE[1], alpha=0.2, lw=0, zorder=-1)
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
-    axes[0].set_title(visible(title), loc="left", fontsize=11, parse_math=False)
+    axes[0].set_title(escape_invisible(title), loc="left", fontsize=11, parse_math=False)
     axes[-1].set_xlabel("time [s]")
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlim(*window)
     if any(strips):
         figure.draw_without_rendering()  # what fits is known when the axes have their places
     for axis, stretches in zip(axes, strips, strict=False):
-        name_stretches(axis, stretches)
+        label_segments(axis, stretches)
     return Picture(figure)
 
 
-def overview(
+def draw_overview(
     runs: Sequence[Trajectory],
     patterns: Sequence[str] = (),
     span: tuple[float, float] | None = None,
@@ -126,13 +126,13 @@ def overview(
     _require_matches(runs, patterns)
     two = len(runs) > 1
     bands = [
-        Band(name.removesuffix(".mode") + (f", {labels[run]}" if two else ""), name, run)
+        ModeBand(name.removesuffix(".mode") + (f", {labels[run]}" if two else ""), name, run)
         for name in dict.fromkeys(name for each in runs for name in each.modes)
         for run, each in enumerate(runs)
         if name in each.signals and _matches(name, patterns) and _has_modes(each, name)
     ]
     title = title or " and ".join(dict.fromkeys(run.name for run in runs))
-    return picture(runs, panels_by_unit(runs, patterns, labels), bands, title, span)
+    return draw_picture(runs, panels_by_unit(runs, patterns, labels), bands, title, span)
 
 
 def panels_by_unit(
@@ -147,9 +147,11 @@ def panels_by_unit(
                 of_unit.append(name)
     panels = []
     for unit, names in by_unit.items():
-        for group in _groups(names, runs):
+        for group in _group_by_magnitude(names, runs):
             lines = [
-                Line(name, f"{name}, {labels[k]}" if len(runs) > 1 else name, 1.0, k > 0, k, colour)
+                PlotLine(
+                    name, f"{name}, {labels[k]}" if len(runs) > 1 else name, 1.0, k > 0, k, colour
+                )
                 for colour, name in enumerate(group)
                 for k, run in enumerate(runs)
                 if name in run.signals
@@ -160,26 +162,26 @@ def panels_by_unit(
 
 def _has_modes(run: Trajectory, name: str) -> bool:
     """Tell whether a signal is of modes, not of an automaton that has none of its own."""
-    return set(run.modes.get(name, {}).values()) not in (set(), {ALWAYS})
+    return set(run.modes.get(name, {}).values()) not in (set(), {IMPLICIT_MODE})
 
 
-def _groups(names: Sequence[str], runs: Sequence[Trajectory]) -> list[list[str]]:
+def _group_by_magnitude(names: Sequence[str], runs: Sequence[Trajectory]) -> list[list[str]]:
     """Return names in groups of similar size, none with more than there are colours."""
     peaks = {name: max(_peak(run, name) for run in runs) for name in names}
     groups: list[list[str]] = []
     last = 0.0
     for name in sorted(names, key=lambda name: -peaks[name]):
-        if not groups or 0.0 < peaks[name] * FAR < last:
+        if not groups or 0.0 < peaks[name] * MAX_PEAK_RATIO < last:
             groups.append([])
         groups[-1].append(name)
         last = peaks[name]
-    found = []
+    result = []
     for group in groups:
-        kept = [name for name in names if name in group]
-        parts = -(-len(kept) // len(PALETTE))
-        size = -(-len(kept) // parts)
-        found += [kept[start : start + size] for start in range(0, len(kept), size)]
-    return found
+        members = [name for name in names if name in group]
+        parts = -(-len(members) // len(PALETTE))
+        size = -(-len(members) // parts)
+        result += [members[start : start + size] for start in range(0, len(members), size)]
+    return result
 
 
 def _peak(run: Trajectory, name: str) -> float:
@@ -201,11 +203,13 @@ def _require_matches(runs: Sequence[Trajectory], patterns: Sequence[str]) -> Non
     known = list(dict.fromkeys(name for run in runs for name in run.signals))
     for pattern in patterns:
         if not fnmatch.filter(known, pattern):
-            hint = nearest(pattern, known) or f"signals: {', '.join(known)}"
+            hint = suggest_name(pattern, known) or f"signals: {', '.join(known)}"
             raise ValueError(f"no signal matches `{pattern}`: {hint}")
 
 
-def _window(runs: Sequence[Trajectory], span: tuple[float, float] | None) -> tuple[float, float]:
+def _time_window(
+    runs: Sequence[Trajectory], span: tuple[float, float] | None
+) -> tuple[float, float]:
     """Return what is shown: the span, its infinite ends replaced by those of the runs [s]."""
     times = [float(run.times[k]) for run in runs if len(run.times) for k in (0, -1)]
     whole = (min(times), max(times)) if len(set(times)) > 1 else (0.0, 1.0)
@@ -217,7 +221,7 @@ def _window(runs: Sequence[Trajectory], span: tuple[float, float] | None) -> tup
     return (start, end) if start < end else whole
 
 
-def _panel(
+def _draw_panel(
     axis: Axes, runs: Sequence[Trajectory], panel: Panel, window: tuple[float, float]
 ) -> None:
     for k, line in enumerate(panel.lines):
@@ -231,7 +235,7 @@ def _panel(
             color=colour, lw=1.2, label=line.label, drawstyle=style,
         )  # fmt: skip
     _mark_events(axis, runs[0], window)
-    axis.set_ylabel(visible(panel.title), fontsize=9, parse_math=False)
+    axis.set_ylabel(escape_invisible(panel.title), fontsize=9, parse_math=False)
     axis.grid(alpha=0.3)
 
 
@@ -239,6 +243,6 @@ def _mark_events(axis: Axes, run: Trajectory, window: tuple[float, float]) -> No
     """Mark when a mode became another one, not what fired and left the modes as they were."""
     times = {e.time for e in run.events if e.target not in ("", e.source)}
     instants = sorted(time for time in times if window[0] <= time <= window[1])
-    for k, time in enumerate(instants[:MOST_MARKERS]):
+    for k, time in enumerate(instants[:MAX_MARKERS]):
         label = "mode changes" if k == 0 else None
         axis.axvline(time, color="black", lw=0.7, ls=":", alpha=0.55, label=label, zorder=0)

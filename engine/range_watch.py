@@ -9,14 +9,14 @@ from operator import le
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.assembly import RANGE_SLACK
-from language.program import Program, short
+from language.assembly import RANGE_TOLERANCE
+from language.program import Program, unqualified_name
 
-FINITE = (-sys.float_info.max, sys.float_info.max)
+FINITE_RANGE = (-sys.float_info.max, sys.float_info.max)
 """The range of a state that has none of its own."""
 
 
-class RangeWatch:
+class RangeMonitor:
     """The ranges of one continuous automaton: never clamped, each leaving is reported once."""
 
     def __init__(
@@ -25,11 +25,11 @@ class RangeWatch:
         """Watch the states and discrete variables that have a range."""
         self._name, self._program, self._stepper, self._log = name, program, stepper, log
         self._bounds = {v.name: v.range for v in program.variables if v.range is not None}
-        self._read = stepper.reader(tuple(self._bounds))
+        self._read = stepper.make_reader(tuple(self._bounds))
         self._outside: set[str] = set()
         states = [v.name for v in program.variables if v.name.startswith("state.")]
-        limits = {**dict.fromkeys(states, FINITE), **self._bounds}
-        self._read_all = stepper.reader(tuple(limits))
+        limits = {**dict.fromkeys(states, FINITE_RANGE), **self._bounds}
+        self._read_all = stepper.make_reader(tuple(limits))
         self._lows = tuple(low for low, _ in limits.values())
         self._highs = tuple(high for _, high in limits.values())
 
@@ -39,24 +39,26 @@ class RangeWatch:
         is_inside = all(map(le, self._lows, values)) and all(map(le, values, self._highs))
         return is_inside and not self._outside
 
-    def look(self, time: Fraction) -> None:
+    def check(self, time: Fraction) -> None:
         """Report what has left its range since the last look."""
         for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
-            slack = RANGE_SLACK * (high - low)
+            slack = RANGE_TOLERANCE * (high - low)
             if low - slack <= value <= high + slack:
                 self._outside.discard(variable)
             elif variable not in self._outside:
                 self._outside.add(variable)
                 mode = self._program.mode_name(self._stepper.get("memory.mode"))
-                text = outside_text(variable, value, low, high)
-                self._log(left_range(float(time), self._name, short(variable), mode, text))
+                text = format_range_violation(variable, value, low, high)
+                self._log(
+                    range_event(float(time), self._name, unqualified_name(variable), mode, text)
+                )
 
 
-def outside_text(variable: str, value: float, low: float, high: float) -> str:
+def format_range_violation(variable: str, value: float, low: float, high: float) -> str:
     """Return what is told of a variable outside its range."""
-    return f"`{short(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
+    return f"`{unqualified_name(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
 
 
-def left_range(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
+def range_event(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
     """Return the event of a signal that left its range, in a mode."""
     return Event(time, 0, instance, f"range {signal}", mode, mode, kind="range", message=message)

@@ -14,23 +14,23 @@ from pathlib import Path
 
 from engine.recorded_file import MAX_BYTES, MAX_PROBLEMS, RecordedFile, Samples
 from language.problem import Problems, Source, Span
-from language.project import shown
+from language.project import display_path
 
 DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 """A number: longer ones, and words such as `nan`, are none."""
 
-PLAIN = b"+-.0123456789"
+DECIMAL_BYTES = b"+-.0123456789"
 """What most numbers are made of: where `float` takes such a text, it is a number."""
-LONGEST_PLAIN = 100_000
+MAX_PLAIN_LINE = 100_000
 """A line that is shorter has no cell that is too long for a CSV reader."""
 
 
 def read_csv(path: Path, problems: Problems) -> RecordedFile:
     """Read a CSV file; rows that do not fit the head line are reported. Raises SpecError."""
-    source = Source(shown(path))
+    source = Source(display_path(path))
     lines = _read_lines(path, source)
     source = Source(source.name, tuple(lines))
-    rows = _Rows(source, problems)
+    rows = _CsvRows(source, problems)
     return RecordedFile(source, "column", rows.head, rows.samples, len(rows.rows))
 
 
@@ -41,13 +41,13 @@ def _read_lines(path: Path, source: Source) -> list[str]:
     try:
         if path.stat().st_size > MAX_BYTES:
             problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
-            problems.stop_if_any()
+            problems.raise_if_errors()
         data = path.read_bytes()
         if path.suffix == ".gz":
             data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
-            problems.stop_if_any()
+            problems.raise_if_errors()
         text = data.decode("utf-8-sig")
     except OSError as error:
         reason = error.strerror or str(error)
@@ -56,16 +56,16 @@ def _read_lines(path: Path, source: Source) -> list[str]:
         problems.error("unreadable", place, f"the recording cannot be unpacked: {error}")
     except UnicodeDecodeError:
         problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
-    problems.stop_if_any()
+    problems.raise_if_errors()
     if "\0" in text:
         problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
     elif not text.strip():
         problems.error("empty", place, "the recording is empty")
-    problems.stop_if_any()
+    problems.raise_if_errors()
     return text.splitlines()
 
 
-class _Rows:
+class _CsvRows:
     """The cells of a CSV text, each with its place."""
 
     def __init__(self, source: Source, problems: Problems) -> None:
@@ -73,13 +73,13 @@ class _Rows:
         self.head: list[str] = []
         self.numbers: list[int] = []
         self.rows: list[list[str]] = []
-        if len(problems.found) >= MAX_PROBLEMS or not self._take_plain():
-            self._take_each(problems)
+        if len(problems.reported) >= MAX_PROBLEMS or not self._split_all_rows():
+            self._parse_each_row(problems)
 
-    def _take_plain(self) -> bool:
+    def _split_all_rows(self) -> bool:
         """Take all rows at once where none has quotes and all as many cells; tell whether so."""
         lines = self.source.lines
-        if '"' in "".join(lines) or max(map(len, lines)) >= LONGEST_PLAIN:
+        if '"' in "".join(lines) or max(map(len, lines)) >= MAX_PLAIN_LINE:
             return False
         numbers = [number for number, line in enumerate(lines, start=1) if line.strip()]
         rows = [lines[number - 1].split(",") for number in numbers]
@@ -89,11 +89,11 @@ class _Rows:
         self.numbers, self.rows = numbers[1:], rows[1:]
         return True
 
-    def _take_each(self, problems: Problems) -> None:
+    def _parse_each_row(self, problems: Problems) -> None:
         for number, line in enumerate(self.source.lines, start=1):
             if not line.strip():
                 continue
-            row = self._cells_of(number, line, problems)
+            row = self._parse_row(number, line, problems)
             if not self.head:
                 self.head = [cell.strip() for cell in row]
             elif len(row) != len(self.head):
@@ -103,11 +103,11 @@ class _Rows:
             else:
                 self.numbers.append(number)
                 self.rows.append(row)
-            if len(problems.found) >= MAX_PROBLEMS:
+            if len(problems.reported) >= MAX_PROBLEMS:
                 break
 
-    def _cells_of(self, number: int, line: str, problems: Problems) -> list[str]:
-        if '"' not in line and len(line) < LONGEST_PLAIN:
+    def _parse_row(self, number: int, line: str, problems: Problems) -> list[str]:
+        if '"' not in line and len(line) < MAX_PLAIN_LINE:
             return line.split(",")
         try:
             return next(csv.reader([line], strict=True))
@@ -130,18 +130,18 @@ class _Rows:
             column = 1 + sum(len(cell) + 1 for cell in row[:position])
             return Span(self.source, line, column, max(1, len(row[position])))
 
-        return Samples(_numbers(texts), texts.__getitem__, place)
+        return Samples(_parse_numbers(texts), texts.__getitem__, place)
 
 
-def _numbers(texts: list[str]) -> list[float | None]:
+def _parse_numbers(texts: list[str]) -> list[float | None]:
     """Return the number of each cell, None for an empty one, NaN for what is none."""
     with suppress(ValueError):
-        if not "".join(texts).encode().translate(None, PLAIN):
+        if not "".join(texts).encode().translate(None, DECIMAL_BYTES):
             return list(map(float, texts))
-    return [_number(text) for text in texts]
+    return [_parse_number(text) for text in texts]
 
 
-def _number(text: str) -> float | None:
+def _parse_number(text: str) -> float | None:
     if not text:
         return None
     return float(text) if DECIMAL.fullmatch(text) else math.nan

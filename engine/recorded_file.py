@@ -45,7 +45,7 @@ class RecordedFile:
     read: Callable[[str], Samples]
     rows: int
     is_stamped: bool = False
-    lacking: Callable[[str], str] = lambda name: ""
+    explain_missing: Callable[[str], str] = lambda name: ""
 
     @property
     def head(self) -> Span:
@@ -61,36 +61,38 @@ def require_size(path: Path, source: Source) -> None:
         with path.open("rb"):
             pass
     except OSError as error:
-        raise unreadable(source, f"read: {error.strerror or error}") from None
+        raise unreadable_error(source, f"read: {error.strerror or error}") from None
     if size > MAX_BYTES:
         problems = Problems()
         problems.error(
             "huge", Span(source, 1, 1), f"the recording is larger than {MAX_BYTES} bytes"
         )
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     if not size:
         problems = Problems()
         problems.error("empty", Span(source, 1, 1), "the recording is empty")
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
 
 
-def require_file(path: Path, source: Source) -> None:
+def require_regular_file(path: Path, source: Source) -> None:
     """Raise SpecError for a pipe or a device: it may never end, and can be read only once."""
     try:
         mode = path.stat().st_mode
     except OSError:
         return  # what is wrong is told where it is read
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise unreadable(source, "read: it is a pipe or a device", "write it into a file first")
+        raise unreadable_error(
+            source, "read: it is a pipe or a device", "write it into a file first"
+        )
 
 
-def unreadable(source: Source, how: str, help: str = "") -> SpecError:
+def unreadable_error(source: Source, action: str, help: str = "") -> SpecError:
     """Return the error of a file that cannot be read, unpacked or understood."""
     problems = Problems()
-    problems.error("unreadable", Span(source, 1, 1), f"the recording cannot be {how}", help)
-    return SpecError(problems.found)
+    problems.error("unreadable", Span(source, 1, 1), f"the recording cannot be {action}", help)
+    return SpecError(problems.reported)
 
 
-def exact(value: float) -> Fraction:
+def exact_fraction(value: float) -> Fraction:
     """Return the shortest decimal that stands for a floating-point number, exactly."""
     return Fraction(repr(float(value)))

@@ -6,22 +6,22 @@ import math
 from pathlib import Path
 from typing import Any
 
-from engine.arrow import arrow_for
-from engine.recorded_file import RecordedFile, Samples, require_size, unreadable
+from engine.arrow import import_pyarrow
+from engine.recorded_file import RecordedFile, Samples, require_size, unreadable_error
 from language.problem import Source, Span
-from language.project import shown
+from language.project import display_path
 
 
 def read_parquet(path: Path) -> RecordedFile:
     """Read a Parquet file. Raises SpecError, ToolMissing (no pyarrow)."""
-    source = Source(shown(path))
+    source = Source(display_path(path))
     require_size(path, source)
-    arrow = arrow_for("a Parquet file")
+    arrow = import_pyarrow("a Parquet file")
     try:
         table = arrow.parquet.read_table(path)
     except (OSError, arrow.ArrowException) as error:
         first = str(error).splitlines()[0]
-        raise unreadable(source, f"understood as Parquet: {first}") from None
+        raise unreadable_error(source, f"understood as Parquet: {first}") from None
 
     def read(name: str) -> Samples:
         cells = table.column(name).to_pylist()
@@ -29,12 +29,12 @@ def read_parquet(path: Path) -> RecordedFile:
         def text(k: int) -> str:
             return "" if cells[k] is None else repr(cells[k])
 
-        return Samples([_number(cell) for cell in cells], text, lambda k: Span(source, k + 1, 1))
+        return Samples([_to_float(cell) for cell in cells], text, lambda k: Span(source, k + 1, 1))
 
     return RecordedFile(source, "column", table.column_names, read, table.num_rows)
 
 
-def _number(cell: Any) -> float | None:
+def _to_float(cell: Any) -> float | None:
     if cell is None:
         return None
     return float(cell) if isinstance(cell, int | float) else math.nan

@@ -11,7 +11,7 @@ from pathlib import Path
 from language.experiment import RecordingMap, Window
 from language.problem import Problems
 
-PART = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+(?:\.\d+)?)")
+PART_PATTERN = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+(?:\.\d+)?)")
 
 
 def file_of(path: Path) -> Path:
@@ -24,7 +24,7 @@ def part_of(path: Path) -> tuple[Path, Window | None]:
 
     A file that is itself called like that is taken as it is.
     """
-    match = PART.fullmatch(path.name)
+    match = PART_PATTERN.fullmatch(path.name)
     if not match or path.exists():
         return path, None
     return path.with_name(match["file"]), (Fraction(match["start"]), Fraction(match["end"]))
@@ -46,20 +46,22 @@ def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[W
     return found
 
 
-def overlap(first: Path, second: Path, opened: bool = True) -> bool:
+def overlap(first: Path, second: Path, compare_contents: bool = True) -> bool:
     """Tell whether two paths name the same values: the same file or a copy, with a common time.
 
-    Where they may not be `opened` yet, a copy is taken for another file.
+    Where they may not be `compare_contents` yet, a copy is taken for another file.
     """
     (one, a), (other, b) = part_of(first), part_of(second)
-    if os.path.realpath(one) != os.path.realpath(other) and not (opened and is_copy(one, other)):
+    if os.path.realpath(one) != os.path.realpath(other) and not (
+        compare_contents and is_copy(one, other)
+    ):
         return False
     return a is None or b is None or max(a[0], b[0]) < min(a[1], b[1])
 
 
-def is_copy(one: Path, other: Path) -> bool:
+def is_copy(first: Path, second: Path) -> bool:
     """Tell whether two files hold the same bytes; one that cannot be read is no copy."""
     try:
-        return filecmp.cmp(one, other, shallow=False)
+        return filecmp.cmp(first, second, shallow=False)
     except OSError:
         return False

@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from engine.channel_reader import ChannelReader, require_names
 from engine.recorded_csv import read_csv
-from engine.recorded_file import RecordedFile, require_file
+from engine.recorded_file import RecordedFile, require_regular_file
 from engine.recorded_part import file_of, windows_of
-from language.experiment import Column, RecordingMap, Window
+from language.experiment import ColumnMapping, RecordingMap, Window
 from language.problem import Problems, Source
-from language.project import shown
+from language.project import display_path
 
 
 @dataclass(frozen=True)
 class Channel:
     """One signal: time stamps [s], exact and increasing, and values in SI, both (n_samples,)."""
 
-    column: Column
+    column: ColumnMapping
     times: tuple[Fraction, ...]
     values: tuple[float, ...]
 
@@ -40,10 +40,10 @@ class Channel:
         """Values in SI (n_samples,)."""
         return np.array(self.values)
 
-    def part(self, cut: slice) -> Channel:
+    def slice_samples(self, selection: slice) -> Channel:
         """Return a stretch of the samples."""
-        found = Channel(self.column, self.times[cut], self.values[cut])
-        vars(found).update(seconds=self.seconds[cut], array=self.array[cut])
+        found = Channel(self.column, self.times[selection], self.values[selection])
+        vars(found).update(seconds=self.seconds[selection], array=self.array[selection])
         return found
 
 
@@ -60,24 +60,24 @@ class Recording:
     start: Fraction = Fraction(0)
     windows: tuple[Window, ...] = ()
 
-    def uses(self, time: Fraction) -> bool:
+    def is_used(self, time: Fraction) -> bool:
         """Tell whether a time [s] is in one of the windows."""
         return not self.windows or any(start <= time <= end for start, end in self.windows)
 
 
-def pieces(recording: Recording) -> list[Recording]:
+def split_by_windows(recording: Recording) -> list[Recording]:
     """Return a recording as one for each of its windows."""
-    return [cut(recording, window) for window in recording.windows] or [recording]
+    return [crop(recording, window) for window in recording.windows] or [recording]
 
 
-def cut(recording: Recording, window: Window) -> Recording:
+def crop(recording: Recording, window: Window) -> Recording:
     """Return what a recording has in a window; a channel without a value there is left out."""
     channels = {}
     for name, channel in recording.channels.items():
         first = bisect_left(channel.times, window[0])
         last = bisect_right(channel.times, window[1])
         if first < last:
-            channels[name] = channel.part(slice(first, last))
+            channels[name] = channel.slice_samples(slice(first, last))
     start, end = max(window[0], recording.start), min(window[1], recording.end)
     return Recording(recording.name, channels, end, start, (window,))
 
@@ -90,28 +90,28 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     Raises SpecError with all problems, ToolMissing.
     """
     problems = Problems()
-    file = open_recorded(path, mapping, problems)
+    file = open_recording(path, mapping, problems)
     columns = [mapping.columns[name] for name in used]
     wanted = [name for column in columns for name in column.columns]
     if not file.is_stamped:
         if not mapping.time:
             label = f"map `{mapping.name}` names no column of time, which this file needs"
             problems.error("missing", mapping.span, label, "`time: {column: t_s, unit: s}`")
-            problems.stop_if_any()
+            problems.raise_if_errors()
         wanted = [mapping.time, *wanted, *[column.time for column in columns if column.time]]
     require_names(file, wanted, mapping, problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
     reader = ChannelReader(file, mapping, problems)
     channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
-    problems.stop_if_any()
+    problems.raise_if_errors()
     _share_seconds(channels.values())
     ends = [*reader.clock[:1], *reader.clock[-1:]]
     if file.is_stamped:
         ends = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
     known = [time for time in ends if time is not None]
     windows = windows_of(path, mapping, problems)
-    problems.stop_if_any()
-    return within(Recording(path.name, channels, max(known), min(known), windows), mapping)
+    problems.raise_if_errors()
+    return crop_to_windows(Recording(path.name, channels, max(known), min(known), windows), mapping)
 
 
 def _share_seconds(channels: Iterable[Channel]) -> None:
@@ -122,10 +122,10 @@ def _share_seconds(channels: Iterable[Channel]) -> None:
         vars(channel)["seconds"] = together.seconds
 
 
-def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
+def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
     """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
     path = file_of(path)
-    require_file(path, Source(shown(path)))
+    require_regular_file(path, Source(display_path(path)))
     ending = path.suffix.lower()
     if ending == ".parquet":
         from engine.recorded_parquet import read_parquet
@@ -151,7 +151,7 @@ def _is_mdf(path: Path) -> bool:
         return False
 
 
-def within(recording: Recording, mapping: RecordingMap) -> Recording:
+def crop_to_windows(recording: Recording, mapping: RecordingMap) -> Recording:
     """Return a recording from the start of its first window to the end of its last one.
 
     Raises SpecError for a window in which a channel has no value.
@@ -159,13 +159,13 @@ def within(recording: Recording, mapping: RecordingMap) -> Recording:
     if not recording.windows:
         return recording
     problems = Problems()
-    for piece in pieces(recording):
+    for piece in split_by_windows(recording):
         for name in recording.channels.keys() - piece.channels.keys():
             (start, end), *_ = piece.windows
             label = f"`{name}` has no value from {float(start):g} s to {float(end):g} s"
             hint = f"{recording.name} goes from {float(recording.start):g} s to "
             hint += f"{float(recording.end):g} s"
             problems.error("range", mapping.span, label + ", a window of this map", hint)
-    problems.stop_if_any()
-    whole = cut(recording, (recording.windows[0][0], recording.windows[-1][1]))
+    problems.raise_if_errors()
+    whole = crop(recording, (recording.windows[0][0], recording.windows[-1][1]))
     return dataclasses.replace(whole, windows=recording.windows)

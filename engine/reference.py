@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from engine.interpreter import Interpreter, Stepper
-from engine.library_stepper import LibraryStepper, Method
+from engine.library_stepper import ScipyMethod, ScipyStepper
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
 from language.experiment import Scenario, System
@@ -25,32 +25,34 @@ from language.program import ObserverInfo, Program
 
 Reals = NDArray[np.float64]
 
-NEGLIGIBLE = 1e-9
+NEGLIGIBLE_RATIO = 1e-9
 """Most that a number taken as 0 may be of its matrix: the agreement promised (rule 17f)."""
 
 
-def reference(system: System, scenario: Scenario, method: Method = "DOP853") -> Trajectory:
+def simulate_reference(
+    system: System, scenario: Scenario, method: ScipyMethod = "DOP853"
+) -> Trajectory:
     """Return the trajectory of a system through a scenario, by independent libraries."""
     return simulate(system, scenario, partial(reference_stepper, method=method))
 
 
-def by_method(system: System, scenario: Scenario, method: Method) -> Trajectory:
+def simulate_with_scipy(system: System, scenario: Scenario, method: ScipyMethod) -> Trajectory:
     """Return a trajectory for which scipy integrates; sampled automata keep our numbers."""
-    return simulate(system, scenario, partial(_integrated, method=method))
+    return simulate(system, scenario, partial(_scipy_integrated_stepper, method=method))
 
 
-def reference_stepper(program: Program, method: Method = "DOP853") -> Stepper:
+def reference_stepper(program: Program, method: ScipyMethod = "DOP853") -> Stepper:
     """Return what runs a Program with the numerics of scipy and filterpy."""
     if program.period is None:
-        return LibraryStepper(program, method)
-    return Interpreter(with_library_numbers(program))
+        return ScipyStepper(program, method)
+    return Interpreter(with_reference_numbers(program))
 
 
-def _integrated(program: Program, method: Method) -> Stepper:
-    return LibraryStepper(program, method) if program.period is None else Interpreter(program)
+def _scipy_integrated_stepper(program: Program, method: ScipyMethod) -> Stepper:
+    return ScipyStepper(program, method) if program.period is None else Interpreter(program)
 
 
-def with_library_numbers(program: Program) -> Program:
+def with_reference_numbers(program: Program) -> Program:
     """Return a sampled Program with the solved numbers of its observers by scipy and filterpy.
 
     ValueError: a number that is not negligible was taken as 0, so that nothing can be replaced.
@@ -58,7 +60,7 @@ def with_library_numbers(program: Program) -> Program:
     numbers: dict[str, float] = {}
     for info in program.observers:
         if info.gain == "steady":
-            numbers.update(library_numbers(info))
+            numbers.update(reference_numbers(info))
     constants = tuple(
         dataclasses.replace(constant, value=numbers.get(constant.name, constant.value))
         for constant in program.constants
@@ -66,7 +68,7 @@ def with_library_numbers(program: Program) -> Program:
     return dataclasses.replace(program, constants=constants)
 
 
-def library_numbers(info: ObserverInfo) -> dict[str, float]:
+def reference_numbers(info: ObserverInfo) -> dict[str, float]:
     """Return an observer's solved numbers by the name of their constant; its zeros have none.
 
     Phi, G (n, n), Gamma (n, inputs), L (n, measures), C (measures, n).
@@ -80,7 +82,7 @@ def library_numbers(info: ObserverInfo) -> dict[str, float]:
         "C": (measures, states),
     }
     found = {}
-    for letter, matrix in _matrices(info).items():
+    for letter, matrix in _observer_matrices(info).items():
         rows, columns = sides[letter]
         largest = float(np.max(np.abs(matrix), initial=0.0))
         for i, row in enumerate(rows):
@@ -88,12 +90,12 @@ def library_numbers(info: ObserverInfo) -> dict[str, float]:
                 name, value = f"solved.{info.mode}_{letter}.{row}.{column}", float(matrix[i, j])
                 if name in info.solved:
                     found[name] = value
-                elif letter != "G" and abs(value) > NEGLIGIBLE * largest:
+                elif letter != "G" and abs(value) > NEGLIGIBLE_RATIO * largest:
                     raise ValueError(f"{name} is 0 in the Program, {value!r} by the libraries")
     return found
 
 
-def _matrices(info: ObserverInfo) -> dict[str, Reals]:
+def _observer_matrices(info: ObserverInfo) -> dict[str, Reals]:
     """Return the matrices of an observer; G = integral of e^(A s) over a period T [s].
 
     Noise enters van_loan_discretization as G G' (n, n): the root of the diagonal spectral density.

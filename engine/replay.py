@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from engine.firing import event, fired_in_steps, mode_names
+from engine.firing import fired_by_micro_step, mode_names, transition_event
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
-from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
+from engine.trajectory import Event, SignalArray, Trajectory, column_array, fault_names
 from language.experiment import RecordingMap
 from language.model import CHART, Automaton
-from language.pairing import paired
+from language.pairing import pair_columns
 from language.problem import Problems, SpecError
 from language.program import Program
-from language.units import shown_unit
+from language.units import display_unit
 
 MAX_TICKS = 20_000_000
 """Most ticks of one replay."""
@@ -55,13 +55,13 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
     Raises SpecError: an input without a column, a wrong dimension, an unknown output.
     """
     problems = Problems()
-    used, left_out = paired(automaton, mapping, problems)
+    used, left_out = pair_columns(automaton, mapping, problems)
     for column in (mapping.columns[name] for name in used):
         if column.to is not None and column.hold == "linear":
             label = f"column `{column.name}` is held `linear`: a replay reads the latest"
             hint = "`hold: previous`; linear is for a scenario's `recording`"
             problems.error("form", column.span, label, hint)
-    problems.stop_if_any()
+    problems.raise_if_errors()
     left_out += [name for name in mapping.constants if name not in automaton.inputs]
     return used, left_out
 
@@ -72,7 +72,7 @@ def replay(
     recording: Recording,
     mapping: RecordingMap,
     build: Callable[[Program], Stepper] = Interpreter,
-    ticked: Callable[[Stepper], None] | None = None,
+    on_tick: Callable[[Stepper], None] | None = None,
 ) -> Replay:
     """Tick through a recording: inputs held, a channel without a new value has innovation 0.
 
@@ -88,41 +88,43 @@ def replay(
         problems = Problems()
         label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
         problems.error("range", mapping.span, label)
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     _set_constants(automaton, program, mapping, stepper)
-    keep = _ticked_through(program, stepper, feeds, start, count, ticked)
+    keep = _run_ticks(program, stepper, feeds, start, count, on_tick)
     word = stepper.get("memory.faults") if program.faults else 0
     faults = fault_names(automaton.name, program, word)
     trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
     compared = [c for c in recording.channels.values() if c.column.compare is not None]
-    found = [_compared(channel, trajectory, start, program, recording) for channel in compared]
+    found = [
+        _compare_output(channel, trajectory, start, program, recording) for channel in compared
+    ]
     return Replay(trajectory, keep.innovation_rms(), tuple(one for one in found if one))
 
 
-def _ticked_through(
+def _run_ticks(
     program: Program,
     stepper: Stepper,
-    feeds: Sequence[Channel],
+    channels: Sequence[Channel],
     start: Fraction,
     count: int,
-    ticked: Callable[[Stepper], None] | None,
-) -> _Kept:
+    on_tick: Callable[[Stepper], None] | None,
+) -> _TickRecorder:
     """Tick `count` times from `start` [s]: channels are latched, then the step runs."""
     assert program.period is not None
-    cursors = [_Cursor(channel, program) for channel in feeds]
-    keep = _Kept(program, [cursor.target for cursor in cursors])
+    cursors = [_ChannelCursor(channel, program) for channel in channels]
+    keep = _TickRecorder(program, [cursor.target for cursor in cursors])
     for tick in range(count):
         time = start + tick * program.period
         for cursor in cursors:
             cursor.advance(time, stepper)
         stepper.run("step")
-        keep.row(time, stepper)
-        if ticked:
-            ticked(stepper)
+        keep.record(time, stepper)
+        if on_tick:
+            on_tick(stepper)
     return keep
 
 
-class _Cursor:
+class _ChannelCursor:
     """A channel and how far it has been read."""
 
     def __init__(self, channel: Channel, program: Program) -> None:
@@ -158,19 +160,19 @@ def _set_constants(
             stepper.set(f"input.{name}", float(number))
 
 
-class _Kept:
+class _TickRecorder:
     """Rows of what each tick gave."""
 
-    def __init__(self, program: Program, fed: Sequence[str]) -> None:
+    def __init__(self, program: Program, input_names: Sequence[str]) -> None:
         self.program = program
-        self.names = {f"in.{name.partition('.')[2]}": name for name in fed}
+        self.names = {f"in.{name.partition('.')[2]}": name for name in input_names}
         self.names.update({wire.name: wire.source for wire in program.outputs})
         for region, variable in program.mode_variables().items():
             self.names.setdefault("mode" if region == CHART else region, variable)
         variables = {variable.name: variable for variable in program.variables}
         self.kinds = {name: variables[source].type for name, source in self.names.items()}
         self.units = {
-            name: shown_unit(variables[source].unit) for name, source in self.names.items()
+            name: display_unit(variables[source].unit) for name, source in self.names.items()
         }
         self.innovations = [n for n in variables if n.startswith("innovation.")]
         observing = {info.mode for info in program.observers}
@@ -182,7 +184,7 @@ class _Kept:
         self.events: list[Event] = []
         self.mode: int | None = None
 
-    def row(self, time: Fraction, stepper: Stepper) -> None:
+    def record(self, time: Fraction, stepper: Stepper) -> None:
         self.times.append(time)
         self.rows.append(tuple([stepper.get(source) for source in self.names.values()]))
         if self.mode in self.observing:
@@ -191,8 +193,10 @@ class _Kept:
                     self.squares[name] += stepper.get(name) ** 2
                     self.counts[name] += 1
         name, program = self.program.name, self.program
-        taken = fired_in_steps(program, stepper)
-        self.events += [event(name, program, info, float(time), step) for step, info in taken]
+        taken = fired_by_micro_step(program, stepper)
+        self.events += [
+            transition_event(name, program, info, float(time), step) for step, info in taken
+        ]
         self.mode = stepper.get("memory.mode")
 
     def innovation_rms(self) -> dict[str, float]:
@@ -204,7 +208,7 @@ class _Kept:
 
     def trajectory(self, name: str) -> Trajectory:
         columns = list(zip(*self.rows, strict=True))
-        signals: dict[str, Values] = {}
+        signals: dict[str, SignalArray] = {}
         for (key, kind), values in zip(self.kinds.items(), columns, strict=True):
             signals[key] = column_array(kind, values)
         return Trajectory(
@@ -217,7 +221,7 @@ class _Kept:
         )
 
 
-def _compared(
+def _compare_output(
     channel: Channel,
     trajectory: Trajectory,
     start: Fraction,
@@ -230,7 +234,7 @@ def _compared(
     differences = []
     for time, value in zip(channel.times, channel.values, strict=True):
         tick = math.ceil((time - start) / program.period)
-        if 0 <= tick < len(output) and recording.uses(time):
+        if 0 <= tick < len(output) and recording.is_used(time):
             differences.append(float(output[tick]) - value)
     if not differences:
         return None

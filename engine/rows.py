@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.trajectory import Values as Column, column_array
+from engine.trajectory import SignalArray as Column, column_array
 from language.declaration import Formula
 from language.experiment import Scenario, System
 from language.program import Program, ValueType
-from language.units import shown_unit
+from language.units import display_unit
 from language.wires import output_block
 
-Values = tuple[Any, ...]
+RowValues = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedColumn:
     """A recorded signal: the name, its type and unit, and the output block or signal it reads."""
 
     name: str
@@ -32,40 +32,42 @@ class Recorded:
     source: str
 
 
-def recorded(
+def recorded_columns(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
-) -> tuple[Recorded, ...]:
+) -> tuple[RecordedColumn, ...]:
     """Return what is recorded: the scenario's choice, else outputs of all and expressions."""
-    known: dict[str, Recorded] = {}
+    known: dict[str, RecordedColumn] = {}
     for name, thing in system.inputs.items():
-        kind: ValueType = "truth" if thing.truth else "real"
-        known[name] = Recorded(name, kind, str(thing.unit.dimension), None, name)
-    everything: list[str] = []
+        kind: ValueType = "truth" if thing.is_bool else "real"
+        known[name] = RecordedColumn(name, kind, str(thing.unit.dimension), None, name)
+    default_names: list[str] = []
     for owner, program in programs.items():
         for wire in program.outputs:
             name = f"{owner}.{wire.name}"
-            known[name] = Recorded(name, wire.type, shown_unit(wire.unit), None, name)
-            everything.append(name)
+            known[name] = RecordedColumn(name, wire.type, display_unit(wire.unit), None, name)
+            default_names.append(name)
     for name, sensor in system.sensors.items():
-        known[name] = Recorded(name, "real", str(sensor.dimension), None, name)
-        everything.append(name)
+        known[name] = RecordedColumn(name, "real", str(sensor.dimension), None, name)
+        default_names.append(name)
     for name, output in system.outputs.items():
         if isinstance(output, Formula):
             dimension = system.dimensions.get(name)
             kind = "real" if dimension else "truth"
             block = output_block(name)
-            known[name] = Recorded(name, kind, str(dimension or "1"), block, name)
-            everything.append(name)
+            known[name] = RecordedColumn(name, kind, str(dimension or "1"), block, name)
+            default_names.append(name)
         else:
             part = known[output]
-            known[name] = Recorded(name, part.type, shown_unit(part.unit), None, part.source)
-    return tuple(known[name] for name in scenario.signals or everything)
+            known[name] = RecordedColumn(
+                name, part.type, display_unit(part.unit), None, part.source
+            )
+    return tuple(known[name] for name in scenario.signals or default_names)
 
 
-class Rows:
+class RowRecorder:
     """The rows of a run, in the order of time."""
 
-    def __init__(self, columns: tuple[Recorded, ...]) -> None:
+    def __init__(self, columns: tuple[RecordedColumn, ...]) -> None:
         """Take what is recorded."""
         self.columns = columns
         self.times: list[Fraction] = []
@@ -82,14 +84,14 @@ class Rows:
         row = [formula(c.block, read) if c.block else read(c.source) for c in self.columns]
         self._rows.append(tuple(row))
 
-    def picked_from(self, names: Sequence[str]) -> Callable[[Values], Values] | None:
+    def make_row_picker(self, names: Sequence[str]) -> Callable[[RowValues], RowValues] | None:
         """Return what picks a row out of the values of some signals; None if they are too few."""
         if any(column.block or column.source not in names for column in self.columns):
             return None
         places = [names.index(column.source) for column in self.columns]
         return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
 
-    def extend(self, times: Sequence[Fraction], rows: Iterable[Values]) -> None:
+    def extend(self, times: Sequence[Fraction], rows: Iterable[RowValues]) -> None:
         """Add rows that are complete."""
         self.times += times
         self._rows += rows

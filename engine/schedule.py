@@ -17,7 +17,7 @@ MAX_INSTANTS = 100_000_000
 """Most ticks, samples and rows of one run: about an hour of the interpreter."""
 
 
-class Grid:
+class TimeGrid:
     """The instants start, start + period, start + 2 periods ... from time 0 on."""
 
     def __init__(self, start: Fraction, period: Fraction) -> None:
@@ -47,41 +47,45 @@ class Schedule:
         """Take a resolved scenario."""
         assert scenario.horizon is not None
         self.horizon = scenario.horizon
-        self.rows = Grid(Fraction(0), scenario.every)
+        self.rows = TimeGrid(Fraction(0), scenario.every)
         self.ticks = {
-            name: Grid(system.instances[name].offset, program.period)
+            name: TimeGrid(system.instances[name].offset, program.period)
             for name, program in programs.items()
             if program.period is not None
         }
-        self.samples: dict[str, Grid] = {}
-        self.captures: dict[str, list[Grid]] = {}
+        self.samples: dict[str, TimeGrid] = {}
+        self.captures: dict[str, list[TimeGrid]] = {}
         for name, sensor in system.sensors.items():
             if sensor.period is not None:
-                self.samples[name] = Grid(sensor.offset, sensor.period)
+                self.samples[name] = TimeGrid(sensor.offset, sensor.period)
                 if sensor.delay:
-                    late = Grid(sensor.offset - sensor.delay, sensor.period)
+                    late = TimeGrid(sensor.offset - sensor.delay, sensor.period)
                     self.captures[name] = [late]
-        self._arrivals: list[Grid] = []
+        self._arrivals: list[TimeGrid] = []
         for connection in system.connections.values():
-            for line in (system.lines[read] for read in connection.reads if read in system.lines):
+            for line in (
+                system.delayed_signals[read]
+                for read in connection.reads
+                if read in system.delayed_signals
+            ):
                 reader, owner = connection.target[0], line.source.partition(".")[0]
                 at = self.captures.setdefault(line.name, [])
                 ticking = self.ticks.get(owner) or self.samples.get(line.source)
                 if reader in self.ticks and ticking is None and line.source not in system.inputs:
                     own = self.ticks[reader]
-                    at.append(Grid(own.start - line.delay, own.period))
+                    at.append(TimeGrid(own.start - line.delay, own.period))
                 elif reader not in self.ticks and ticking is not None:
-                    self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
-        pages = (page.time for page in scenario.pages)
-        self.events = _in_order([*pages, *_events(system, scenario.inputs)])
+                    self._arrivals.append(TimeGrid(ticking.start + line.delay, ticking.period))
+        pages = (page.time for page in scenario.calibrations)
+        self.events = _sort_unique([*pages, *_input_event_times(system, scenario.inputs)])
         self._require_bounded(scenario)
 
     @property
-    def _grids(self) -> list[Grid]:
+    def _grids(self) -> list[TimeGrid]:
         captures = [grid for grids in self.captures.values() for grid in grids]
         return [*self.ticks.values(), *self.samples.values(), *captures, *self._arrivals]
 
-    def grids(self) -> dict[str, Grid]:
+    def grids(self) -> dict[str, TimeGrid]:
         """Return when what ticks, samples or captures does so; of a run without delayed outputs."""
         late = {f"capture {n}": grids[0] for n, grids in self.captures.items() if grids}
         return {**self.ticks, **self.samples, **late}
@@ -97,7 +101,7 @@ class Schedule:
                 yield time
             last = time
 
-    def captured(self, time: Fraction) -> list[str]:
+    def captures_at(self, time: Fraction) -> list[str]:
         """Return the sensors and lines that capture their signal at an instant."""
         return [n for n, grids in self.captures.items() if any(grid.has(time) for grid in grids)]
 
@@ -107,20 +111,20 @@ class Schedule:
             label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
             problems = Problems()
             problems.error("range", scenario.span, label, "a shorter `horizon`")
-            raise SpecError(problems.found)
+            raise SpecError(problems.reported)
 
 
-def _in_order(times: Sequence[Fraction]) -> list[Fraction]:
+def _sort_unique(times: Sequence[Fraction]) -> list[Fraction]:
     """Return times in their order, each once: as whole numbers of a tick they are soon compared."""
     bottom = math.lcm(*(time.denominator for time in times))
     ticks = {time.numerator * (bottom // time.denominator): time for time in times}
     return [ticks[tick] for tick in sorted(ticks)]
 
 
-def _events(system: System, inputs: Mapping[str, Stimulus]) -> Iterator[Fraction]:
+def _input_event_times(system: System, inputs: Mapping[str, Stimulus]) -> Iterator[Fraction]:
     """Yield when a piece of an input starts, and when that arrives at the end of a line."""
     for name, stimulus in inputs.items():
-        delays = [line.delay for line in system.lines.values() if line.source == name]
+        delays = [line.delay for line in system.delayed_signals.values() if line.source == name]
         for piece in stimulus.pieces:
             if piece.start.numerator > 0:
                 yield piece.start

@@ -12,11 +12,11 @@ from typing import Any
 from language.evaluate import divide
 
 Frame = list[Any]
-Read = Callable[[Frame], Any]
-Pair = Callable[[Any, Any], Read]
-Triple = Callable[[Any, int, int], Read]
+ExpressionClosure = Callable[[Frame], Any]
+BinaryFactory = Callable[[Any, Any], ExpressionClosure]
+FusedFactory = Callable[[Any, int, int], ExpressionClosure]
 
-SLOTS: Mapping[str, Pair] = {
+SLOT_SLOT: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: v[a] + v[b],
     "-": lambda a, b: lambda v: v[a] - v[b],
     "*": lambda a, b: lambda v: v[a] * v[b],
@@ -31,7 +31,7 @@ SLOTS: Mapping[str, Pair] = {
     "!=": lambda a, b: lambda v: v[a] != v[b],
 }
 """Of two slots."""
-SLOT_READ: Mapping[str, Pair] = {
+SLOT_EXPRESSION: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: v[a] + b(v),
     "-": lambda a, b: lambda v: v[a] - b(v),
     "*": lambda a, b: lambda v: v[a] * b(v),
@@ -46,7 +46,7 @@ SLOT_READ: Mapping[str, Pair] = {
     "!=": lambda a, b: lambda v: v[a] != b(v),
 }
 """Of a slot and an expression."""
-READ_SLOT: Mapping[str, Pair] = {
+EXPRESSION_SLOT: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: a(v) + v[b],
     "-": lambda a, b: lambda v: a(v) - v[b],
     "*": lambda a, b: lambda v: a(v) * v[b],
@@ -61,7 +61,7 @@ READ_SLOT: Mapping[str, Pair] = {
     "!=": lambda a, b: lambda v: a(v) != v[b],
 }
 """Of an expression and a slot."""
-READS: Mapping[str, Pair] = {
+EXPRESSION_EXPRESSION: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: a(v) + b(v),
     "-": lambda a, b: lambda v: a(v) - b(v),
     "*": lambda a, b: lambda v: a(v) * b(v),
@@ -76,7 +76,7 @@ READS: Mapping[str, Pair] = {
     "!=": lambda a, b: lambda v: a(v) != b(v),
 }
 """Of two expressions."""
-LEFT: Mapping[tuple[str, str], Triple] = {
+FUSED_LEFT: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: v[a] + v[b] + v[c],
     ("+", "-"): lambda a, b, c: lambda v: v[a] - v[b] + v[c],
     ("+", "*"): lambda a, b, c: lambda v: v[a] * v[b] + v[c],
@@ -88,7 +88,7 @@ LEFT: Mapping[tuple[str, str], Triple] = {
     ("*", "*"): lambda a, b, c: lambda v: v[a] * v[b] * v[c],
 }
 """(a inner b) outer c, by outer and inner."""
-RIGHT: Mapping[tuple[str, str], Triple] = {
+FUSED_RIGHT: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: v[a] + (v[b] + v[c]),
     ("+", "-"): lambda a, b, c: lambda v: v[a] + (v[b] - v[c]),
     ("+", "*"): lambda a, b, c: lambda v: v[a] + v[b] * v[c],
@@ -100,7 +100,7 @@ RIGHT: Mapping[tuple[str, str], Triple] = {
     ("*", "*"): lambda a, b, c: lambda v: v[a] * (v[b] * v[c]),
 }
 """a outer (b inner c), by outer and inner."""
-READ_PAIR: Mapping[tuple[str, str], Triple] = {
+EXPRESSION_FUSED: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: a(v) + (v[b] + v[c]),
     ("+", "-"): lambda a, b, c: lambda v: a(v) + (v[b] - v[c]),
     ("+", "*"): lambda a, b, c: lambda v: a(v) + v[b] * v[c],
@@ -114,42 +114,46 @@ READ_PAIR: Mapping[tuple[str, str], Triple] = {
 """As RIGHT, of an expression and two slots."""
 
 
-def within(a: int, low: int, b: int, high: int) -> Read:
+def range_test(a: int, low: int, b: int, high: int) -> ExpressionClosure:
     """Return whether one variable is at least another, and one at most another: a range."""
     return lambda v: (v[a] >= v[low]) & (v[b] <= v[high])
 
 
-def of_slot(slot: int) -> Read:
+def load_slot(slot: int) -> ExpressionClosure:
     """Return what reads a variable."""
     return lambda v: v[slot]
 
 
-def of_element(slot: int, index: int) -> Read:
+def load_element(slot: int, index: int) -> ExpressionClosure:
     """Return what reads an element whose index never changes."""
     return lambda v: v[slot][index]
 
 
-def of_item(slot: int, index: Read) -> Read:
+def load_item(slot: int, index: ExpressionClosure) -> ExpressionClosure:
     """Return what reads an element of an array."""
     return lambda v: v[slot][index(v)]
 
 
-def negative(a: Read) -> Read:
+def negate(a: ExpressionClosure) -> ExpressionClosure:
     """Return the negative of an expression."""
     return lambda v: -a(v)
 
 
-def opposite(a: Read) -> Read:
+def logical_not(a: ExpressionClosure) -> ExpressionClosure:
     """Return what is true where an expression is not."""
     return lambda v: not a(v)
 
 
-def selected(condition: Read, then: Read, other: Read) -> Read:
+def select(
+    condition: ExpressionClosure, if_true: ExpressionClosure, if_false: ExpressionClosure
+) -> ExpressionClosure:
     """Return one of two expressions; the other one is not evaluated."""
-    return lambda v: then(v) if condition(v) else other(v)
+    return lambda v: if_true(v) if condition(v) else if_false(v)
 
 
-def called(function: Callable[..., Any], arguments: Sequence[Read]) -> Read:
+def call_function(
+    function: Callable[..., Any], arguments: Sequence[ExpressionClosure]
+) -> ExpressionClosure:
     """Return a function of some expressions."""
     match arguments:
         case [a]:

@@ -9,37 +9,37 @@ from typing import Any
 
 from engine.interpreter import Interpreter, Stepper
 from engine.sensing import SensorRun
-from engine.stimulus import Course
+from engine.stimulus import InputSignal
 from language.declaration import Formula
 from language.experiment import Connection, Scenario, System
 from language.program import Program
-from language.signal import Line
+from language.signal import DelayedSignal
 from language.syntax import names
-from language.wires import RESULT, block_of, wire_formulas, wires_program
+from language.wires import WIRE_RESULT, connection_block, wire_formulas, wires_program
 
-Read = Callable[[str], Any]
+ReadSignal = Callable[[str], Any]
 
 
-class LineRun:
+class DelayLine:
     """A delayed signal: exact for an input of the system, else the values that were put in."""
 
-    def __init__(self, line: Line, course: Course | None) -> None:
+    def __init__(self, line: DelayedSignal, input_signal: InputSignal | None) -> None:
         """Take the line and, where it reads an input of the system, that input's course."""
         self.line = line
-        self.course = course
+        self.course = input_signal
         self._kept: deque[tuple[Fraction, Any]] = deque()
 
-    def put(self, time: Fraction, value: Any) -> None:
+    def push(self, time: Fraction, value: Any) -> None:
         """Keep the value that the signal has from a time on."""
         self._kept.append((time, value))
 
     def at(self, time: Fraction, since: Fraction | None = None) -> Any:
         """Return the signal as it was one delay ago; before that, as it was at the start."""
-        then = time - self.line.delay
+        delayed = time - self.line.delay
         if self.course:
-            from_then = None if since is None else max(since - self.line.delay, Fraction(0))
-            return self.course.at(max(then, Fraction(0)), from_then)
-        while len(self._kept) > 1 and self._kept[1][0] <= then:
+            delayed_since = None if since is None else max(since - self.line.delay, Fraction(0))
+            return self.course.at(max(delayed, Fraction(0)), delayed_since)
+        while len(self._kept) > 1 and self._kept[1][0] <= delayed:
             self._kept.popleft()
         return self._kept[0][1]
 
@@ -66,18 +66,19 @@ class Signals:
             for wire in program.outputs
         }
         truths = {name for name, (_, wire) in self._outputs.items() if wire.type == "truth"}
-        truths |= {name for name, thing in system.inputs.items() if thing.truth}
-        truths |= {line.name for line in system.lines.values() if line.source in truths}
+        truths |= {name for name, thing in system.inputs.items() if thing.is_bool}
+        truths |= {line.name for line in system.delayed_signals.values() if line.source in truths}
         self._wires = Interpreter(wires_program(formulas, frozenset(truths)))
         self.courses = {
-            name: Course(name, stimulus, self._piece) for name, stimulus in scenario.inputs.items()
+            name: InputSignal(name, stimulus, self._evaluate_piece)
+            for name, stimulus in scenario.inputs.items()
         }
         self.sensors = {
             name: SensorRun(sensor, scenario.seed) for name, sensor in system.sensors.items()
         }
         self.lines = {
-            name: LineRun(line, self.courses.get(line.source))
-            for name, line in system.lines.items()
+            name: DelayLine(line, self.courses.get(line.source))
+            for name, line in system.delayed_signals.items()
         }
         self._inputs: dict[str, Any] = {}
         self.time = Fraction(0)
@@ -88,7 +89,7 @@ class Signals:
         self.time = time
         self._inputs = {name: course.at(time) for name, course in self.courses.items()}
 
-    def now(self, name: str) -> Any:
+    def current_value(self, name: str) -> Any:
         """Return what a signal is now; a sensor gives its latest sample."""
         if name in self._outputs:
             stepper, wire = self._outputs[name]
@@ -99,7 +100,7 @@ class Signals:
         if sensor is None:
             return self.lines[name].at(self.time)
         if sensor.sensor.period is None:
-            return sensor.look(self.time, self.now(sensor.sensor.source))
+            return sensor.evaluate(self.time, self.current_value(sensor.sensor.source))
         return sensor.value
 
     def varies(self, name: str) -> bool:
@@ -109,7 +110,7 @@ class Signals:
             course = self.lines[name].course
         return course is not None and course.varies
 
-    def at(self, time: Fraction, since: Fraction) -> Read:
+    def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
         """Return what reads signals at a time of the step that began at `since`."""
 
         def read(name: str) -> Any:
@@ -117,25 +118,25 @@ class Signals:
             if course:
                 return course.at(time, since)
             line = self.lines.get(name)
-            return line.at(time, since) if line and line.course else self.now(name)
+            return line.at(time, since) if line and line.course else self.current_value(name)
 
         return read
 
-    def connected(self, connection: Connection, read: Read | None = None) -> Any:
+    def evaluate_connection(self, connection: Connection, read: ReadSignal | None = None) -> Any:
         """Return the value that a connection gives."""
-        source, read = connection.source, read or self.now
+        source, read = connection.source, read or self.current_value
         if isinstance(source, str):
             return read(source)
         if isinstance(source, Formula):
-            return self.formula(block_of(connection), read)
+            return self.evaluate_formula(connection_block(connection), read)
         return source.numerator / source.denominator
 
-    def formula(self, block: str, read: Read) -> Any:
+    def evaluate_formula(self, block: str, read: ReadSignal) -> Any:
         """Return the value of an expression of the wires."""
         for name in self._reads[block]:
             self._wires.set(f"signal.{name}", read(name))
         self._wires.run(block)
-        return self._wires.get(RESULT)
+        return self._wires.get(WIRE_RESULT)
 
-    def _piece(self, block: str, time: float) -> float:
-        return float(self.formula(block, lambda _: time))
+    def _evaluate_piece(self, block: str, time: float) -> float:
+        return float(self.evaluate_formula(block, lambda _: time))

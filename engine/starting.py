@@ -12,7 +12,7 @@ from language.load import program_of
 from language.model import Automaton
 from language.problem import Source, Span
 from language.program import Program
-from language.syntax import Number
+from language.syntax import NumberLiteral
 from language.units import NO_UNIT
 
 
@@ -38,22 +38,22 @@ def automata_of(system: System, scenario: Scenario) -> dict[str, tuple[Automaton
             thing
             for (owner, thing), connection in system.connections.items()
             if owner == name and not instance.automaton.is_sampled
-            if not instance.automaton.inputs[thing].truth
+            if not instance.automaton.inputs[thing].is_bool
             if any(_varies(system, scenario, read) for read in connection.reads)
         ]
-        found[name] = _started(instance.automaton, start), varying
+        found[name] = _with_start_values(instance.automaton, start), varying
     return found
 
 
 def _varies(system: System, scenario: Scenario, signal: str) -> bool:
-    source = system.lines[signal].source if signal in system.lines else signal
+    source = system.delayed_signals[signal].source if signal in system.delayed_signals else signal
     return source in scenario.inputs and scenario.inputs[source].varies
 
 
-def _started(automaton: Automaton, start: Mapping[str, Fraction]) -> Automaton:
+def _with_start_values(automaton: Automaton, start: Mapping[str, Fraction]) -> Automaton:
     states = dict(automaton.states)
     nowhere = Span(Source("scenario"), 1, 1)
     for name, value in start.items():
-        formula = Formula(Number(value, NO_UNIT, nowhere), f"states.{name}.initial")
+        formula = Formula(NumberLiteral(value, NO_UNIT, nowhere), f"states.{name}.initial")
         states[name] = dataclasses.replace(states[name], initial=formula)
     return dataclasses.replace(automaton, states=states)

@@ -10,22 +10,22 @@ from fractions import Fraction
 from engine.recording import Channel, Recording, read_recording
 from language.experiment import Scenario, System
 from language.problem import Problems, SpecError
-from language.signal import Piece, Stimulus
-from language.stimulus import held, linear
+from language.signal import Stimulus, StimulusPiece
+from language.stimulus import constant_pieces, linear_pieces
 from language.wires import piece_block
 
-Formulas = Callable[[str, float], float]
+EvaluateFormula = Callable[[str, float], float]
 """The value of a piece's formula, by the name of its block, at a time [s]."""
 
 
-class Course:
+class InputSignal:
     """An input over time: right-continuous; inside a step, the piece of the step's start."""
 
-    def __init__(self, name: str, stimulus: Stimulus, formulas: Formulas) -> None:
+    def __init__(self, name: str, stimulus: Stimulus, formulas: EvaluateFormula) -> None:
         """Take the input's name, its pieces, and what evaluates formulas."""
         self.name = name
         self.pieces = stimulus.pieces
-        self.truth = stimulus.truth
+        self.truth = stimulus.is_bool
         self.varies = stimulus.varies
         self.starts = [piece.start for piece in stimulus.pieces]
         self._formulas = formulas
@@ -33,34 +33,34 @@ class Course:
 
     def at(self, time: Fraction, since: Fraction | None = None) -> float | bool:
         """Return the value at a time; `since` picks the piece active then: the limit from below."""
-        within = time if since is None else since
-        number = self._number(within)
+        piece_time = time if since is None else since
+        number = self._active_piece(piece_time)
         piece = self.pieces[number]
         if piece.formula:
             return self._formulas(piece_block(self.name, number), float(max(time, Fraction(0))))
         if not piece.slope:
-            return self.held(piece)
+            return self.constant_value(piece)
         exact = piece.value + piece.slope * (max(time, Fraction(0)) - piece.start)
         return bool(exact) if self.truth else exact.numerator / exact.denominator
 
-    def held(self, piece: Piece) -> float | bool:
+    def constant_value(self, piece: StimulusPiece) -> float | bool:
         """Return the value of a piece that does not vary."""
         exact = piece.value
         return bool(exact) if self.truth else exact.numerator / exact.denominator
 
-    def _number(self, time: Fraction) -> int:
+    def _active_piece(self, time: Fraction) -> int:
         """Return the place of the piece that is active at a time: most often that of before."""
         starts, latest = self.starts, self._latest
         if not starts[latest] <= time or (latest + 1 < len(starts) and starts[latest + 1] <= time):
             self._latest = max(0, bisect_right(starts, time) - 1)
         return self._latest
 
-    def events(self) -> list[Fraction]:
+    def piece_starts(self) -> list[Fraction]:
         """Return when pieces start, after time 0."""
         return [start for start in self.starts if start > 0]
 
 
-def resolved(system: System, scenario: Scenario) -> Scenario:
+def resolve_recording(system: System, scenario: Scenario) -> Scenario:
     """Return a scenario in which a recording is replaced by the inputs that it gives.
 
     Time 0 is the first instant at which every input that the recording gives has had a value.
@@ -78,16 +78,16 @@ def resolved(system: System, scenario: Scenario) -> Scenario:
         problems = Problems()
         label = "the recording ends before every input has a value"
         problems.error("range", use.span, label)
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     return dataclasses.replace(
         scenario,
         horizon=recording.end - start if scenario.horizon is None else scenario.horizon,
         initial={
-            name: _first(recording, value, start) if isinstance(value, str) else value
+            name: _value_at_start(recording, value, start) if isinstance(value, str) else value
             for name, value in scenario.initial.items()
         },
         inputs={
-            name: stimulus_of(recording.channels[s.column], start, s.truth) if s.column else s
+            name: stimulus_of(recording.channels[s.column], start, s.is_bool) if s.column else s
             for name, s in scenario.inputs.items()
         },
         recording=None,
@@ -98,12 +98,12 @@ def stimulus_of(channel: Channel, start: Fraction, truth: bool = False) -> Stimu
     """Return a channel as an input from `start` [s] on, held or linear as its column says."""
     values = [Fraction(value) for value in channel.values]
     points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
-    pieces = linear(points) if channel.column.hold == "linear" else held(points)
+    pieces = linear_pieces(points) if channel.column.hold == "linear" else constant_pieces(points)
     first = max(0, bisect_right([piece.start for piece in pieces], Fraction(0)) - 1)
-    return Stimulus(pieces[first:], truth=truth)
+    return Stimulus(pieces[first:], is_bool=truth)
 
 
-def _first(recording: Recording, column: str, start: Fraction) -> Fraction:
+def _value_at_start(recording: Recording, column: str, start: Fraction) -> Fraction:
     """Return the value of a column at the start: the latest one until then, or the first."""
     channel = recording.channels[column]
     return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])

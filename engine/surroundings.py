@@ -12,7 +12,7 @@ from language.experiment import Connection
 from language.program import Program
 
 
-class Surroundings:
+class SystemEnvironment:
     """The wires around one continuous instance (see engine/continuous.py, Around)."""
 
     def __init__(
@@ -38,41 +38,43 @@ class Surroundings:
         self._lagging = [run for run in own if run.sensor.lag]
         self._unsampled = [run for run in own if run.sensor.period is None]
         self.names = (*self._outputs, *(run.sensor.name for run in self._unsampled))
-        self._read = stepper.reader(tuple(wire.source for wire in program.outputs))
+        self._read = stepper.make_reader(tuple(wire.source for wire in program.outputs))
         self._since = Fraction(0)
-        self.is_watching = bool(self._lagging)
-        self.is_still = not self._varying
+        self.has_observers = bool(self._lagging)
+        self.has_constant_inputs = not self._varying
 
-    def aim(self, start: Fraction, stop: Fraction) -> None:
+    def interpolate_inputs(self, start: Fraction, stop: Fraction) -> None:
         """Lay a parabola through an input at the start, the middle and the end of a flow."""
         self._since = start
         h = float(stop - start)
         for connection in self._varying:
-            value = self._valued(connection)
+            value = self._input_function(connection)
             first, middle, last = value(start), value((start + stop) / 2), value(stop)
             name = connection.target[1]
             self._stepper.set(f"input.{name}", first)
             self._stepper.set(f"work.rise_{name}", (4.0 * middle - 3.0 * first - last) / h)
             self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
 
-    def place(self, time: Fraction) -> None:
+    def set_inputs(self, time: Fraction) -> None:
         """Set the inputs to what they are at a time of that flow: the limit from below."""
         for connection in self._varying:
             name = f"input.{connection.target[1]}"
-            self._stepper.set(name, self._valued(connection)(time))
+            self._stepper.set(name, self._input_function(connection)(time))
 
-    def watch(self, time: Fraction) -> None:
+    def observe_boundary(self, time: Fraction) -> None:
         """Carry the lags of sensors on to a time."""
         for run in self._lagging:
-            run.lag.move(time, self._signals.now(run.sensor.source))
+            run.lag.advance(time, self._signals.current_value(run.sensor.source))
 
-    def look(self, time: Fraction) -> None:
+    def sample_outputs(self, time: Fraction) -> None:
         """Keep the outputs, and the sensors that give their value whenever they are read."""
         found = self._read()
         for run in self._unsampled:
             value = found[self._outputs.index(run.sensor.source)]
-            found = (*found, run.look(time, value))
+            found = (*found, run.evaluate(time, value))
         self.looked.append(found)
 
-    def _valued(self, connection: Connection) -> Callable[[Fraction], Any]:
-        return lambda time: self._signals.connected(connection, self._signals.at(time, self._since))
+    def _input_function(self, connection: Connection) -> Callable[[Fraction], Any]:
+        return lambda time: self._signals.evaluate_connection(
+            connection, self._signals.reader_at(time, self._since)
+        )

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from language.model import CHART
 from language.program import Program
 
 if TYPE_CHECKING:
     from engine.plot import Picture
 
-Values = NDArray[np.float64] | NDArray[np.int64]
-TIME = "t [s]"
+SignalArray = NDArray[np.float64] | NDArray[np.int64]
+TIME_HEADER = "t [s]"
 """Head of the first column of every table of samples."""
 
 
@@ -54,7 +54,7 @@ class Trajectory:
 
     name: str
     times: NDArray[np.float64]
-    signals: Mapping[str, Values]
+    signals: Mapping[str, SignalArray]
     units: Mapping[str, str]
     modes: Mapping[str, Mapping[int, str]]
     events: tuple[Event, ...]
@@ -69,7 +69,7 @@ class Trajectory:
         """Return the samples as CSV: a head line with units, shortest exact decimals."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(heads(self))
+        writer.writerow(column_headers(self))
         columns = [values.tolist() for values in (self.times, *self.signals.values())]
         writer.writerows(zip(*columns, strict=True))
         return text.getvalue()
@@ -82,10 +82,10 @@ class Trajectory:
         try:
             import pandas
         except ImportError:
-            raise ToolMissing(
+            raise MissingToolError(
                 "a frame needs the package `pandas`: pip install 'modewright[frame]'"
             ) from None
-        index = pandas.Index(self.times, name=TIME)
+        index = pandas.Index(self.times, name=TIME_HEADER)
         columns = {
             name: pandas.Categorical.from_codes(
                 np.searchsorted(sorted(self.modes[name]), values),
@@ -101,17 +101,17 @@ class Trajectory:
 
     def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
         """Return a picture: signals by unit (patterns such as `plant.*`; all), modes, events."""
-        from engine.plot import overview  # matplotlib takes a second: only if asked for
+        from engine.plot import draw_overview  # matplotlib takes a second: only if asked for
 
-        return overview([self], signals, span)
+        return draw_overview([self], signals, span)
 
 
-def heads(trajectory: Trajectory) -> list[str]:
+def column_headers(trajectory: Trajectory) -> list[str]:
     """Return the heads of a table of samples: `name [unit]`, the time first."""
-    return [TIME, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
+    return [TIME_HEADER, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
 
 
-def column_array(kind: str, values: Sequence[float | int | bool]) -> Values:
+def column_array(kind: str, values: Sequence[float | int | bool]) -> SignalArray:
     """Return the values of one signal (n_samples,): doubles for reals, else whole numbers."""
     if kind == "real":
         return np.array(values, dtype=np.float64)

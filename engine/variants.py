@@ -9,46 +9,46 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.adjustment import Adjustment, groups
-from engine.batch import NO_EVENT, Batch, BatchResult, EventKind, InputTable, Measure, Reals
+from engine.adjustment import ParameterBinding, group_variants
+from engine.batch import NO_EVENT, Batch, BatchResult, EventKind, InputTable, Reals, SignalStatistic
 from engine.interpreter import Interpreter, Stepper
-from engine.page import AFTER
-from engine.schedule import Grid
-from engine.simulate import Build, simulate
+from engine.page import DERIVE_BLOCKS
+from engine.schedule import TimeGrid
+from engine.simulate import BuildStepper, simulate
 from engine.trajectory import Event, Trajectory
 from language.experiment import Scenario, System
-from language.number import rounded
+from language.number import round_to_type
 from language.operation import FaultBit
-from language.program import Program, short
-from language.signal import Piece, Stimulus
-from language.traversal import walk
+from language.program import Program, unqualified_name
+from language.signal import Stimulus, StimulusPiece
+from language.traversal import walk_ops
 
 
-def run_variants(batch: Batch, build: Build = Interpreter) -> BatchResult:
+def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> BatchResult:
     """Return what is kept of each variant; `build` makes what runs a Program."""
-    found: BatchResult | None = None
-    for group in groups(batch):
-        kept = found or empty_result(batch, group.adjustment, "interpreter")
-        found = kept
+    result: BatchResult | None = None
+    for group in group_variants(batch):
+        current = result or allocate_result(batch, group.binding, "interpreter")
+        result = current
         for variant in group.variants.tolist():
-            keep_variant(batch, kept, variant, group.adjustment, build)
-    if found is None:
+            run_variant(batch, current, variant, group.binding, build)
+    if result is None:
         raise ValueError("a batch has at least one variant")
-    return found
+    return result
 
 
-def empty_result(batch: Batch, adjustment: Adjustment, note: str) -> BatchResult:
+def allocate_result(batch: Batch, binding: ParameterBinding, note: str) -> BatchResult:
     """Return the arrays of a result, to be filled."""
-    horizon = adjustment.scenario.horizon
+    horizon = binding.scenario.horizon
     assert horizon is not None
-    grid = Grid(Fraction(0), adjustment.scenario.every)
+    grid = TimeGrid(Fraction(0), binding.scenario.every)
     times = np.array([float(row) for row, _ in zip(grid, range(grid.count(horizon)), strict=False)])
-    shape = (batch.count, batch.most_events)
+    shape = (batch.count, batch.max_events)
     return BatchResult(
-        measures={m.name: np.full(batch.count, math.nan) for m in batch.measures},
+        statistics={m.name: np.full(batch.count, math.nan) for m in batch.statistics},
         outputs={name: np.full((batch.count, len(times)), math.nan) for name in batch.outputs},
         times=times,
-        kinds=event_kinds(adjustment.programs),
+        kinds=list_event_kinds(binding.programs),
         event_counts=np.zeros(batch.count, dtype=np.int64),
         event_times=np.full(shape, math.nan),
         event_kinds=np.full(shape, NO_EVENT, dtype=np.int32),
@@ -58,14 +58,14 @@ def empty_result(batch: Batch, adjustment: Adjustment, note: str) -> BatchResult
     )
 
 
-def event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
+def list_event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
     """Return what can happen in some instances: transitions, ranges left, invariants."""
     found: list[EventKind] = []
     for name, program in programs.items():
         for info in program.transitions:
-            source, target = program.ends(info)
+            source, target = program.endpoint_names(info)
             found.append(EventKind(name, info.name, source, target, info.region))
-        for signal in _ranged(program):
+        for signal in _ranged_signals(program):
             found.append(EventKind(name, f"range {signal}", kind="range"))
         for invariant in program.invariants:
             text = f"invariant {invariant.name}"
@@ -73,24 +73,24 @@ def event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _ranged(program: Program) -> list[str]:
+def _ranged_signals(program: Program) -> list[str]:
     """Return the signals whose range may be left."""
-    states = [short(v.name) for v in program.variables if v.range is not None]
-    ops = (op for block in program.blocks.values() for op in walk(block))
+    states = [unqualified_name(v.name) for v in program.variables if v.range is not None]
+    ops = (op for block in program.blocks.values() for op in walk_ops(block))
     return [*states, *(op.signal for op in ops if isinstance(op, FaultBit) and op.signal)]
 
 
-def first_and_last_row(measure: Measure, every: Fraction, count: int) -> tuple[int, int]:
+def row_range(statistic: SignalStatistic, every: Fraction, count: int) -> tuple[int, int]:
     """Return the first row of a measure and the one behind its last."""
-    until = count - 1 if measure.until is None else measure.until // every
-    return -int(-measure.since // every), min(count, int(until) + 1)
+    until = count - 1 if statistic.until is None else statistic.until // every
+    return -int(-statistic.since // every), min(count, int(until) + 1)
 
 
-def measured(measure: Measure, values: Reals) -> float:
+def evaluate_statistic(statistic: SignalStatistic, values: Reals) -> float:
     """Return a measure of the rows in its span, from the first to the last in this order."""
     if not len(values) or np.any(np.isnan(values)):
         return math.nan
-    match measure.kind:
+    match statistic.kind:
         case "first":
             return float(values[0])
         case "final":
@@ -107,28 +107,30 @@ def measured(measure: Measure, values: Reals) -> float:
             return float(np.sqrt(np.cumsum(values * values)[-1] / len(values)))
 
 
-def variant_scenario(batch: Batch, scenario: Scenario, variant: int) -> Scenario:
+def scenario_of_variant(batch: Batch, scenario: Scenario, variant: int) -> Scenario:
     """Return the scenario of a variant: its inputs and its seed."""
     inputs = dict(scenario.inputs)
-    if batch.courses:
-        inputs.update(batch.courses[variant])
+    if batch.variant_inputs:
+        inputs.update(batch.variant_inputs[variant])
     for name, table in batch.inputs.items():
-        inputs[name] = _stimulus(batch.system, name, table, variant)
+        inputs[name] = _stimulus_of_table(batch.system, name, table, variant)
     seed = scenario.seed if batch.seeds is None else int(batch.seeds[variant])
     return dataclasses.replace(scenario, inputs=inputs, seed=seed)
 
 
-def tuned_values(
-    batch: Batch, adjustment: Adjustment, variant: int
+def tunable_values(
+    batch: Batch, binding: ParameterBinding, variant: int
 ) -> dict[tuple[str, str], float]:
     """Return the values of a variant by instance and tunable parameter."""
     arrays = {**batch.parameters, **batch.initial}
-    return {place: float(arrays[name][variant]) for name, place in adjustment.tuned.items()}
+    return {place: float(arrays[name][variant]) for name, place in binding.tunables.items()}
 
 
-def _run(batch: Batch, adjustment: Adjustment, variant: int, build: Build) -> Trajectory:
-    values = tuned_values(batch, adjustment, variant)
-    owners = {id(program): name for name, program in adjustment.programs.items()}
+def _simulate_variant(
+    batch: Batch, binding: ParameterBinding, variant: int, build: BuildStepper
+) -> Trajectory:
+    values = tunable_values(batch, binding, variant)
+    owners = {id(program): name for name, program in binding.programs.items()}
 
     def tuned(program: Program) -> Stepper:
         stepper = build(program)
@@ -137,42 +139,42 @@ def _run(batch: Batch, adjustment: Adjustment, variant: int, build: Build) -> Tr
             name = f"calibration.{parameter}"
             if owner == owners[id(program)] and name in known:
                 kind = next(c.type for c in program.constants if c.name == name)
-                typed = rounded(value, program.number) if kind == "real" else int(value)
+                typed = round_to_type(value, program.number_type) if kind == "real" else int(value)
                 stepper.set(name, bool(typed) if kind == "truth" else typed)
-        for block in AFTER:
+        for block in DERIVE_BLOCKS:
             if block in program.blocks:
                 stepper.run(block)
         return stepper
 
-    scenario = variant_scenario(batch, adjustment.scenario, variant)
-    return simulate(adjustment.system, scenario, tuned, programs=adjustment.programs)
+    scenario = scenario_of_variant(batch, binding.scenario, variant)
+    return simulate(binding.system, scenario, tuned, programs=binding.programs)
 
 
-def _stimulus(system: System, name: str, table: InputTable, variant: int) -> Stimulus:
+def _stimulus_of_table(system: System, name: str, table: InputTable, variant: int) -> Stimulus:
     values = table.values[variant].tolist()
-    pieces = tuple(Piece(s, Fraction(v)) for s, v in zip(table.starts, values, strict=True))
-    return Stimulus(pieces, truth=system.inputs[name].truth)
+    pieces = tuple(StimulusPiece(s, Fraction(v)) for s, v in zip(table.starts, values, strict=True))
+    return Stimulus(pieces, is_bool=system.inputs[name].is_bool)
 
 
-def keep_variant(
+def run_variant(
     batch: Batch,
     result: BatchResult,
     variant: int,
-    adjustment: Adjustment,
-    build: Build = Interpreter,
+    binding: ParameterBinding,
+    build: BuildStepper = Interpreter,
 ) -> None:
     """Run a variant, and put what is kept of it into the result."""
-    run = _run(batch, adjustment, variant, build)
-    for name, kept in result.outputs.items():
-        kept[variant, : len(run.times)] = run.signals[name]
-    for measure in batch.measures:
-        first, behind = first_and_last_row(measure, batch.scenario.every, len(result.times))
+    run = _simulate_variant(batch, binding, variant, build)
+    for name, array in result.outputs.items():
+        array[variant, : len(run.times)] = run.signals[name]
+    for measure in batch.statistics:
+        first, behind = row_range(measure, batch.scenario.every, len(result.times))
         values = np.asarray(run.signals[measure.signal], dtype=np.float64)[first:behind]
-        result.measures[measure.name][variant] = measured(measure, values)
+        result.statistics[measure.name][variant] = evaluate_statistic(measure, values)
     result.event_counts[variant] = len(run.events)
-    for place, event in enumerate(run.events[: batch.most_events]):
+    for place, event in enumerate(run.events[: batch.max_events]):
         result.event_times[variant, place] = event.time
-        result.event_kinds[variant, place] = _place(result.kinds, event)
+        result.event_kinds[variant, place] = _event_kind_index(result.kinds, event)
     if run.faults:
         assert isinstance(result.faults, dict)
         result.faults[variant] = run.faults
@@ -181,7 +183,7 @@ def keep_variant(
         result.stopped[variant] = run.stopped
 
 
-def _place(kinds: Iterable[EventKind], event: Event) -> int:
+def _event_kind_index(kinds: Iterable[EventKind], event: Event) -> int:
     """Return the place of an event among the kinds; ranges and invariants have no modes there."""
     is_move = event.kind == "transition"
     modes = (event.source, event.target) if is_move else ("", "")

@@ -14,20 +14,25 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
-from language.document import Scalar
+from language.document import ScalarNode
 from language.model import Transition
-from language.model_text import tree_text
+from language.model_text import format_tree
 from language.operation import Binary, Expr, Unary
 from language.parse import parse_expression
 from language.problem import SpecError
-from language.syntax import Logic, Not, Tree, Truth, alike
+from language.syntax import BoolLiteral, Logic, Not, SyntaxTree, is_same_expression
 
-Joined = int | bool | tuple[str, "Joined"] | tuple[str, "Joined", "Joined"]
+DecisionStructure = (
+    int
+    | bool
+    | tuple[str, "DecisionStructure"]
+    | tuple[str, "DecisionStructure", "DecisionStructure"]
+)
 """A condition by its place, `true` or `false`, or `not`, `and`, `or` of others."""
-Shown = Literal["unique cause", "masking", "always true", "always false", "not shown"]
-SHOWN: tuple[Shown, ...] = ("unique cause", "masking")
+ConditionCoverage = Literal["unique cause", "masking", "always true", "always false", "not shown"]
+COVERED: tuple[ConditionCoverage, ...] = ("unique cause", "masking")
 """What counts as covered."""
-MOST_CONDITIONS = 10
+MAX_CONDITIONS = 10
 """More have too many combinations to be kept, one for each."""
 
 
@@ -40,114 +45,117 @@ class Decision:
 
     key: str
     conditions: tuple[str, ...]
-    joined: Joined
+    structure: DecisionStructure
 
     def outcome(self, combination: int) -> bool:
         """Return what the guard is; bit k of a combination is condition k."""
-        return _value(self.joined, combination)
+        return _evaluate(self.structure, combination)
 
-    def shown(self, seen: Collection[int]) -> tuple[Shown, ...]:
+    def condition_coverage(self, combinations: Collection[int]) -> tuple[ConditionCoverage, ...]:
         """Return of each condition whether the combinations that were seen show that it matters."""
-        return tuple(self._shown(1 << k, seen) for k in range(len(self.conditions)))
+        return tuple(self._coverage_of(1 << k, combinations) for k in range(len(self.conditions)))
 
-    def outcomes(self, seen: Collection[int]) -> frozenset[bool]:
+    def outcomes(self, combinations: Collection[int]) -> frozenset[bool]:
         """Return what the guard has been."""
-        return frozenset(self.outcome(combination) for combination in seen)
+        return frozenset(self.outcome(combination) for combination in combinations)
 
-    def _shown(self, bit: int, seen: Collection[int]) -> Shown:
-        ons = [one for one in seen if one & bit]
-        offs = {one for one in seen if not one & bit}
-        if any(one ^ bit in offs and self._matters(one, bit) for one in ons):
+    def _coverage_of(self, bit: int, combinations: Collection[int]) -> ConditionCoverage:
+        ons = [one for one in combinations if one & bit]
+        offs = {one for one in combinations if not one & bit}
+        if any(one ^ bit in offs and self._affects_outcome(one, bit) for one in ons):
             return "unique cause"
-        mattering = [one for one in ons if self._matters(one, bit)]
-        others = [one for one in offs if self._matters(one, bit)]
+        mattering = [one for one in ons if self._affects_outcome(one, bit)]
+        others = [one for one in offs if self._affects_outcome(one, bit)]
         if any(self.outcome(a) != self.outcome(b) for a, b in itertools.product(mattering, others)):
             return "masking"
         if not offs or not ons:
             return "always true" if ons else "always false"
         return "not shown"
 
-    def _matters(self, combination: int, bit: int) -> bool:
+    def _affects_outcome(self, combination: int, bit: int) -> bool:
         return self.outcome(combination) != self.outcome(combination ^ bit)
 
 
 def decision_of(transition: Transition) -> Decision:
     """Return what a transition asks for as a decision: its events, and its guard."""
-    if transition.completes:
+    if transition.is_completion:
         return Decision(transition.key, ("completion",), 0)
-    found: list[Tree] = []
+    conditions: list[SyntaxTree] = []
 
-    def joined(tree: Tree) -> Joined:
+    def joined(tree: SyntaxTree) -> DecisionStructure:
         match tree:
             case Logic(operator, left, right, _):
                 return (operator, joined(left), joined(right))
             case Not(operand, _):
                 return ("not", joined(operand))
-            case Truth(value, _):
+            case BoolLiteral(value, _):
                 return value
-        place = next((k for k, known in enumerate(found) if alike(known, tree)), len(found))
-        if place == len(found):
-            found.append(tree)
+        place = next(
+            (k for k, known in enumerate(conditions) if is_same_expression(known, tree)),
+            len(conditions),
+        )
+        if place == len(conditions):
+            conditions.append(tree)
         return place + len(transition.events)
 
-    made: Joined = any_of(len(transition.events))
+    structure: DecisionStructure = any_of(len(transition.events))
     guard = transition.when.tree
-    if not (transition.events and isinstance(guard, Truth) and guard.value):
+    if not (transition.events and isinstance(guard, BoolLiteral) and guard.value):
         own = joined(guard)
-        made = ("and", made, own) if transition.events else own
+        structure = ("and", structure, own) if transition.events else own
     events = (f"event {name}" for name in transition.events)
-    return Decision(transition.key, (*events, *map(_text, found)), made)
+    return Decision(transition.key, (*events, *map(_condition_text, conditions)), structure)
 
 
-def any_of(count: int) -> Joined:
+def any_of(count: int) -> DecisionStructure:
     """Return whether one of the first conditions holds."""
-    made: Joined = 0
+    structure: DecisionStructure = 0
     for place in range(1, count):
-        made = ("or", made, place)
-    return made
+        structure = ("or", structure, place)
+    return structure
 
 
-def lowered_conditions(joined: Joined, expr: Expr) -> dict[int, Expr] | None:
+def match_conditions(structure: DecisionStructure, expr: Expr) -> dict[int, Expr] | None:
     """Return what each condition is in a lowered guard; None where that is joined otherwise.
 
     A condition may be lowered to anything: `rising(x)` to whether x is true, and was not.
     """
-    match joined, expr:
+    match structure, expr:
         case bool(), _:
             return {}
         case int(place), _:
             return {place: expr}
         case (("not", inner), Unary("not", operand)):
-            return lowered_conditions(inner, operand)
+            return match_conditions(inner, operand)
         case ((operator, left, right), Binary(found, first, second)) if operator == found:
-            parts = lowered_conditions(left, first), lowered_conditions(right, second)
+            parts = match_conditions(left, first), match_conditions(right, second)
             if parts[0] is not None and parts[1] is not None:
                 return {**parts[1], **parts[0]}
     return None
 
 
-def _value(joined: Joined, combination: int) -> bool:
-    match joined:
+def _evaluate(structure: DecisionStructure, combination: int) -> bool:
+    match structure:
         case bool():
-            return joined
+            return structure
         case int():
-            return bool(combination >> joined & 1)
+            return bool(combination >> structure & 1)
         case ("not", operand):
-            return not _value(operand, combination)
+            return not _evaluate(operand, combination)
         case ("and", left, right):
-            return _value(left, combination) and _value(right, combination)
+            return _evaluate(left, combination) and _evaluate(right, combination)
         case (_, left, right):
-            return _value(left, combination) or _value(right, combination)
-    raise TypeError(f"not a decision: {joined}")
+            return _evaluate(left, combination) or _evaluate(right, combination)
+    raise TypeError(f"not a decision: {structure}")
 
 
-def _text(tree: Tree) -> str:
+def _condition_text(tree: SyntaxTree) -> str:
     """Return a condition as its author wrote it, where that is one text of the file."""
     span = tree.span
-    if not span.whole and 1 <= span.line <= len(span.source.lines):
+    if not span.is_atomic and 1 <= span.line <= len(span.source.lines):
         line = span.source.lines[span.line - 1]
         text = line[span.column - 1 : span.column - 1 + span.width]
         with suppress(SpecError):
-            if alike(parse_expression(Scalar(text, span)), tree):
+            if is_same_expression(parse_expression(ScalarNode(text, span)), tree):
                 return text
-    return tree_text(tree).removeprefix("(").removesuffix(")")
+    return format_tree(tree).removeprefix("(").removesuffix(")")

@@ -8,25 +8,25 @@ from fractions import Fraction
 from typing import Literal
 
 from language.declaration import Formula
-from language.event_name import EventName
+from language.event_name import ModeEntryEvent
 from language.experiment import Scenario, System
-from language.kind import Kind
+from language.kind import ExprType
 from language.problem import Source, Span
 
-Place = tuple[str, str]
+RegionRef = tuple[str, str]
 """An instance and one of its regions."""
 
 
 @dataclass(frozen=True)
-class Stay:
+class ModePredicate:
     """Whether one of some modes of a region is active."""
 
-    place: Place
+    region_ref: RegionRef
     modes: frozenset[str]
 
 
 @dataclass(frozen=True)
-class Running:
+class RunningStatistic:
     """A number of the run so far: `count` (of changes), `first` (time [s]), `rms`.
 
     What it reads is a condition or a quantity, or for `count` also the mode of a region.
@@ -34,12 +34,12 @@ class Running:
     """
 
     function: Literal["count", "first", "rms"]
-    of: Condition | Place
+    operand: Condition | RegionRef
     since: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
-class Flag:
+class FaultFlag:
     """One bit of a fault word, a signal."""
 
     signal: str
@@ -52,30 +52,30 @@ class Condition:
 
     formula: Formula
     text: str
-    signals: Mapping[str, Kind] = field(default_factory=dict)
-    stays: Mapping[str, Stay] = field(default_factory=dict)
-    flags: Mapping[str, Flag] = field(default_factory=dict)
-    running: Mapping[str, Running] = field(default_factory=dict)
+    signals: Mapping[str, ExprType] = field(default_factory=dict)
+    stays: Mapping[str, ModePredicate] = field(default_factory=dict)
+    flags: Mapping[str, FaultFlag] = field(default_factory=dict)
+    running: Mapping[str, RunningStatistic] = field(default_factory=dict)
     literals: Mapping[str, int] = field(default_factory=dict)
-    kind: Kind = "truth"
+    kind: ExprType = "truth"
 
     @property
     def all_signals(self) -> tuple[str, ...]:
         """The signals that are read, by what runs too; none: it is known between rows."""
         found = dict.fromkeys([*self.signals, *(flag.signal for flag in self.flags.values())])
         for running in self.running.values():
-            if isinstance(running.of, Condition):
-                found.update(dict.fromkeys(running.of.all_signals))
+            if isinstance(running.operand, Condition):
+                found.update(dict.fromkeys(running.operand.all_signals))
         return tuple(found)
 
 
-Trigger = Condition | EventName
-Subject = Condition | EventName | tuple[str, ...]
+Trigger = Condition | ModeEntryEvent
+Subject = Condition | ModeEntryEvent | tuple[str, ...]
 """What is expected: that something is the case, an event, or the modes of a region in order."""
 
 
 @dataclass(frozen=True)
-class When:
+class TimeConstraint:
     """When something is expected; all times in s, None where nothing is said."""
 
     at: Fraction | None = None
@@ -94,11 +94,11 @@ class Expectation:
     name: str
     kind: Literal["that", "always", "never", "event", "modes"]
     subject: Subject
-    when: When
+    when: TimeConstraint
     text: str
     span: Span
     count: int | None = None
-    place: Place | None = None
+    region_ref: RegionRef | None = None
     requirements: tuple[str, ...] = ()
 
     @property

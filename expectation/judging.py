@@ -9,12 +9,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from engine.trajectory import Trajectory
-from expectation.expected import Condition, Expectation, Test, Trigger, When
-from expectation.observed import Observed, at_or_before, observed, series, slack
-from language.event_name import EventName
+from expectation.expected import Condition, Expectation, Test, TimeConstraint, Trigger
+from expectation.observed import (
+    ObservedRun,
+    evaluate_series,
+    observe_run,
+    point_at_or_before,
+    time_tolerance,
+)
+from language.event_name import ModeEntryEvent
 
-Spans = list[tuple[float, float]]
-Truths = list[tuple[int, float, bool]]
+TimeSpans = list[tuple[float, float]]
+TruthSeries = list[tuple[int, float, bool]]
 """Point, time [s] and whether a condition holds there."""
 
 
@@ -30,55 +36,63 @@ class Outcome:
     values: Mapping[str, Any] = field(default_factory=dict)
 
 
-def judged(test: Test, trajectory: Trajectory) -> tuple[Outcome, ...]:
+def evaluate_test(test: Test, trajectory: Trajectory) -> tuple[Outcome, ...]:
     """Return what became of each expectation in a run."""
-    seen = observed(test.system, trajectory)
-    return tuple(_Judge(each, seen).outcome() for each in test.expectations)
+    run = observe_run(test.system, trajectory)
+    return tuple(_ExpectationEvaluator(each, run).evaluate() for each in test.expectations)
 
 
-class _Judge:
+class _ExpectationEvaluator:
     """One expectation of one run."""
 
-    def __init__(self, expectation: Expectation, seen: Observed) -> None:
+    def __init__(self, expectation: Expectation, run: ObservedRun) -> None:
         self.expectation = expectation
-        self.seen = seen
+        self.seen = run
 
-    def outcome(self) -> Outcome:
+    def evaluate(self) -> Outcome:
         expectation = self.expectation
         match expectation.kind:
             case "that":
-                return self._that(self._truths(expectation.subject), expectation.when)
+                return self._evaluate_that(
+                    self._truth_series(expectation.subject), expectation.when
+                )
             case "always" | "never":
-                return self._throughout(self._truths(expectation.subject), expectation.when)
+                return self._check_throughout(
+                    self._truth_series(expectation.subject), expectation.when
+                )
             case "event":
-                return self._event(expectation.when)
+                return self._evaluate_event(expectation.when)
             case "modes":
-                return self._modes(expectation.when)
+                return self._evaluate_modes(expectation.when)
 
     # What there is to see.
 
-    def _truths(self, subject: Any) -> Truths:
-        found = series(subject, self.seen)
+    def _truth_series(self, subject: Any) -> TruthSeries:
+        found = evaluate_series(subject, self.seen)
         points = self.seen.points
         return [
             (k, points[k].time, bool(v)) for k, v in zip(found.points, found.values, strict=True)
         ]
 
-    def _occurrences(self, trigger: Trigger, when: When) -> list[float]:
+    def _occurrences(self, trigger: Trigger, when: TimeConstraint) -> list[float]:
         """Return when something happened, or turned true, in the window [s]."""
-        if isinstance(trigger, EventName):
+        if isinstance(trigger, ModeEntryEvent):
             times = self.seen.times_of(trigger)
         else:
-            times = _turns(self._truths(trigger))
+            times = _rising_times(self._truth_series(trigger))
         low, high = self._window(when)
-        return [time for time in times if low - slack(low) <= time <= high + slack(high)]
+        return [
+            time
+            for time in times
+            if low - time_tolerance(low) <= time <= high + time_tolerance(high)
+        ]
 
-    def _window(self, when: When) -> tuple[float, float]:
+    def _window(self, when: TimeConstraint) -> tuple[float, float]:
         low = 0.0 if when.since is None else float(when.since)
         high = self.seen.end if when.until is None else float(when.until)
         return low, high
 
-    def _spans(self, when: When) -> Spans:
+    def _spans(self, when: TimeConstraint) -> TimeSpans:
         """Return from when to when something is expected [s]: once, or after each event."""
         if when.after is None:
             return [self._window(when)]
@@ -87,160 +101,190 @@ class _Judge:
 
     # Conditions.
 
-    def _that(self, truths: Truths, when: When) -> Outcome:
+    def _evaluate_that(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
         if when.at is not None and when.within is None:
-            return self._at(truths, float(when.at))
+            return self._check_at(truths, float(when.at))
         if when.at is not None:
-            return self._near(
-                _turns(truths), float(when.at), float(when.within or 0), "turned true"
+            return self._check_near(
+                _rising_times(truths), float(when.at), float(when.within or 0), "turned true"
             )
         if when.before is not None:
             low, high = float(when.since or 0), float(when.before)
-            return self._met(truths, [(low, high)], f"was not true by {_s(high)}")
-        late = f"within {_s(float(when.within or 0))} after `{when.after_text}`"
+            return self._check_eventually(
+                truths, [(low, high)], f"was not true by {_format_time(high)}"
+            )
+        late = f"within {_format_time(float(when.within or 0))} after `{when.after_text}`"
         if not (spans := self._spans(when)):
-            return self._never_happened(when)
-        return self._met(truths, spans, f"was not true {late}")
+            return self._fail_no_trigger(when)
+        return self._check_eventually(truths, spans, f"was not true {late}")
 
-    def _at(self, truths: Truths, time: float) -> Outcome:
-        held = _held(truths, time)
+    def _check_at(self, truths: TruthSeries, time: float) -> Outcome:
+        held = _last_not_after(truths, time)
         if held is None:
-            return self._ended(time)
+            return self._fail_run_ended(time)
         k, _, value = held
-        if self.seen.end < time - slack(time):
-            return self._ended(time)
+        if self.seen.end < time - time_tolerance(time):
+            return self._fail_run_ended(time)
         if value:
-            return self._passed(time)
-        return self._failed(f"is false at {_s(time)}", time, k)
+            return self._pass(time)
+        return self._fail(f"is false at {_format_time(time)}", time, k)
 
-    def _near(self, times: Sequence[float], at: float, within: float, verb: str) -> Outcome:
-        limit = within + slack(at + within)
+    def _check_near(self, times: Sequence[float], at: float, within: float, verb: str) -> Outcome:
+        limit = within + time_tolerance(at + within)
         nearest = min(times, key=lambda time: abs(time - at), default=None)
         if nearest is not None and abs(nearest - at) <= limit:
-            return self._passed(nearest)
-        told = f"never {verb}" if nearest is None else f"{verb} at {_s(nearest)}"
-        text = f"{told}, expected at {_s(at)}" + (f" within {_s(within)}" if within else "")
-        return self._failed(text, at if nearest is None else nearest)
+            return self._pass(nearest)
+        observed_text = f"never {verb}" if nearest is None else f"{verb} at {_format_time(nearest)}"
+        text = f"{observed_text}, expected at {_format_time(at)}" + (
+            f" within {_format_time(within)}" if within else ""
+        )
+        return self._fail(text, at if nearest is None else nearest)
 
-    def _met(self, truths: Truths, spans: Spans, text: str) -> Outcome:
+    def _check_eventually(self, truths: TruthSeries, spans: TimeSpans, text: str) -> Outcome:
         """Somewhere in each span it is true."""
         first = None
         for low, high in spans:
-            met = next((time for _, time, value in self._inside(truths, low, high) if value), None)
-            if met is None:
-                early = f": the run ended at {_s(self.seen.end)}" if self.seen.end < high else ""
-                start = f" at {_s(low)}" if self.expectation.when.after is not None else ""
-                return self._failed(f"{text}{start}{early}", high, at_or_before(self.seen, high))
-            first = met if first is None else first
-        return self._passed(first)
+            hit = next(
+                (time for _, time, value in self._truths_within(truths, low, high) if value), None
+            )
+            if hit is None:
+                early = (
+                    f": the run ended at {_format_time(self.seen.end)}"
+                    if self.seen.end < high
+                    else ""
+                )
+                start = (
+                    f" at {_format_time(low)}" if self.expectation.when.after is not None else ""
+                )
+                return self._fail(
+                    f"{text}{start}{early}", high, point_at_or_before(self.seen, high)
+                )
+            first = hit if first is None else first
+        return self._pass(first)
 
-    def _inside(self, truths: Truths, low: float, high: float) -> Truths:
+    def _truths_within(self, truths: TruthSeries, low: float, high: float) -> TruthSeries:
         """Return what modes hold at the start of a span, signals at rows, then all points in it."""
         subject = self.expectation.subject
         if isinstance(subject, Condition) and subject.all_signals:
-            start = bisect.bisect_left(truths, low - slack(low), key=lambda each: each[1])
+            start = bisect.bisect_left(truths, low - time_tolerance(low), key=lambda each: each[1])
         else:
-            start = bisect.bisect_right(truths, low + slack(low), key=lambda each: each[1])
+            start = bisect.bisect_right(truths, low + time_tolerance(low), key=lambda each: each[1])
             start = max(start - 1, 0)
-        end = bisect.bisect_right(truths, high + slack(high), key=lambda each: each[1])
+        end = bisect.bisect_right(truths, high + time_tolerance(high), key=lambda each: each[1])
         return truths[start:end]
 
-    def _throughout(self, truths: Truths, when: When) -> Outcome:
+    def _check_throughout(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
         """In all of each span it is what it is expected to be."""
-        wanted = self.expectation.kind == "always"
+        expected_truth = self.expectation.kind == "always"
         spans = self._spans(when)
         if not spans:
-            return self._never_happened(when)
+            return self._fail_no_trigger(when)
         for low, high in spans:
-            if self.seen.end < high - slack(high):
-                return self._ended(high)
-            inside = self._inside(truths, low, high)
+            if self.seen.end < high - time_tolerance(high):
+                return self._fail_run_ended(high)
+            inside = self._truths_within(truths, low, high)
             if not inside:
-                return self._failed(f"no row lies from {_s(low)} to {_s(high)}: a smaller `every`")
+                return self._fail(
+                    f"no row lies from {_format_time(low)} to {_format_time(high)}: a smaller `every`"
+                )
             for k, time, value in inside:
-                if value != wanted:
+                if value != expected_truth:
                     at = max(time, low)
-                    return self._failed(f"is {str(value).lower()} at {_s(at)}", at, k)
-        return self._passed(None)
+                    return self._fail(f"is {str(value).lower()} at {_format_time(at)}", at, k)
+        return self._pass(None)
 
     # Events and modes.
 
-    def _event(self, when: When) -> Outcome:
+    def _evaluate_event(self, when: TimeConstraint) -> Outcome:
         subject = self.expectation.subject
-        assert isinstance(subject, EventName)
+        assert isinstance(subject, ModeEntryEvent)
         times = self.seen.times_of(subject)
         if when.at is not None:
-            return self._near(times, float(when.at), float(when.within or 0), "happened")
+            return self._check_near(times, float(when.at), float(when.within or 0), "happened")
         if when.before is not None:
             low, high = float(when.since or 0), float(when.before)
-            return self._among(times, [(low, high)], f"did not happen by {_s(high)}")
+            return self._check_event_in_spans(
+                times, [(low, high)], f"did not happen by {_format_time(high)}"
+            )
         if when.after is not None:
-            late = f"within {_s(float(when.within or 0))} after `{when.after_text}`"
+            late = f"within {_format_time(float(when.within or 0))} after `{when.after_text}`"
             if not (spans := self._spans(when)):
-                return self._never_happened(when)
-            return self._among(times, spans, f"did not happen {late}")
+                return self._fail_no_trigger(when)
+            return self._check_event_in_spans(times, spans, f"did not happen {late}")
         low, high = self._window(when)
-        count = sum(low - slack(low) <= time <= high + slack(high) for time in times)
-        wanted = self.expectation.count
-        if count == wanted or (wanted is None and count):
-            return self._passed(times[0] if times else None)
-        told = "not once" if count == 0 else f"{count} times" if count > 1 else "once"
-        return self._failed(f"happened {told}" + ("" if wanted is None else f", not {wanted}"))
+        count = sum(
+            low - time_tolerance(low) <= time <= high + time_tolerance(high) for time in times
+        )
+        expected_count = self.expectation.count
+        if count == expected_count or (expected_count is None and count):
+            return self._pass(times[0] if times else None)
+        count_text = "not once" if count == 0 else f"{count} times" if count > 1 else "once"
+        return self._fail(
+            f"happened {count_text}" + ("" if expected_count is None else f", not {expected_count}")
+        )
 
-    def _among(self, times: Sequence[float], spans: Spans, text: str) -> Outcome:
+    def _check_event_in_spans(self, times: Sequence[float], spans: TimeSpans, text: str) -> Outcome:
         first = None
         for low, high in spans:
-            met = next((t for t in times if low - slack(low) <= t <= high + slack(high)), None)
-            if met is None:
-                start = f" at {_s(low)}" if self.expectation.when.after is not None else ""
-                return self._failed(text + start, high, at_or_before(self.seen, high))
-            first = met if first is None else first
-        return self._passed(first)
-
-    def _modes(self, when: When) -> Outcome:
-        """The modes of a region from the window's start on, each as often as it was entered."""
-        place, wanted = self.expectation.place, self.expectation.subject
-        assert place is not None and isinstance(wanted, tuple)
-        low, high = self._window(when)
-        start = at_or_before(self.seen, low)
-        found = [(max(low, 0.0), self.seen.modes[place][start])]
-        for k, mode in self.seen.entered(place, start):
-            if self.seen.points[k].time <= high + slack(high):
-                found.append((self.seen.points[k].time, mode))
-        for (time, mode), expected in zip(found, wanted, strict=False):
-            if mode != expected:
-                text = f"was `{mode}` from {_s(time)} on, not `{expected}`"
-                return self._failed(text, time, at_or_before(self.seen, time))
-        if len(found) < len(wanted):
-            return self._failed(f"did not enter `{wanted[len(found)]}` after `{found[-1][1]}`")
-        if len(found) > len(wanted):
-            time, mode = found[len(wanted)]
-            return self._failed(
-                f"entered `{mode}` at {_s(time)}, after all that was expected", time
+            hit = next(
+                (t for t in times if low - time_tolerance(low) <= t <= high + time_tolerance(high)),
+                None,
             )
-        return self._passed(found[-1][0])
+            if hit is None:
+                start = (
+                    f" at {_format_time(low)}" if self.expectation.when.after is not None else ""
+                )
+                return self._fail(text + start, high, point_at_or_before(self.seen, high))
+            first = hit if first is None else first
+        return self._pass(first)
+
+    def _evaluate_modes(self, when: TimeConstraint) -> Outcome:
+        """The modes of a region from the window's start on, each as often as it was entered."""
+        place, expected_modes = self.expectation.region_ref, self.expectation.subject
+        assert place is not None and isinstance(expected_modes, tuple)
+        low, high = self._window(when)
+        start = point_at_or_before(self.seen, low)
+        entries = [(max(low, 0.0), self.seen.modes[place][start])]
+        for k, mode in self.seen.mode_entries(place, start):
+            if self.seen.points[k].time <= high + time_tolerance(high):
+                entries.append((self.seen.points[k].time, mode))
+        for (time, mode), expected in zip(entries, expected_modes, strict=False):
+            if mode != expected:
+                text = f"was `{mode}` from {_format_time(time)} on, not `{expected}`"
+                return self._fail(text, time, point_at_or_before(self.seen, time))
+        if len(entries) < len(expected_modes):
+            return self._fail(
+                f"did not enter `{expected_modes[len(entries)]}` after `{entries[-1][1]}`"
+            )
+        if len(entries) > len(expected_modes):
+            time, mode = entries[len(expected_modes)]
+            return self._fail(
+                f"entered `{mode}` at {_format_time(time)}, after all that was expected", time
+            )
+        return self._pass(entries[-1][0])
 
     # Outcomes.
 
-    def _passed(self, time: float | None) -> Outcome:
+    def _pass(self, time: float | None) -> Outcome:
         return Outcome(self.expectation.name, True, "", time)
 
-    def _failed(self, text: str, time: float | None = None, point: int | None = None) -> Outcome:
+    def _fail(self, text: str, time: float | None = None, point: int | None = None) -> Outcome:
         if point is None and time is not None:
-            point = at_or_before(self.seen, time)
+            point = point_at_or_before(self.seen, time)
         modes = {} if point is None else self.seen.modes_at(point)
-        values = {} if point is None else self._values(point)
+        values = {} if point is None else self._signal_values(point)
         return Outcome(self.expectation.name, False, text, time, modes, values)
 
-    def _ended(self, time: float) -> Outcome:
-        return self._failed(
-            f"the run ended at {_s(self.seen.end)}, before {_s(time)}", self.seen.end
+    def _fail_run_ended(self, time: float) -> Outcome:
+        return self._fail(
+            f"the run ended at {_format_time(self.seen.end)}, before {_format_time(time)}",
+            self.seen.end,
         )
 
-    def _never_happened(self, when: When) -> Outcome:
-        return self._failed(f"`{when.after_text}` never happened")
+    def _fail_no_trigger(self, when: TimeConstraint) -> Outcome:
+        return self._fail(f"`{when.after_text}` never happened")
 
-    def _values(self, point: int) -> dict[str, Any]:
+    def _signal_values(self, point: int) -> dict[str, Any]:
         """Return the signals that the conditions read, at a point or in the row before."""
         rows = [p.row for p in self.seen.points[: point + 1] if p.row >= 0]
         if not rows:
@@ -249,7 +293,7 @@ class _Judge:
         return {name: self.seen.signals[name][rows[-1]] for name in dict.fromkeys(read)}
 
 
-def _turns(truths: Truths) -> list[float]:
+def _rising_times(truths: TruthSeries) -> list[float]:
     """Return when a condition turned true [s]; the start counts."""
     found, before = [], False
     for _, time, value in truths:
@@ -259,11 +303,11 @@ def _turns(truths: Truths) -> list[float]:
     return found
 
 
-def _held(truths: Truths, time: float) -> tuple[int, float, bool] | None:
+def _last_not_after(truths: TruthSeries, time: float) -> tuple[int, float, bool] | None:
     """Return the last point that is not after a time."""
-    place = bisect.bisect_right(truths, time + slack(time), key=lambda each: each[1])
+    place = bisect.bisect_right(truths, time + time_tolerance(time), key=lambda each: each[1])
     return truths[place - 1] if place else None
 
 
-def _s(time: float) -> str:
+def _format_time(time: float) -> str:
     return f"{time:.9g} s" if math.isfinite(time) else "the end"

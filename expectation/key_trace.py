@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from expectation.trace import Line, citations
-from language.document import Document, Node, Scalar, Table
+from expectation.trace import CodeLine, citations
+from language.document import Document, MappingNode, ScalarNode, YamlNode
 from language.problem import Span
-from language.tree import at
+from language.tree import find_node
 
-PARTS = (
+KEYED_SECTIONS = (
     *("modes", "regions", "tables", "parameters", "inputs", "states", "discrete", "equations"),
     *("flow", "terms", "events", "transitions", "observer", "update", "entry", "exit"),
 )
@@ -24,7 +24,7 @@ class KeyTrace:
     spec: str
     path: str
     place: Span
-    code: tuple[Line, ...]
+    code: tuple[CodeLine, ...]
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,17 @@ class KeyTraces:
     """All keys, in the order of the specs; `strays` are what C cites and no spec has."""
 
     keys: tuple[KeyTrace, ...]
-    strays: tuple[str, ...]
+    unmatched_citations: tuple[str, ...]
 
     @property
-    def silent(self) -> tuple[KeyTrace, ...]:
+    def uncited(self) -> tuple[KeyTrace, ...]:
         """The keys that no line of C cites: their values went into numbers, or nothing reads it."""
         return tuple(key for key in self.keys if not key.code)
 
 
-def keys_traced(documents: Sequence[Document], code: Mapping[str, Mapping[str, str]]) -> KeyTraces:
+def build_key_traces(
+    documents: Sequence[Document], code: Mapping[str, Mapping[str, str]]
+) -> KeyTraces:
     """Return which lines of C cite which keys of specs; `code` is C by automaton and file.
 
     A line that cites a part of a key, such as one flow of a mode, belongs to the smallest key that
@@ -49,13 +51,13 @@ def keys_traced(documents: Sequence[Document], code: Mapping[str, Mapping[str, s
     spans = {
         (document.name, path): span
         for document in documents
-        for path, span in _keys(document.root, "")
+        for path, span in _iterate_keys(document.root, "")
     }
     roots = {document.name: document.root for document in documents}
-    lines: dict[tuple[str, str], dict[Line, None]] = {key: {} for key in spans}
+    lines: dict[tuple[str, str], dict[CodeLine, None]] = {key: {} for key in spans}
     strays = []
     for (name, path), where in citations(code).items():
-        key = _nearest(name, path, spans, roots.get(name))
+        key = _enclosing_key(name, path, spans, roots.get(name))
         if key is None:
             strays.append(f"{name} {path}")
         else:
@@ -67,42 +69,42 @@ def keys_traced(documents: Sequence[Document], code: Mapping[str, Mapping[str, s
     return KeyTraces(tuple(keys), tuple(strays))
 
 
-def _keys(table: Table, above: str) -> Iterator[tuple[str, Span]]:
+def _iterate_keys(table: MappingNode, above: str) -> Iterator[tuple[str, Span]]:
     """Yield the path and place of each key below the parts that have keys of their own."""
     for part in table:
-        if not isinstance(part.node, Table):
+        if not isinstance(part.node, MappingNode):
             continue
         if part.key == "templates":
-            yield from _entries(part.node, "templates.")
-        elif part.key in PARTS:
-            yield from _entries(part.node, f"{above}{part.key}.")
+            yield from _iterate_entries(part.node, "templates.")
+        elif part.key in KEYED_SECTIONS:
+            yield from _iterate_entries(part.node, f"{above}{part.key}.")
 
 
-def _entries(table: Table, above: str) -> Iterator[tuple[str, Span]]:
+def _iterate_entries(table: MappingNode, above: str) -> Iterator[tuple[str, Span]]:
     for entry in table:
         yield f"{above}{entry.key}", entry.span
-        if isinstance(entry.node, Table):
-            yield from _keys(entry.node, f"{above}{entry.key}.")
+        if isinstance(entry.node, MappingNode):
+            yield from _iterate_keys(entry.node, f"{above}{entry.key}.")
 
 
-def _nearest(
-    name: str, path: str, known: Mapping[tuple[str, str], Span], root: Table | None
+def _enclosing_key(
+    name: str, path: str, known: Mapping[tuple[str, str], Span], root: MappingNode | None
 ) -> tuple[str, str] | None:
     """Return the smallest known key that a cited path is in."""
     parts = path.split(".")
     for count in range(len(parts), 1, -1):
         shorter = ".".join(parts[:count])
         if (name, shorter) in known:
-            template = _template(root, parts)
-            inside = _nearest(name, template, known, None) if template else None
+            template = _template_path(root, parts)
+            inside = _enclosing_key(name, template, known, None) if template else None
             is_deeper = inside is not None and inside[1].count(".") >= count
             return inside if is_deeper else (name, shorter)
     return None
 
 
-def _template(root: Table | None, parts: Sequence[str]) -> str:
+def _template_path(root: MappingNode | None, parts: Sequence[str]) -> str:
     """Return the path in the template that a mode is like; "" if it is like none."""
-    like: Node | None = at(root, (*parts[:2], "like")) if root else None
-    if not isinstance(like, Scalar) or parts[0] != "modes" or len(parts) < 3:
+    like: YamlNode | None = find_node(root, (*parts[:2], "like")) if root else None
+    if not isinstance(like, ScalarNode) or parts[0] != "modes" or len(parts) < 3:
         return ""
     return ".".join(("templates", like.text, *parts[2:]))

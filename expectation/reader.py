@@ -7,48 +7,56 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from expectation.condition import ConditionReader
-from expectation.expected import Condition, Expectation, Place, Subject, Test, Trigger, When
-from expectation.places import nearest_mode, require_mode_output, said
-from expectation.recording import recording
+from expectation.expected import (
+    Condition,
+    Expectation,
+    RegionRef,
+    Subject,
+    Test,
+    TimeConstraint,
+    Trigger,
+)
+from expectation.places import format_region, require_mode_output, suggest_mode
+from expectation.recording import select_recorded_signals
 from language.declaration import Formula
-from language.document import Document, Entry, Node, Scalar, Table, require_kind
-from language.event_name import EventName, read_event
+from language.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
+from language.event_name import ModeEntryEvent, read_event
 from language.experiment import Scenario, System
 from language.model import CHART
-from language.overlay import without
-from language.problem import Problems, Span, nearest
-from language.project import Project, expanded
+from language.overlay import without_keys
+from language.problem import Problems, Span, suggest_name
+from language.project import Project, expand_document
 from language.reader import Reader, about_of
 from language.requirement import all_requirements, requirements_of
 from language.scenario import SCENARIO_KEYS, read_scenario
-from language.syntax import Broken
+from language.syntax import ErrorNode
 from language.system import read_system
-from language.units import SECOND, fits
+from language.units import SECOND, are_compatible
 from language.wiring import INACTIVE
 
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
-INNER_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
+INLINE_SCENARIO_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
 """The keys of a scenario that is written in a test."""
-MOMENTS = ("at", "within", "before", "after", "from", "until")
-KEYS: Mapping[str, tuple[str, ...]] = {
-    "that": MOMENTS,
+TIME_KEYS = ("at", "within", "before", "after", "from", "until")
+EXPECTATION_KEYS: Mapping[str, tuple[str, ...]] = {
+    "that": TIME_KEYS,
     "always": ("from", "until", "after", "within"),
     "never": ("from", "until", "after", "within"),
-    "event": (*MOMENTS, "count"),
+    "event": (*TIME_KEYS, "count"),
     "modes": ("of", "from", "until"),
 }
 """What an expectation may be, and what stands beside it."""
-MOST_EVENTS = 1_000_000
+MAX_EVENTS = 1_000_000
 
 
 def read_test(document: Document, project: Project, problems: Problems | None = None) -> Test:
     """Read a test with its system and scenario. Raises SpecError with all problems."""
-    document = expanded(document, project)
+    document = expand_document(document, project)
     problems = problems if problems is not None else Problems()
     require_kind(document, "test", problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
     test = _TestReader(problems, project).read(document)
-    problems.stop_if_any()
+    problems.raise_if_errors()
     return test
 
 
@@ -57,7 +65,7 @@ class _TestReader(Reader):
 
     system: System
     scenario: Scenario
-    written: Document
+    scenario_document: Document
     conditions: ConditionReader
 
     def __init__(self, problems: Problems, project: Project) -> None:
@@ -65,73 +73,76 @@ class _TestReader(Reader):
         self.project = project
 
     def read(self, document: Document) -> Test:
-        tree = self.table(document.root, f"test {document.name}", TEST_KEYS)
+        tree = self.read_mapping(document.root, f"test {document.name}", TEST_KEYS)
         at = document.name_span
         self._load(tree, document)
-        self.problems.stop_if_any()
+        self.problems.raise_if_errors()
         self.conditions = ConditionReader(self.problems, self.system)
         if tree.get("every") is not None:
             every = self._time(tree.get("every"), "every") or Fraction(1, 1000)
             self.scenario = dataclasses.replace(self.scenario, every=every)
         node = tree.get("expect")
-        found = [self._expectation(entry) for entry in self.named(node, "expect")]
-        if node is None or (isinstance(node, Table) and not node.entries):
+        found = [self._expectation(entry) for entry in self.named_entries(node, "expect")]
+        if node is None or (isinstance(node, MappingNode) and not node.entries):
             label, hint = "a test has `expect`", "like `{ends: {at: end, that: est.mode == drive}}`"
             self.problems.error("missing", at, label, hint)
         expectations = tuple(each for each in found if each is not None)
         return Test(
             name=document.name,
             system=self.system,
-            scenario=recording(self.scenario, self.system, expectations, self.problems),
+            scenario=select_recorded_signals(
+                self.scenario, self.system, expectations, self.problems
+            ),
             expectations=expectations,
             span=at,
             source=document.source,
             about=about_of(tree),
             requirements=all_requirements(
-                without(document.root, "expect"), expanded(self.written, self.project).root
+                without_keys(document.root, "expect"),
+                expand_document(self.scenario_document, self.project).root,
             ),
         )
 
-    def _load(self, tree: Table, document: Document) -> None:
+    def _load(self, tree: MappingNode, document: Document) -> None:
         """The system and the scenario: named, or with the scenario written here."""
         node, at = tree.get("scenario"), document.name_span
-        if isinstance(node, Table):
-            inner = self.table(node, "scenario", INNER_KEYS)
+        if isinstance(node, MappingNode):
+            inner = self.read_mapping(node, "scenario", INLINE_SCENARIO_KEYS)
             written = Document("scenario", document.name, node.span, inner, document.source)
         else:
-            named = self.scalar(node, "scenario", at)
-            self.problems.stop_if_any()
+            named = self.read_scalar(node, "scenario", at)
+            self.problems.raise_if_errors()
             assert named is not None
             written = self.project.read(self.project.path_of(named.text, named.span))
         of = tree.get("of")
         if of is None:
-            of = expanded(written, self.project).root.get("of")
-        named = self.scalar(of, "of", written.name_span)
+            of = expand_document(written, self.project).root.get("of")
+        named = self.read_scalar(of, "of", written.name_span)
         values = tree.get("values")
         overrides = {
             entry.key: entry.node
-            for entry in self.table(values, "values")
-            if self.scalar(entry.node, entry.key, entry.span)
+            for entry in self.read_mapping(values, "values")
+            if self.read_scalar(entry.node, entry.key, entry.span)
         }
-        self.problems.stop_if_any()
+        self.problems.raise_if_errors()
         assert named is not None
         document = self.project.read(self.project.path_of(named.text, named.span))
         self.system = read_system(document, self.project, overrides)  # type: ignore[arg-type]
         self.scenario = read_scenario(written, self.project, self.system)
-        self.written = written
+        self.scenario_document = written
 
     def _expectation(self, entry: Entry) -> Expectation | None:
-        told = len(self.problems.found)
-        found = self.kind_of(entry, f"expect.{entry.key}", KEYS, "expects")
+        problem_count = len(self.problems.reported)
+        found = self.read_alternative(entry, f"expect.{entry.key}", EXPECTATION_KEYS, "expects")
         if found is None:
             return None
         kind, own = found
-        place = self._place(own, entry.span) if kind == "modes" else None
+        place = self._region_ref(own, entry.span) if kind == "modes" else None
         subject = self._subject(kind, own.entries[kind], place)
         when = self._when(own, entry, kind)
-        if subject is None or len(self.problems.found) > told:
+        if subject is None or len(self.problems.reported) > problem_count:
             return None
-        self._at_rows(subject, when, own)
+        self._require_row_time(subject, when, own)
         count = own.get("count")
         return Expectation(
             name=entry.key,
@@ -140,84 +151,88 @@ class _TestReader(Reader):
             when=when,
             text=_text(own.get(kind)),
             span=own.entries[kind].node.span,
-            count=self.whole(count, "count", 1, 0, MOST_EVENTS) if count is not None else None,
-            place=place,
+            count=self.read_integer(count, "count", 1, 0, MAX_EVENTS)
+            if count is not None
+            else None,
+            region_ref=place,
             requirements=requirements_of(own),
         )
 
     # What is expected.
 
-    def _subject(self, kind: str, entry: Entry, place: Place | None) -> Subject | None:
+    def _subject(self, kind: str, entry: Entry, region_ref: RegionRef | None) -> Subject | None:
         if kind == "modes":
-            return self._modes(entry.node, place)
-        scalar = self.scalar(entry.node, kind, entry.span)
+            return self._modes(entry.node, region_ref)
+        scalar = self.read_scalar(entry.node, kind, entry.span)
         if scalar is None:
             return None
         if kind == "event":
             return self._event(scalar)
         return self._condition(scalar, kind)
 
-    def _condition(self, scalar: Scalar, key: str) -> Condition | None:
-        formula: Formula | None = self.expression(scalar, key, scalar.span)
-        if formula is None or isinstance(formula.tree, Broken):
+    def _condition(self, scalar: ScalarNode, key: str) -> Condition | None:
+        formula: Formula | None = self.read_expression(scalar, key, scalar.span)
+        if formula is None or isinstance(formula.tree, ErrorNode):
             return None
-        return self.conditions.condition(scalar, formula)
+        return self.conditions.read_condition(scalar, formula)
 
-    def _trigger(self, node: Node | None, at: Span) -> Trigger | None:
+    def _trigger(self, node: YamlNode | None, at: Span) -> Trigger | None:
         """What something is expected after: an event, or a condition that turns true."""
-        scalar = self.scalar(node, "after", at)
+        scalar = self.read_scalar(node, "after", at)
         if scalar is None:
             return None
         if "->" in scalar.text or scalar.text in self.conditions.modes:
             return self._event(scalar)
         return self._condition(scalar, "after")
 
-    def _event(self, scalar: Scalar) -> EventName | None:
+    def _event(self, scalar: ScalarNode) -> ModeEntryEvent | None:
         event = read_event(scalar, self.system, self.problems)
         if event:
             require_mode_output(self.system, event.instance, scalar.span, self.problems)
         return event
 
-    def _place(self, own: Table, at: Span) -> Place | None:
+    def _region_ref(self, own: MappingNode, at: Span) -> RegionRef | None:
         """The region whose modes are expected: `est`, `est.gap`."""
         places = [
             (name, region.name)
             for name, instance in self.system.instances.items()
             for region in instance.automaton.all_regions
         ]
-        alone = self.system.alone
+        alone = self.system.sole_instance
         known = {region: (name, region) for name, region in places if name == alone}
-        known |= {said(place): place for place in places}
+        known |= {format_region(place): place for place in places}
         if own.get("of") is None and alone:
             require_mode_output(self.system, alone, at, self.problems)
             return alone, CHART
-        scalar = self.scalar(own.get("of"), "of", at)
+        scalar = self.read_scalar(own.get("of"), "of", at)
         if scalar is None:
             return None
         if scalar.text not in known:
             label = (
                 f"`{scalar.text}` is not an instance of `{self.system.name}`, nor a region of one"
             )
-            self.problems.error("name", scalar.span, label, nearest(scalar.text, known))
+            self.problems.error("name", scalar.span, label, suggest_name(scalar.text, known))
             return None
         require_mode_output(self.system, known[scalar.text][0], scalar.span, self.problems)
         return known[scalar.text]
 
-    def _modes(self, node: Node, place: Place | None) -> tuple[str, ...] | None:
-        items = self.items(node, "modes")
-        if place is None or not items:
+    def _modes(self, node: YamlNode, region_ref: RegionRef | None) -> tuple[str, ...] | None:
+        items = self.read_list(node, "modes")
+        if region_ref is None or not items:
             return None
-        region = self.system.instances[place[0]].automaton.region(place[1])
+        region = self.system.instances[region_ref[0]].automaton.region(region_ref[1])
         modes = [*region.modes, *([INACTIVE] if region.inactive is not None else [])]
         for item in items:
             if item.text not in modes:
-                self._unknown_mode(item, place, modes)
+                self._report_unknown_mode(item, region_ref, modes)
         return tuple(item.text for item in items)
 
-    def _unknown_mode(self, item: Scalar, place: Place, modes: Sequence[str]) -> None:
+    def _report_unknown_mode(
+        self, item: ScalarNode, region_ref: RegionRef, modes: Sequence[str]
+    ) -> None:
         """Report a mode that a region has not, or that has others inside it."""
-        label = f"`{item.text}` is not a mode of `{said(place)}`"
-        hint = nearest_mode(item.text, place, self.system)
+        label = f"`{item.text}` is not a mode of `{format_region(region_ref)}`"
+        hint = suggest_mode(item.text, region_ref, self.system)
         inner = [mode for mode in modes if mode.startswith(f"{item.text}.")]
         if inner:
             label = f"`{item.text}` has modes inside it, and what is listed are the innermost"
@@ -226,21 +241,21 @@ class _TestReader(Reader):
 
     # When it is expected.
 
-    def _when(self, own: Table, entry: Entry, kind: str) -> When:
-        given = {key: own.entries[key] for key in MOMENTS if key in own.entries}
-        self._require_one_moment(given, entry, kind)
-        times = {key: self._moment(own.get(key), key) for key in MOMENTS if key != "after"}
+    def _when(self, own: MappingNode, entry: Entry, kind: str) -> TimeConstraint:
+        given = {key: own.entries[key] for key in TIME_KEYS if key in own.entries}
+        self._require_one_time(given, entry, kind)
+        times = {key: self._time_point(own.get(key), key) for key in TIME_KEYS if key != "after"}
         after = self._trigger(own.get("after"), entry.span) if "after" in given else None
         since, until = times["from"], times["until"]
         if since is not None and until is not None and since > until:
             label = "the window is empty: `from` is after `until`"
             self.problems.error("range", given["from"].span, label)
-        return When(
+        return TimeConstraint(
             times["at"], times["within"], times["before"], since, until, after,
             _text(own.get("after")),
         )  # fmt: skip
 
-    def _require_one_moment(self, given: Mapping[str, Entry], entry: Entry, kind: str) -> None:
+    def _require_one_time(self, given: Mapping[str, Entry], entry: Entry, kind: str) -> None:
         moments = [key for key in ("at", "before", "after") if key in given]
         if len(moments) > 1:
             label = f"`{moments[0]}` and `{moments[1]}` say two moments"
@@ -260,32 +275,32 @@ class _TestReader(Reader):
                 label = f"`{key}` does not go with `{moments[0]}`"
                 self.problems.error("form", given[key].span, label)
 
-    def _moment(self, node: Node | None, key: str) -> Fraction | None:
+    def _time_point(self, node: YamlNode | None, key: str) -> Fraction | None:
         horizon = self.scenario.horizon
         if node is None:
             return None
-        if isinstance(node, Scalar) and node.text == "end" and key in ("at", "until"):
+        if isinstance(node, ScalarNode) and node.text == "end" and key in ("at", "until"):
             if horizon is None:
                 label = "the run ends with its recording: say a time"
                 self.problems.error("form", node.span, label)
             return horizon
-        told = len(self.problems.found)
+        problem_count = len(self.problems.reported)
         time = self._time(node, key)
-        if len(self.problems.found) > told:
+        if len(self.problems.reported) > problem_count:
             return None
         if horizon is not None and time > horizon:
             label = f"`{key}` is after the end of the run, {float(horizon):.9g} s"
             self.problems.error("range", node.span, label)
         return time
 
-    def _time(self, node: Node | None, what: str) -> Fraction:
+    def _time(self, node: YamlNode | None, what: str) -> Fraction:
         assert node is not None
-        value, unit = self.quantity(node, what, node.span, None)
-        if value < 0 or (value and not fits(unit.dimension, SECOND)):
+        value, unit = self.read_quantity(node, what, node.span, None)
+        if value < 0 or (value and not are_compatible(unit.dimension, SECOND)):
             self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
         return value
 
-    def _at_rows(self, subject: Subject, when: When, own: Table) -> None:
+    def _require_row_time(self, subject: Subject, when: TimeConstraint, own: MappingNode) -> None:
         """Signals are known at rows: `at` is the time of one."""
         every = self.scenario.every
         if not isinstance(subject, Condition) or not subject.all_signals:
@@ -296,5 +311,5 @@ class _TestReader(Reader):
             self.problems.error("range", own.entries["at"].node.span, label, hint)
 
 
-def _text(node: Node | None) -> str:
-    return node.text if isinstance(node, Scalar) else ""
+def _text(node: YamlNode | None) -> str:
+    return node.text if isinstance(node, ScalarNode) else ""

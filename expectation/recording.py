@@ -12,11 +12,11 @@ from expectation.places import is_chart, mode_signals
 from language.experiment import Scenario, System
 from language.problem import Problems
 
-MOST_ROWS = 1_000_000
+MAX_ROWS = 1_000_000
 """More rows are a mistake of a horizon, or of a period."""
 
 
-def recording(
+def select_recorded_signals(
     scenario: Scenario, system: System, expectations: Sequence[Expectation], problems: Problems
 ) -> Scenario:
     """Return a scenario that records the signals that are read, at least one.
@@ -30,16 +30,16 @@ def recording(
         if is_chart(system, name) and "mode" in automaton.outputs:
             read += mode_signals(system, name)
             if automaton.period:
-                every = _common(every, automaton.period, instance.offset)
+                every = _common_period(every, automaton.period, instance.offset)
     horizon = scenario.horizon
-    if every != scenario.every and horizon and horizon / every > MOST_ROWS:
-        label = f"rows at all ticks of its charts are more than {MOST_ROWS}"
+    if every != scenario.every and horizon and horizon / every > MAX_ROWS:
+        label = f"rows at all ticks of its charts are more than {MAX_ROWS}"
         problems.error("range", scenario.span, label, "a shorter `horizon`")
     signals = tuple(dict.fromkeys(read)) or system.signals[:1]
     return dataclasses.replace(scenario, signals=signals, every=every)
 
 
-def _common(every: Fraction, period: Fraction, offset: Fraction) -> Fraction:
+def _common_period(every: Fraction, period: Fraction, offset: Fraction) -> Fraction:
     """Return the largest time of which all three are whole multiples [s]."""
     times = (every, period, offset)
     whole = math.lcm(*(time.denominator for time in times))

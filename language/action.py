@@ -9,85 +9,108 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from language.declaration import Formula
-from language.limit import stored
-from language.lower import WHOLE_TYPES, Names, assigned, equations, reads_of
+from language.limit import store_saturated
+from language.lower import (
+    WHOLE_TYPES,
+    NameBindings,
+    lower_assigned_value,
+    lower_equations,
+    names_read,
+)
 from language.model import Automaton, Mode, Transition
-from language.operation import Assign, Block, Choose, Op, Ref
+from language.operation import Assign, Block, Op, Ref, Switch
 from language.program import Variable, value_type
-from language.region import sources
-from language.wiring import watched_range
+from language.region import equation_formulas
+from language.wiring import event_range
 
 
-def place_of(automaton: Automaton, name: str) -> str:
+def storage_of(automaton: Automaton, name: str) -> str:
     """Return the variable of a state or discrete variable."""
     return f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
 
 
-def stage(
-    automaton: Automaton, formulas: Mapping[str, Formula], known: Names, verb: str = "reset"
+def lower_stage(
+    automaton: Automaton,
+    formulas: Mapping[str, Formula],
+    known: NameBindings,
+    stage_name: str = "reset",
 ) -> list[Op]:
     """Return assignments that all read the values before, then commit together."""
-    return [*reading(automaton, formulas, known, verb), *committing(automaton, formulas, verb)]
+    return [
+        *read_stage(automaton, formulas, known, stage_name),
+        *commit_stage(automaton, formulas, stage_name),
+    ]
 
 
-def reading(
-    automaton: Automaton, formulas: Mapping[str, Formula], known: Names, verb: str = "reset"
+def read_stage(
+    automaton: Automaton,
+    formulas: Mapping[str, Formula],
+    known: NameBindings,
+    stage_name: str = "reset",
 ) -> list[Op]:
     """Return what reads the values before a stage."""
     found: list[Op] = []
     for name, formula in formulas.items():
-        value = assigned(formula.tree, known, automaton.carried[name].type in WHOLE_TYPES)
+        value = lower_assigned_value(
+            formula.tree, known, automaton.state_variables[name].type in WHOLE_TYPES
+        )
         key = f"{automaton.name} {formula.key}"
-        found.append(Assign(f"work.{verb}_{name}", value, key))
+        found.append(Assign(f"work.{stage_name}_{name}", value, key))
     return found
 
 
-def committing(automaton: Automaton, written: Iterable[str], verb: str = "reset") -> list[Op]:
+def commit_stage(automaton: Automaton, names: Iterable[str], stage_name: str = "reset") -> list[Op]:
     """Return what commits the assignments of a stage together."""
     found: list[Op] = []
-    for name in written:
-        whole = automaton.carried[name].type in WHOLE_TYPES
-        found += stored(automaton, name, Ref(f"work.{verb}_{name}", whole))
+    for name in names:
+        whole = automaton.state_variables[name].type in WHOLE_TYPES
+        found += store_saturated(automaton, name, Ref(f"work.{stage_name}_{name}", whole))
     return found
 
 
-def stage_of_regions(
+def lower_stage_of_regions(
     automaton: Automaton,
-    taken: Callable[[str], str],
-    number: Callable[[Transition], int],
-    written: Callable[[Transition], Mapping[str, Formula]],
-    known: Names,
+    selected_variable: Callable[[str], str],
+    number_of: Callable[[Transition], int],
+    assignments_of: Callable[[Transition], Mapping[str, Formula]],
+    known: NameBindings,
 ) -> Block:
     """Return one stage of the transitions that all regions take: all read, then all commit.
 
-    `taken` is the variable of a region that holds the number of its transition, 0 for none.
+    `selected_variable` is the variable of a region that holds the number of its transition, 0 for none.
     """
     reads: list[Op] = []
     commits: list[Op] = []
     for region in automaton.all_regions:
-        ways = [way for mode in region.modes.values() for way in mode.transitions if written(way)]
-        numbers = [number(way) for way in ways]
-        read = [tuple(reading(automaton, written(way), known)) for way in ways]
-        commit = [tuple(committing(automaton, written(way))) for way in ways]
+        ways = [
+            way for mode in region.modes.values() for way in mode.transitions if assignments_of(way)
+        ]
+        numbers = [number_of(way) for way in ways]
+        read = [tuple(read_stage(automaton, assignments_of(way), known)) for way in ways]
+        commit = [tuple(commit_stage(automaton, assignments_of(way))) for way in ways]
         if ways:
-            reads.append(Choose(taken(region.name), tuple(zip(numbers, read, strict=True))))
-            commits.append(Choose(taken(region.name), tuple(zip(numbers, commit, strict=True))))
+            reads.append(
+                Switch(selected_variable(region.name), tuple(zip(numbers, read, strict=True)))
+            )
+            commits.append(
+                Switch(selected_variable(region.name), tuple(zip(numbers, commit, strict=True)))
+            )
     return (*reads, *commits)
 
 
-def entry(
-    automaton: Automaton, target: Mode, written: Mapping[str, Formula], known: Names
+def lower_entry(
+    automaton: Automaton, target: Mode, assignments: Mapping[str, Formula], known: NameBindings
 ) -> Block:
     """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
-    if not written:
+    if not assignments:
         return ()
-    inside = {name: place for name, place in known.items() if name not in sources(target)}
-    wanted = reads_of(formula.tree for formula in written.values())
-    ops = equations(target, inside, "equation.", f"{automaton.name} ", wanted)
-    return (*ops, *stage(automaton, written, inside))
+    inside = {name: place for name, place in known.items() if name not in equation_formulas(target)}
+    wanted = names_read(formula.tree for formula in assignments.values())
+    ops = lower_equations(target, inside, "equation.", f"{automaton.name} ", wanted)
+    return (*ops, *lower_stage(automaton, assignments, inside))
 
 
-def first_entry(automaton: Automaton) -> dict[str, Formula]:
+def initial_entry_assignments(automaton: Automaton) -> dict[str, Formula]:
     """Return what the entry of the initial modes of all regions writes."""
     initial = [region.modes[region.initial] for region in automaton.all_regions]
     return {name: formula for mode in initial for name, formula in mode.entry.items()}
@@ -100,9 +123,9 @@ def action_variables(automaton: Automaton) -> list[Variable]:
         resets = [transition.reset for transition in mode.transitions]
         for formulas in (*resets, mode.entry, mode.exit):
             for name in sorted(formulas):
-                found[f"reset_{name}"] = work_variable(automaton, "reset", name)
+                found[f"reset_{name}"] = stage_variable(automaton, "reset", name)
         for name in mode.update:
-            found[f"next_{name}"] = work_variable(automaton, "next", name)
+            found[f"next_{name}"] = stage_variable(automaton, "next", name)
     return list(found.values())
 
 
@@ -115,15 +138,15 @@ def discrete_variables(automaton: Automaton) -> list[Variable]:
             str(thing.unit.dimension),
             about=thing.key,
             values=thing.values,
-            range=watched_range(automaton, thing),
+            range=event_range(automaton, thing),
         )
         for name, thing in automaton.discrete.items()
     ]
 
 
-def work_variable(automaton: Automaton, verb: str, name: str) -> Variable:
+def stage_variable(automaton: Automaton, stage_name: str, name: str) -> Variable:
     """Return the variable of what a stage has computed and not yet committed."""
-    thing = automaton.carried[name]
+    thing = automaton.state_variables[name]
     unit = str(thing.unit.dimension)
     kind = value_type(thing.type)
-    return Variable(f"work.{verb}_{name}", kind, unit, values=thing.values)
+    return Variable(f"work.{stage_name}_{name}", kind, unit, values=thing.values)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 
-from language.document import Items, Node, Scalar
+from language.document import ScalarNode, SequenceNode, YamlNode
 
-KEYS: Mapping[str, tuple[str, ...]] = {
+KEY_ALIASES: Mapping[str, tuple[str, ...]] = {
     "en": ("entry",),
     "du": ("update",),
     "during": ("update",),
@@ -32,21 +32,23 @@ KEYS: Mapping[str, tuple[str, ...]] = {
     "default": ("initial",),
 }
 """Keys, each with what it may mean: the first that has a place counts."""
-AT_THE_ROOT = ("discrete", "inputs", "outputs", "parameters", "events", "tables", "period")
-KEPT = "what is kept is declared once, at the root: `discrete: {k: {type: int, initial: 0}}`"
-KINDS = "a mode has no type: `modes` inside take turns, `regions` run side by side; "
-KINDS += "in place of a junction each transition has the whole guard"
-HABITS: Mapping[str, str] = {
-    **dict.fromkeys(AT_THE_ROOT, "it stands at the root of the automaton, for all modes"),
-    **dict.fromkeys(("data", "local", "locals", "variables", "vars"), KEPT),
-    **dict.fromkeys(("type", "decomposition", "junction", "junctions"), KINDS),
+ROOT_KEYS = ("discrete", "inputs", "outputs", "parameters", "events", "tables", "period")
+DISCRETE_HINT = (
+    "what is kept is declared once, at the root: `discrete: {k: {type: int, initial: 0}}`"
+)
+MODE_TYPE_HINT = "a mode has no type: `modes` inside take turns, `regions` run side by side; "
+MODE_TYPE_HINT += "in place of a junction each transition has the whole guard"
+KEY_HINTS: Mapping[str, str] = {
+    **dict.fromkeys(ROOT_KEYS, "it stands at the root of the automaton, for all modes"),
+    **dict.fromkeys(("data", "local", "locals", "variables", "vars"), DISCRETE_HINT),
+    **dict.fromkeys(("type", "decomposition", "junction", "junctions"), MODE_TYPE_HINT),
     "on": "a transition hears an event: `transitions: {x: {event: x, to: []}}`",
 }
 """Keys that people write in a mode, and what is written here."""
-ASSIGNMENT = re.compile(r"([A-Za-z]\w*)\s*=\s*([^=;,]+)")
-STEPPED = re.compile(r"([A-Za-z]\w*)?\s*(\+\+|--|[-+*/]=)")
-WITH_GUARD = re.compile(r"(\w+)\s*\[(.*)\]")
-FUNCTIONS: Mapping[str, str] = {
+ASSIGNMENT_PATTERN = re.compile(r"([A-Za-z]\w*)\s*=\s*([^=;,]+)")
+INCREMENT_PATTERN = re.compile(r"([A-Za-z]\w*)?\s*(\+\+|--|[-+*/]=)")
+EVENT_WITH_GUARD_PATTERN = re.compile(r"(\w+)\s*\[(.*)\]")
+FUNCTION_HINTS: Mapping[str, str] = {
     "duration": "write `wait: 5 s` on the transition: how long its guard has to hold",
     "elapsed": "`after(5 s)` is a condition: 5 s since the mode was entered",
     "temporalCount": "`after(5 s)` is a condition: 5 s since the mode was entered",
@@ -64,39 +66,39 @@ FUNCTIONS: Mapping[str, str] = {
 """Functions, each with what is written here."""
 
 
-def known_as(word: str, known: Collection[str]) -> str:
+def key_alias_hint(word: str, known_keys: Collection[str]) -> str:
     """Return "did you mean `x`?" for a key of another tool, or an empty text."""
-    found = next((key for key in KEYS.get(word, ()) if key in known), "")
+    found = next((key for key in KEY_ALIASES.get(word, ()) if key in known_keys), "")
     return f"did you mean `{found}`?" if found else ""
 
 
-def habit(key: str, what: str) -> str:
+def key_hint(key: str, what: str) -> str:
     """Return what is written in place of a key of a mode, an empty text where nothing is known."""
-    heard = re.fullmatch(r"on[ _](\w+)", key)
-    if heard:
-        name = heard.group(1)
+    event_key = re.fullmatch(r"on[ _](\w+)", key)
+    if event_key:
+        name = event_key.group(1)
         return f"a transition hears an event: `transitions: {{{name}: {{event: {name}, to: []}}}}`"
     if key == "priority" and re.fullmatch(r"regions\.\w+", what):
         return "regions at the root are never left: those inside a mode have a priority"
-    return HABITS.get(key, "") if re.match(r"(.*\.)?(modes|regions)\.", what) else ""
+    return KEY_HINTS.get(key, "") if re.match(r"(.*\.)?(modes|regions)\.", what) else ""
 
 
-def as_mapping(node: Node, what: str) -> str:
+def mapping_hint(node: YamlNode, what: str) -> str:
     """Return how what is written as a text or list is written as a mapping, if that is known."""
     if what.endswith("transitions"):
         return "each has a name: `transitions: {fault: {to: fault, when: ...}}`"
     if re.search(r"transitions\.\w+$", what):
         return "like `{event: go, when: a, reset: {k: 1}}`"
-    items = node.nodes if isinstance(node, Items) else (node,)
-    text = ";".join(item.text for item in items if isinstance(item, Scalar))
-    found = ASSIGNMENT.findall(text)
+    items = node.nodes if isinstance(node, SequenceNode) else (node,)
+    text = ";".join(item.text for item in items if isinstance(item, ScalarNode))
+    found = ASSIGNMENT_PATTERN.findall(text)
     parts = ", ".join(f"{name}: {value.strip()}" for name, value in found)
     return f"it is written `{{{parts}}}`" if parts else ""
 
 
-def stepped(text: str) -> str:
+def increment_hint(text: str) -> str:
     """Return what is written in place of `k++` and `k += 2`, an empty text for other texts."""
-    match = STEPPED.search(text)
+    match = INCREMENT_PATTERN.search(text)
     if not match:
         return ""
     name, sign = match.group(1), match.group(2)
@@ -105,9 +107,9 @@ def stepped(text: str) -> str:
     return f"the new value is written whole{written}"
 
 
-def heard_with_guard(text: str, events: Collection[str]) -> str:
+def event_guard_hint(text: str, events: Collection[str]) -> str:
     """Return what is written in place of the event `go [a]`, an empty text for other texts."""
-    match = WITH_GUARD.fullmatch(text)
+    match = EVENT_WITH_GUARD_PATTERN.fullmatch(text)
     if not match or match.group(1) not in events:
         return ""
     return f"a guard stands beside it: `event: {match.group(1)}, when: {match.group(2)}`"

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from language.printing import digest
-from language.program import Constant, Program, Variable, short
+from language.program import Constant, Program, Variable, unqualified_name
 from language.signal import Sensor
 
-RANGE_SLACK = 1e-9
+RANGE_TOLERANCE = 1e-9
 """Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
 on that bound is located within, over ten digits above the rounding of a double."""
 
 
 @dataclass(frozen=True)
-class Feed:
+class InputSource:
     """What sets an input of an instance: a signal, a number, or a block of the wires.
 
     `is_limited`: a value that is not finite is held in the range of the input.
@@ -29,12 +29,12 @@ class Feed:
     variable: Variable
     source: str | float
     block: str | None
-    is_limited: bool
+    has_saturation: bool
     sensors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Column:
+class RecordedSignal:
     """A recorded signal, or a block of the wires."""
 
     name: str
@@ -43,7 +43,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Course:
+class InputTrajectory:
     """An input that changes between the instants, `delay` [s] late where it is a delayed one.
 
     `formulas` are the pieces that are formulas of time, by number, with their block of the wires.
@@ -55,7 +55,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Assembly:
+class SimulationAssembly:
     """Instances with their Programs, `order` of all that ticks or samples, and what they read.
 
     `inputs` are the system's, delayed ones among them; `controlled` are the continuous instances
@@ -65,32 +65,36 @@ class Assembly:
     programs: Mapping[str, Program]
     order: tuple[str, ...]
     inputs: tuple[str, ...]
-    feeds: Mapping[str, tuple[Feed, ...]]
+    input_sources: Mapping[str, tuple[InputSource, ...]]
     sensors: Mapping[str, Sensor]
     wires: Program
-    slots: tuple[str, ...]
-    columns: tuple[Column, ...]
+    row_signals: tuple[str, ...]
+    columns: tuple[RecordedSignal, ...]
     controlled: frozenset[str]
-    courses: tuple[Course, ...] = ()
+    input_trajectories: tuple[InputTrajectory, ...] = ()
 
     @property
-    def flows(self) -> tuple[str, ...]:
+    def continuous_instances(self) -> tuple[str, ...]:
         """The continuous instances."""
         return tuple(name for name, program in self.programs.items() if program.period is None)
 
     @property
-    def happenings(self) -> tuple[str, ...]:
+    def instant_actions(self) -> tuple[str, ...]:
         """What happens at an instant, by bit: ticks, samples, captures of sensors."""
-        ticks = [name for name in self.order if name in self.programs and name not in self.flows]
+        ticks = [
+            name
+            for name in self.order
+            if name in self.programs and name not in self.continuous_instances
+        ]
         late = [f"capture {name}" for name, sensor in self.sensors.items() if sensor.delay]
         return (*ticks, *self.sensors, *late)
 
     def digest(self) -> str:
         """Return a digest of all that is printed of it."""
         programs = [(name, digest(program)) for name, program in self.programs.items()]
-        rest = (self.order, self.inputs, self.feeds, self.slots, self.columns)
+        rest = (self.order, self.inputs, self.input_sources, self.row_signals, self.columns)
         more = (sorted(self.controlled), list(self.sensors.items()), digest(self.wires))
-        text = repr((programs, rest, more, self.courses))
+        text = repr((programs, rest, more, self.input_trajectories))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def tunables(self) -> Iterator[tuple[str, Constant]]:
@@ -100,26 +104,30 @@ class Assembly:
                 if constant.kind == "tunable" and constant.type == "real" and not constant.items:
                     yield name, constant
 
-    def numbers(self) -> dict[str, int]:
+    def first_event_numbers(self) -> dict[str, int]:
         """Return where the events of each instance begin: its transitions, then its ranges,
         then its invariants."""
         found, count = {}, 0
         for name, program in self.programs.items():
             found[name] = count
-            count += len(program.transitions) + len(ranged(program)) + len(program.invariants)
+            count += (
+                len(program.transitions)
+                + len(range_event_variables(program))
+                + len(program.invariants)
+            )
         return found
 
 
-def ranged(program: Program) -> tuple[Variable, ...]:
+def range_event_variables(program: Program) -> tuple[Variable, ...]:
     """Return the variables whose leaving of a range is an event: those of a continuous Program."""
     return tuple(v for v in program.variables if v.range is not None)
 
 
-def wires_of(program: Program) -> dict[str, str]:
+def output_variables(program: Program) -> dict[str, str]:
     """Return the variable that holds each output."""
     return {wire.name: wire.source for wire in program.outputs}
 
 
-def short_input(feed: Feed) -> str:
+def input_name(source: InputSource) -> str:
     """Return the name of the input that a feed sets."""
-    return short(feed.variable.name)
+    return unqualified_name(source.variable.name)

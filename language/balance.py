@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 from language.problem import Problems, SpecError
-from language.syntax import Application, Arithmetic, Name, Tree, walk
+from language.syntax import Arithmetic, FunctionCall, Name, SyntaxTree, walk
 
 
-def coefficient_of(left: Tree, state: str) -> Tree | SpecError | None:
+def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | None:
     """Return the factor of der(state) on the left side of a balance, None where it is 1."""
-    if isinstance(left, Application) and left.function == "der":
-        return None if _is_derivative(left, state) else _bad_balance(left, state)
+    if isinstance(left, FunctionCall) and left.function == "der":
+        return None if _is_derivative(left, state) else _balance_error(left, state)
     if isinstance(left, Arithmetic) and left.operator == "*":
-        if isinstance(left.right, Application) and _is_derivative(left.right, state):
-            return left.left if not _has_derivative(left.left) else _bad_balance(left, state)
-        if isinstance(left.left, Application) and _is_derivative(left.left, state):
-            return left.right if not _has_derivative(left.right) else _bad_balance(left, state)
-    return _bad_balance(left, state)
+        if isinstance(left.right, FunctionCall) and _is_derivative(left.right, state):
+            return left.left if not _has_derivative(left.left) else _balance_error(left, state)
+        if isinstance(left.left, FunctionCall) and _is_derivative(left.left, state):
+            return left.right if not _has_derivative(left.right) else _balance_error(left, state)
+    return _balance_error(left, state)
 
 
-def _is_derivative(tree: Application, state: str) -> bool:
+def _is_derivative(tree: FunctionCall, state: str) -> bool:
     match tree:
-        case Application("der", (Name(path, _),), _):
+        case FunctionCall("der", (Name(path, _),), _):
             return path == state
         case _:
             return False
 
 
-def _has_derivative(tree: Tree) -> bool:
-    return any(isinstance(part, Application) and part.function == "der" for part in walk(tree))
+def _has_derivative(tree: SyntaxTree) -> bool:
+    return any(isinstance(part, FunctionCall) and part.function == "der" for part in walk(tree))
 
 
-def _bad_balance(left: Tree, state: str) -> SpecError:
+def _balance_error(left: SyntaxTree, state: str) -> SpecError:
     problems = Problems()
     label = f"the left side is `coefficient * der({state})` with der once"
     problems.error("balance", left.span, label)
-    return SpecError(problems.found)
+    return SpecError(problems.reported)

@@ -5,125 +5,129 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from language.grammar import Parsed, Shape
+from language.grammar import ParsedShape, ParseShape
 from language.problem import Problems, Span, SpecError
-from language.quantity import number, quantity
+from language.quantity import parse_number_literal, parse_quantity_literal
 from language.syntax import (
-    Application,
     Arithmetic,
-    Choice,
+    BoolLiteral,
+    Conditional,
+    FunctionCall,
     Logic,
     Name,
-    Negative,
+    Negation,
     Not,
-    Number,
+    NumberLiteral,
     Power,
     Relation,
-    Tree,
-    Truth,
+    SyntaxTree,
 )
 
 MAX_POWER = 8
 
 
-def built(parsed: Parsed, span: Span) -> tuple[Tree, ...]:
+def build_trees(parsed: ParsedShape, span: Span) -> tuple[SyntaxTree, ...]:
     """Return the tree of an expression, or both sides of a balance; `span` is that of the text.
 
     Raises SpecError for a number, a unit or a power that is none.
     """
-    build = _Build(parsed, span)
-    return tuple(build.part(part) for part in parsed.shape[1])
+    builder = _AstBuilder(parsed, span)
+    return tuple(builder.build_part(part) for part in parsed.shape[1])
 
 
-class _Build:
+class _AstBuilder:
     """From shapes to trees; a part is a tree, or the number of a token."""
 
-    def __init__(self, parsed: Parsed, span: Span) -> None:
+    def __init__(self, parsed: ParsedShape, span: Span) -> None:
         self.texts = parsed.texts
-        self.starts = parsed.starts
+        self.starts = parsed.offsets
         self.span = span
 
-    def part(self, shape: Shape | int) -> Any:
+    def build_part(self, shape: ParseShape | int) -> Any:
         if isinstance(shape, int):
             return shape
-        return RULES[shape[0]](self, [self.part(part) for part in shape[1]])
+        return BUILDERS[shape[0]](self, [self.build_part(part) for part in shape[1]])
 
-    def at(self, token: int) -> Span:
+    def token_span(self, token: int) -> Span:
         """Return the place of a token."""
-        return self.inside(self.starts[token], len(self.texts[token]))
+        return self.text_span(self.starts[token], len(self.texts[token]))
 
-    def inside(self, start: int, width: int) -> Span:
+    def text_span(self, start: int, width: int) -> Span:
         """Return the place of a part of the text, which has at least one character."""
         span = self.span
-        return span if span.whole else Span(span.source, span.line, span.column + start, width)
+        return span if span.is_atomic else Span(span.source, span.line, span.column + start, width)
 
-    def over(self, first: Any, last: Any) -> Span:
+    def joined_span(self, first: Any, last: Any) -> Span:
         """Return the place from one part to another."""
-        start = self.at(first) if isinstance(first, int) else first.span
-        end = self.at(last) if isinstance(last, int) else last.span
+        start = self.token_span(first) if isinstance(first, int) else first.span
+        end = self.token_span(last) if isinstance(last, int) else last.span
         return Span(start.source, start.line, start.column, end.column + end.width - start.column)
 
 
-def _path(build: _Build, parts: list[int]) -> Tree:
+def _build_name(builder: _AstBuilder, parts: list[int]) -> SyntaxTree:
     first, last = parts[0], parts[-1]
-    path = build.texts[first] if first == last else ".".join(build.texts[k] for k in parts)
-    start, end = build.starts[first], build.starts[last] + len(build.texts[last])
-    return Name(path, build.inside(start, end - start))
+    path = builder.texts[first] if first == last else ".".join(builder.texts[k] for k in parts)
+    start, end = builder.starts[first], builder.starts[last] + len(builder.texts[last])
+    return Name(path, builder.text_span(start, end - start))
 
 
-def _call(build: _Build, parts: list[Any]) -> Tree:
+def _build_call(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     name, *arguments, close = parts
-    return Application(name.path, tuple(arguments), build.over(name, close))
+    return FunctionCall(name.path, tuple(arguments), builder.joined_span(name, close))
 
 
-def _negative(build: _Build, parts: list[Any]) -> Tree:
+def _build_negation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     minus, operand = parts
-    if isinstance(operand, Number) and operand.unit.offset:
+    if isinstance(operand, NumberLiteral) and operand.unit.offset:
         below = 2 * operand.unit.offset - operand.value
-        return Number(below, operand.unit, operand.span)
-    return Negative(operand, build.over(minus, operand))
+        return NumberLiteral(below, operand.unit, operand.span)
+    return Negation(operand, builder.joined_span(minus, operand))
 
 
-def _power(build: _Build, parts: list[Any]) -> Tree:
+def _build_power(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     base, token = parts
-    exponent = int(build.texts[token])
+    exponent = int(builder.texts[token])
     if abs(exponent) > MAX_POWER:
         problems = Problems()
         label = f"a power is at most {MAX_POWER}"
-        problems.error("power", build.at(token), label, "multiply two powers: `x^8 * x`")
-        raise SpecError(problems.found)
-    return Power(base, exponent, build.over(base, token))
+        problems.error("power", builder.token_span(token), label, "multiply two powers: `x^8 * x`")
+        raise SpecError(problems.reported)
+    return Power(base, exponent, builder.joined_span(base, token))
 
 
-def _binary(build: _Build, parts: list[Any]) -> Tree:
+def _build_arithmetic(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     left, operator, right = parts
-    return Arithmetic(build.texts[operator], left, right, build.over(left, right))
+    return Arithmetic(builder.texts[operator], left, right, builder.joined_span(left, right))
 
 
-def _compare(build: _Build, parts: list[Any]) -> Tree:
+def _build_relation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     left, operator, right = parts
-    return Relation(build.texts[operator], left, right, build.over(left, right))
+    return Relation(builder.texts[operator], left, right, builder.joined_span(left, right))
 
 
-def _select(build: _Build, parts: list[Any]) -> Tree:
+def _build_conditional(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     condition, then, other = parts
-    return Choice(condition, then, other, build.over(condition, other))
+    return Conditional(condition, then, other, builder.joined_span(condition, other))
 
 
-RULES: Mapping[str, Callable[[_Build, list[Any]], Tree]] = {
-    "number": lambda build, parts: number(build.texts[parts[0]], build.at(parts[0])),
-    "quantity": lambda build, parts: quantity(build.texts[parts[0]], build.at(parts[0])),
-    "true": lambda build, parts: Truth(True, build.at(parts[0])),
-    "false": lambda build, parts: Truth(False, build.at(parts[0])),
-    "path": _path,
-    "call": _call,
-    "negative": _negative,
-    "not_": lambda build, parts: Not(parts[1], build.over(*parts)),
-    "power_of": _power,
-    "binary": _binary,
-    "compare": _compare,
-    "or_": lambda build, parts: Logic("or", parts[0], parts[1], build.over(*parts)),
-    "and_": lambda build, parts: Logic("and", parts[0], parts[1], build.over(*parts)),
-    "select": _select,
+BUILDERS: Mapping[str, Callable[[_AstBuilder, list[Any]], SyntaxTree]] = {
+    "number": lambda build, parts: parse_number_literal(
+        build.texts[parts[0]], build.token_span(parts[0])
+    ),
+    "quantity": lambda build, parts: parse_quantity_literal(
+        build.texts[parts[0]], build.token_span(parts[0])
+    ),
+    "true": lambda build, parts: BoolLiteral(True, build.token_span(parts[0])),
+    "false": lambda build, parts: BoolLiteral(False, build.token_span(parts[0])),
+    "path": _build_name,
+    "call": _build_call,
+    "negative": _build_negation,
+    "not_": lambda build, parts: Not(parts[1], build.joined_span(*parts)),
+    "power_of": _build_power,
+    "binary": _build_arithmetic,
+    "compare": _build_relation,
+    "or_": lambda build, parts: Logic("or", parts[0], parts[1], build.joined_span(*parts)),
+    "and_": lambda build, parts: Logic("and", parts[0], parts[1], build.joined_span(*parts)),
+    "select": _build_conditional,
 }
 """What each rule of the grammar makes of its parts."""

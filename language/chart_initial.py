@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from language.chart import ROOT, Kind
-from language.chart_target import inside
-from language.document import Items, Node, Scalar, Table
+from language.chart import ROOT, NodeKind
+from language.chart_target import find_descendant
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.model import Mode
-from language.problem import Span, nearest
+from language.problem import Span, suggest_name
 from language.reader import Reader
 
 
@@ -19,12 +19,12 @@ class RawNode:
 
     name: str
     path: str
-    kind: Kind
+    kind: NodeKind
     parent: int
     region: str
     is_region: bool
     span: Span
-    table: Table
+    table: MappingNode
     mode: Mode | None = None
     children: list[int] = field(default_factory=list)
     number: int | None = None
@@ -32,11 +32,11 @@ class RawNode:
     initial: tuple[int, ...] = ()
 
 
-def set_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
+def resolve_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
     """Find what `initial` names; a history without one has that of the mode around it."""
     for index, node in enumerate(nodes):
         if index != ROOT:
-            node.initial = _initial(nodes, index, reader)
+            node.initial = _resolve_initial(nodes, index, reader)
     for node in nodes:
         if node.kind == "history" and not node.initial:
             node.initial = nodes[node.parent].initial
@@ -46,11 +46,13 @@ def set_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
             reader.problems.error("target", node.span, label, hint)
 
 
-def _initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int, ...]:
+def _resolve_initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int, ...]:
     raw = nodes[index]
     node = raw.table.get("initial")
     if raw.kind == "history":
-        return _found(nodes, raw.parent, _words(node, raw, reader) if node else [], reader)
+        return _resolve_names(
+            nodes, raw.parent, _read_initial_names(node, raw, reader) if node else [], reader
+        )
     if raw.kind != "compound":
         if node is not None:
             label = f"`{raw.name}` has no modes inside: there is no `initial`"
@@ -66,31 +68,31 @@ def _initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int,
         told = f"like `initial: {nodes[own[0]].name}`"
         reader.problems.error("missing", raw.span, "`initial` is missing", told)
         return ()
-    return _found(nodes, index, _words(node, raw, reader), reader)
+    return _resolve_names(nodes, index, _read_initial_names(node, raw, reader), reader)
 
 
-def _found(
-    nodes: Sequence[RawNode], owner: int, words: Sequence[Scalar], reader: Reader
+def _resolve_names(
+    nodes: Sequence[RawNode], owner: int, words: Sequence[ScalarNode], reader: Reader
 ) -> tuple[int, ...]:
     """Return the nodes that some words name inside another; those that are not there are told."""
-    found = []
+    indices = []
     for word in words:
-        hit = inside(nodes, owner, word.text)
+        hit = find_descendant(nodes, owner, word.text)
         if hit is None:
             label = f"there is no mode `{word.text}` in `{nodes[owner].name}`"
             names = [nodes[child].name for child in nodes[owner].children]
-            reader.problems.error("name", word.span, label, nearest(word.text, names))
+            reader.problems.error("name", word.span, label, suggest_name(word.text, names))
         else:
-            found.append(hit)
-    return tuple(found)
+            indices.append(hit)
+    return tuple(indices)
 
 
-def _words(node: Node | None, raw: RawNode, reader: Reader) -> list[Scalar]:
+def _read_initial_names(node: YamlNode | None, raw: RawNode, reader: Reader) -> list[ScalarNode]:
     """Return the names that stand in a list, or the only one."""
-    if isinstance(node, Items) and node.nodes:
-        return reader.items(node, "initial")
-    if isinstance(node, Items):
+    if isinstance(node, SequenceNode) and node.nodes:
+        return reader.read_list(node, "initial")
+    if isinstance(node, SequenceNode):
         reader.problems.error("missing", node.span, f"`initial` of `{raw.name}` names no mode")
         return []
-    word = reader.scalar(node, "initial", raw.span)
+    word = reader.read_scalar(node, "initial", raw.span)
     return [word] if word else []

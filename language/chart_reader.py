@@ -7,191 +7,206 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
-from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
-from language.chart_initial import RawNode, set_initials
-from language.chart_way import ways_of
-from language.document import Entry, Items, Node as YamlNode, Table
-from language.mode import ALWAYS, INNER_KEYS, REGION_KEYS, ModeReader, check_numbers
+from language.chart import (
+    ROOT,
+    Chart,
+    ChartEvent,
+    ChartNode,
+    HistoryKind,
+    NodeKind,
+    TransitionOrder,
+)
+from language.chart_initial import RawNode, resolve_initials
+from language.chart_way import resolve_transitions
+from language.document import Entry, MappingNode, SequenceNode, YamlNode as YamlNode
+from language.mode import IMPLICIT_MODE, INNER_KEYS, REGION_KEYS, ModeReader, check_mode_numbers
 from language.model import CHART, Mode, Region
 from language.problem import Span
 from language.reader import TEXT_KEYS
-from language.site import Site
-from language.transition_reader import CHART_WAY_KEYS
+from language.site import ModeContext
+from language.transition_reader import CHART_TRANSITION_KEYS
 
 CHART_KEYS = ("events", "order", "micro_steps")
 """Keys at the root that make the modes a chart."""
-MOST_MICRO_STEPS = 255
-NOWHERE = -1
+MAX_MICRO_STEPS = 255
+NO_PARENT = -1
 
 
-def is_chart(root: Table) -> bool:
+def is_chart(root: MappingNode) -> bool:
     """Tell whether an automaton has modes inside modes, events, or several micro-steps."""
     if any(key in root.entries for key in CHART_KEYS):
         return True
     owners = [root]
-    for entry in _tables(root.get("regions")):
+    for entry in _child_mappings(root.get("regions")):
         owners.append(entry)
         if "regions" in entry.entries:
             return True
-    return any(_is_nested(mode) for owner in owners for mode in _modes(owner))
+    return any(_uses_chart_keys(mode) for owner in owners for mode in _mode_mappings(owner))
 
 
-def _modes(owner: Table) -> Iterator[Table]:
-    yield from _tables(owner.get("modes"))
-    yield from _tables(owner.get("templates"))
+def _mode_mappings(owner: MappingNode) -> Iterator[MappingNode]:
+    yield from _child_mappings(owner.get("modes"))
+    yield from _child_mappings(owner.get("templates"))
 
 
-def _is_nested(mode: Table) -> bool:
-    ways = _tables(mode.get("transitions"))
+def _uses_chart_keys(mode: MappingNode) -> bool:
+    ways = _child_mappings(mode.get("transitions"))
     return any(key in mode.entries for key in INNER_KEYS) or any(
-        any(key in way.entries for key in CHART_WAY_KEYS) or isinstance(way.get("to"), Items)
+        any(key in way.entries for key in CHART_TRANSITION_KEYS)
+        or isinstance(way.get("to"), SequenceNode)
         for way in ways
     )
 
 
-def _tables(node: YamlNode | None) -> Iterator[Table]:
-    for entry in node if isinstance(node, Table) else ():
-        if isinstance(entry.node, Table):
+def _child_mappings(node: YamlNode | None) -> Iterator[MappingNode]:
+    for entry in node if isinstance(node, MappingNode) else ():
+        if isinstance(entry.node, MappingNode):
             yield entry.node
 
 
 @dataclass(frozen=True)
-class ReadModes:
+class ModeStructure:
     """What was read: the chart and the regions beside it; superstates and tree of a chart."""
 
     regions: tuple[Region, ...]
     superstates: tuple[Mode, ...] = ()
-    tree: Chart | None = None
+    statechart: Chart | None = None
 
 
 class ChartReader:
     """Reads the tree of an automaton with the help of the reader of modes."""
 
-    def __init__(self, modes: ModeReader) -> None:
-        self.modes = modes
-        self.problems = modes.problems
-        self.root = modes.root
-        self.raw: list[RawNode] = []
-        self.broken = False
+    def __init__(self, mode_reader: ModeReader) -> None:
+        self.mode_reader = mode_reader
+        self.problems = mode_reader.problems
+        self.root = mode_reader.root
+        self.raw_nodes: list[RawNode] = []
+        self.has_errors = False
 
-    def read(self, at: Span) -> ReadModes:
+    def read(self, span: Span) -> ModeStructure:
         """Return the chart of an automaton. Raises SpecError where there is no tree."""
-        signals = self._signals()
-        self._read_tree(at)
-        chart = self._chart(signals)
-        regions = tuple(self._as_region(chart, node) for node in chart.regions)
-        return ReadModes(regions, self._superstates(), chart)
+        signals = self._read_events()
+        self._read_tree(span)
+        chart = self._build_chart(signals)
+        regions = tuple(self._build_region(chart, node) for node in chart.regions)
+        return ModeStructure(regions, self._collect_superstates(), chart)
 
-    def _read_tree(self, at: Span) -> None:
+    def _read_tree(self, span: Span) -> None:
         """Read all nodes below a root, in the order of their numbers, and what is initial."""
-        self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, Table({}, at)))
-        entries = self.modes.root_regions()
+        self.raw_nodes.append(
+            RawNode("", "", "parallel", NO_PARENT, "", False, span, MappingNode({}, span))
+        )
+        entries = self.mode_reader.root_region_entries()
         own = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
         if entries and "modes" not in own:
-            always = Table({ALWAYS: Entry(ALWAYS, at, Table({}, at))}, at)
-            own["modes"] = Entry("modes", at, always)
+            always = MappingNode(
+                {IMPLICIT_MODE: Entry(IMPLICIT_MODE, span, MappingNode({}, span))}, span
+            )
+            own["modes"] = Entry("modes", span, always)
         if "modes" in own and all(entry.key != CHART for entry in entries):
-            table = self.modes.table(Table(own, at), "regions", REGION_KEYS)
-            self._enter(Entry(CHART, at, table), table, ROOT, CHART, CHART, True, "", None)
+            table = self.mode_reader.read_mapping(MappingNode(own, span), "regions", REGION_KEYS)
+            self._read_node(Entry(CHART, span, table), table, ROOT, CHART, CHART, True, "", None)
         entries.sort(key=lambda entry: entry.key != CHART)
         for entry in entries:
-            self._region(entry, ROOT, "")
-        self.raw[ROOT].last = len(self.raw) - 1
-        if len(self.raw) == 1:
-            self.problems.error("missing", at, "a chart has at least one mode in `modes`")
-            self.problems.stop_if_any()
-        known = len(self.problems.found)
-        set_initials(self.raw, self.modes)
-        if len(self.problems.found) > known or self.broken:
-            self.problems.stop_if_any()
+            self._read_region(entry, ROOT, "")
+        self.raw_nodes[ROOT].last = len(self.raw_nodes) - 1
+        if len(self.raw_nodes) == 1:
+            self.problems.error("missing", span, "a chart has at least one mode in `modes`")
+            self.problems.raise_if_errors()
+        known = len(self.problems.reported)
+        resolve_initials(self.raw_nodes, self.mode_reader)
+        if len(self.problems.reported) > known or self.has_errors:
+            self.problems.raise_if_errors()
 
-    def _chart(self, signals: Mapping[str, Signal]) -> Chart:
-        nodes = tuple(self._node(index) for index in range(len(self.raw)))
-        bare = Chart(nodes, signals, "outer_first", 1, {})
-        modes = {n: raw.mode for n, raw in enumerate(self.raw) if raw.mode is not None}
+    def _build_chart(self, events: Mapping[str, ChartEvent]) -> Chart:
+        nodes = tuple(self._build_node(index) for index in range(len(self.raw_nodes)))
+        bare = Chart(nodes, events, "outer_first", 1, {})
+        modes = {n: raw.mode for n, raw in enumerate(self.raw_nodes) if raw.mode is not None}
         return dataclasses.replace(
             bare,
-            ways=ways_of(bare, modes, self.problems),
-            order=cast(Order, self._order()),
-            micro_steps=self._micro_steps(signals, modes.values()),
+            transitions=resolve_transitions(bare, modes, self.problems),
+            order=cast(TransitionOrder, self._read_order()),
+            micro_steps=self._read_micro_steps(events, modes.values()),
         )
 
-    def _superstates(self) -> tuple[Mode, ...]:
+    def _collect_superstates(self) -> tuple[Mode, ...]:
         """Return the modes with modes inside; what they hold was handed down to those."""
         return tuple(
             dataclasses.replace(
                 raw.mode, equations={}, flow={}, update={}, observer=None, run=None, invariants={}
             )
-            for raw in self.raw
+            for raw in self.raw_nodes
             if raw.mode is not None and raw.number is None
         )
 
-    def _region(self, entry: Entry, parent: int, prefix: str) -> None:
+    def _read_region(self, entry: Entry, parent: int, prefix: str) -> None:
         """Read a region: a node that its parent is always in, with what is inside it."""
         is_root = parent == ROOT
         path = f"{prefix}{entry.key}"
         key = f"regions.{entry.key}" if is_root else ""
         if not is_root:
-            outer = self.raw[parent]
+            outer = self.raw_nodes[parent]
             base = outer.mode.key if outer.mode else ""
             key = f"{base}.regions.{entry.key}"
         what = REGION_KEYS if is_root else None
-        table = self.modes.table(entry.node, key or "regions", what)
-        self._enter(entry, table, parent, path, path, True, key, None)
+        table = self.mode_reader.read_mapping(entry.node, key or "regions", what)
+        self._read_node(entry, table, parent, path, path, True, key, None)
 
-    def _enter(
+    def _read_node(
         self,
         entry: Entry,
-        table: Table,
+        table: MappingNode,
         parent: int,
         path: str,
         region: str,
         is_region: bool,
         key: str,
-        above: Mode | None,
+        parent_mode: Mode | None,
     ) -> None:
-        index = len(self.raw)
-        table = self.modes.like(table)
-        kind = self._kind(entry, table)
+        index = len(self.raw_nodes)
+        table = self.mode_reader.apply_template(table)
+        kind = self._node_kind(entry, table)
         if kind == "history":
-            is_region, region = False, self.raw[parent].region
+            is_region, region = False, self.raw_nodes[parent].region
         raw = RawNode(entry.key, path, kind, parent, region, is_region, entry.span, table)
-        self.raw.append(raw)
-        self.raw[parent].children.append(index)
+        self.raw_nodes.append(raw)
+        self.raw_nodes[parent].children.append(index)
         is_root = is_region and parent == ROOT
         if kind == "history":
             self._check_history(entry, table)
         elif not is_root:
-            raw.mode = self._mode(entry, raw, key, above)
+            raw.mode = self._read_mode(entry, raw, key, parent_mode)
         elif kind != "compound":
             self.problems.error("missing", entry.span, "a region has at least one mode in `modes`")
-            self.broken = True
-        self._inside(raw, index, key, path, raw.mode if not is_region else None)
-        raw.last = len(self.raw) - 1
+            self.has_errors = True
+        self._read_children(raw, index, key, path, raw.mode if not is_region else None)
+        raw.last = len(self.raw_nodes) - 1
         if kind in ("atomic", "parallel") and raw.mode:
             raw.number = raw.mode.number
 
-    def _check_history(self, entry: Entry, table: Table) -> None:
+    def _check_history(self, entry: Entry, table: MappingNode) -> None:
         for key, own in table.entries.items():
             if key not in ("history", "initial", *TEXT_KEYS):
                 label = f"`{entry.key}` is a history: it has no `{key}`"
                 hint = "it only says what is entered in the mode around it"
                 self.problems.error("form", own.span, label, hint)
 
-    def _inside(self, raw: RawNode, index: int, key: str, path: str, above: Mode | None) -> None:
+    def _read_children(
+        self, raw: RawNode, index: int, key: str, path: str, parent_mode: Mode | None
+    ) -> None:
         prefix = "" if path == CHART else f"{path}."
         if raw.kind == "parallel":
-            for entry in self.modes.named(raw.table.get("regions"), f"{key}.regions"):
-                self._region(entry, index, prefix)
+            for entry in self.mode_reader.named_entries(raw.table.get("regions"), f"{key}.regions"):
+                self._read_region(entry, index, prefix)
         elif raw.kind == "compound":
             base = f"{key}." if key else ""
-            for entry in self.modes.named(raw.table.get("modes"), f"{base}modes"):
+            for entry in self.mode_reader.named_entries(raw.table.get("modes"), f"{base}modes"):
                 inner = f"{base}modes.{entry.key}"
-                table = self.modes.table(entry.node, inner)
+                table = self.mode_reader.read_mapping(entry.node, inner)
                 where = f"{prefix}{entry.key}"
-                self._enter(entry, table, index, where, raw.region, False, inner, above)
+                self._read_node(entry, table, index, where, raw.region, False, inner, parent_mode)
 
-    def _kind(self, entry: Entry, table: Table) -> Kind:
+    def _node_kind(self, entry: Entry, table: MappingNode) -> NodeKind:
         if "history" in table.entries:
             return "history"
         if "modes" in table.entries and "regions" in table.entries:
@@ -202,7 +217,7 @@ class ChartReader:
             return "compound"
         return "parallel" if "regions" in table.entries else "atomic"
 
-    def _mode(self, entry: Entry, raw: RawNode, key: str, above: Mode | None) -> Mode:
+    def _read_mode(self, entry: Entry, raw: RawNode, key: str, parent_mode: Mode | None) -> Mode:
         """Return the mode of a node; what superstates of its region hold is handed down."""
         name = raw.path.removeprefix(f"{raw.region}.") if raw.region != CHART else raw.path
         if raw.is_region:
@@ -213,21 +228,23 @@ class ChartReader:
         if "priority" in raw.table.entries and not raw.is_region:
             span = raw.table.entries["priority"].span
             self.problems.error("form", span, "a mode has no priority: regions inside a mode do")
-        position = sum(1 for r in self.raw if r.region == raw.region and r.number is not None)
-        site = Site(key, raw.region, position, above, raw.kind != "atomic")
-        return self.modes.mode(Entry(name, entry.span, raw.table), site)
+        position = sum(1 for r in self.raw_nodes if r.region == raw.region and r.number is not None)
+        site = ModeContext(key, raw.region, position, parent_mode, raw.kind != "atomic")
+        return self.mode_reader.read_mode(Entry(name, entry.span, raw.table), site)
 
-    def _node(self, index: int) -> Node:
-        raw = self.raw[index]
+    def _build_node(self, index: int) -> ChartNode:
+        raw = self.raw_nodes[index]
         table = raw.table
-        final = self.modes.choice(table.get("final"), "final", ("true", "false"), "false")
+        final = self.mode_reader.read_choice(
+            table.get("final"), "final", ("true", "false"), "false"
+        )
         if final == "true" and raw.kind != "atomic":
             label = "a final mode has no modes inside"
             self.problems.error("form", table.entries["final"].span, label)
         kept = ("shallow", "deep")
-        return Node(
+        return ChartNode(
             index=index,
-            last=raw.last,
+            last_descendant=raw.last,
             name=raw.name,
             path=raw.path,
             kind=raw.kind,
@@ -235,52 +252,54 @@ class ChartReader:
             children=tuple(raw.children),
             region=raw.region,
             is_region=raw.is_region,
-            mode=raw.mode.key if raw.mode else "",
+            mode_key=raw.mode.key if raw.mode else "",
             number=raw.number,
             initial=raw.initial,
-            history=cast(Keeping, self.modes.choice(table.get("history"), "history", kept, "")),
-            final=final == "true",
-            rank=self.modes.whole(table.get("priority"), "priority", 0, 0, 1000),
+            history=cast(
+                HistoryKind, self.mode_reader.read_choice(table.get("history"), "history", kept, "")
+            ),
+            is_final=final == "true",
+            priority=self.mode_reader.read_integer(table.get("priority"), "priority", 0, 0, 1000),
         )
 
-    def _signals(self) -> dict[str, Signal]:
-        found: dict[str, Signal] = {}
-        for entry in self.modes.named(self.root.get("events"), "events"):
-            table = self.modes.table(entry.node, f"events.{entry.key}", ("from",))
-            comes = self.modes.choice(table.get("from"), "from", ("input",), "")
-            found[entry.key] = Signal(entry.key, len(found) + 1, comes == "input")
+    def _read_events(self) -> dict[str, ChartEvent]:
+        found: dict[str, ChartEvent] = {}
+        for entry in self.mode_reader.named_entries(self.root.get("events"), "events"):
+            table = self.mode_reader.read_mapping(entry.node, f"events.{entry.key}", ("from",))
+            comes = self.mode_reader.read_choice(table.get("from"), "from", ("input",), "")
+            found[entry.key] = ChartEvent(entry.key, len(found) + 1, comes == "input")
         return found
 
-    def _order(self) -> str:
+    def _read_order(self) -> str:
         allowed = ("outer_first", "inner_first")
-        return self.modes.choice(self.root.get("order"), "order", allowed, "outer_first")
+        return self.mode_reader.read_choice(self.root.get("order"), "order", allowed, "outer_first")
 
-    def _micro_steps(self, signals: Mapping[str, Signal], modes: Iterable[Mode]) -> int:
+    def _read_micro_steps(self, events: Mapping[str, ChartEvent], modes: Iterable[Mode]) -> int:
         """One, or as many as modes where one tick may have several events to take."""
         raised = any(way.raises for mode in modes for way in mode.transitions)
-        several = raised or sum(signal.is_input for signal in signals.values()) > 1
-        count = max(2, sum(raw.number is not None for raw in self.raw))
+        several = raised or sum(signal.is_input for signal in events.values()) > 1
+        count = max(2, sum(raw.number is not None for raw in self.raw_nodes))
         node = self.root.get("micro_steps")
-        given = self.modes.whole(
-            node, "micro_steps", min(count, MOST_MICRO_STEPS) if several else 1, 1, MOST_MICRO_STEPS
+        given = self.mode_reader.read_integer(
+            node, "micro_steps", min(count, MAX_MICRO_STEPS) if several else 1, 1, MAX_MICRO_STEPS
         )
         if node is not None and raised and given < 2:
             label = "an event that is raised is taken in the next micro-step: one is too few"
             self.problems.error("form", node.span, label)
         return given
 
-    def _as_region(self, chart: Chart, node: Node) -> Region:
+    def _build_region(self, chart: Chart, node: ChartNode) -> Region:
         modes = {}
         for leaf in chart.leaves(node.region):
-            mode = self.raw[leaf.index].mode
+            mode = self.raw_nodes[leaf.index].mode
             assert mode is not None
             modes[mode.name] = mode
-        check_numbers(modes.values(), self.problems)
-        active = chart.first(node, ())
+        check_mode_numbers(modes.values(), self.problems)
+        active = chart.entry_set(node, ())
         initial = next(n for n in active if n.region == node.region and n.number is not None)
-        start = self.raw[initial.index].mode
+        start = self.raw_nodes[initial.index].mode
         assert start is not None
         inactive = (
             None if node.parent == ROOT else min(-1, *(mode.number - 1 for mode in modes.values()))
         )
-        return Region(node.region, modes, start.name, self.raw[node.index].span, inactive)
+        return Region(node.region, modes, start.name, self.raw_nodes[node.index].span, inactive)

@@ -4,25 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from language.chart import ROOT, Chart, Node, Way
-from language.chart_target import known_targets, looked_up
+from language.chart import ROOT, Chart, ChartNode, ChartTransition
+from language.chart_target import resolve_target, target_names
 from language.model import Mode, Transition
-from language.problem import Problems, nearest
+from language.problem import Problems, suggest_name
 
 
-def ways_of(chart: Chart, modes: Mapping[int, Mode], problems: Problems) -> dict[str, Way]:
+def resolve_transitions(
+    chart: Chart, modes: Mapping[int, Mode], problems: Problems
+) -> dict[str, ChartTransition]:
     """Return the ways of the modes of some nodes by their key path; wrong targets are reported."""
-    found: dict[str, Way] = {}
+    result: dict[str, ChartTransition] = {}
     for index, mode in modes.items():
         for transition in mode.transitions:
-            found[transition.key] = _way(chart, chart.nodes[index], transition, problems)
-    return found
+            result[transition.key] = _resolve_transition(
+                chart, chart.nodes[index], transition, problems
+            )
+    return result
 
 
-def _way(chart: Chart, source: Node, transition: Transition, problems: Problems) -> Way:
-    targets: list[Node] = []
+def _resolve_transition(
+    chart: Chart, source: ChartNode, transition: Transition, problems: Problems
+) -> ChartTransition:
+    targets: list[ChartNode] = []
     for name in transition.targets:
-        hit = looked_up(chart, source, name)
+        hit = resolve_target(chart, source, name)
         if hit is None:
             label = f"there is no mode `{name}`"
             hint = _target_hint(chart, name)
@@ -32,14 +38,14 @@ def _way(chart: Chart, source: Node, transition: Transition, problems: Problems)
     if transition.events and transition.wait:
         label = "an event is an instant: it cannot hold for a wait"
         problems.error("wait", transition.wait.span, label)
-    _check_together(chart, transition, targets, problems)
+    _check_orthogonal_targets(chart, transition, targets, problems)
     _check_internal(source, transition, targets, problems)
     domain = chart.domain(source, targets, transition.internal)
     if domain == ROOT and targets:
         label = f"`{targets[0].path}` is in another region of the root"
         hint = "regions of the root are never left"
         problems.error("target", transition.span, label, hint)
-    return Way(source.index, tuple(target.index for target in targets), domain)
+    return ChartTransition(source.index, tuple(target.index for target in targets), domain)
 
 
 def _target_hint(chart: Chart, name: str) -> str:
@@ -49,29 +55,29 @@ def _target_hint(chart: Chart, name: str) -> str:
     paths = [node.path for node in chart.nodes[ROOT + 1 :] if node.name == name]
     if paths:
         return f"it stands in another mode: write {' or '.join(f'`to: {path}`' for path in paths)}"
-    return nearest(name, known_targets(chart))
+    return suggest_name(name, target_names(chart))
 
 
-def _check_together(
-    chart: Chart, transition: Transition, targets: Sequence[Node], problems: Problems
+def _check_orthogonal_targets(
+    chart: Chart, transition: Transition, targets: Sequence[ChartNode], problems: Problems
 ) -> None:
     """Several targets lie in different regions of one mode."""
     for number, target in enumerate(targets):
         for other in targets[:number]:
-            shared = [node for node in chart.outer(target) if node.holds(other.index)]
+            shared = [node for node in chart.ancestors(target) if node.contains(other.index)]
             apart = bool(shared) and shared[0].kind == "parallel"
-            if not apart or chart.nested(target.index, other.index):
+            if not apart or chart.are_nested(target.index, other.index):
                 label = f"`{other.path}` and `{target.path}` are never active together"
                 hint = "several targets lie in different regions of one mode"
                 problems.error("target", transition.span, label, hint)
 
 
 def _check_internal(
-    source: Node, transition: Transition, targets: Sequence[Node], problems: Problems
+    source: ChartNode, transition: Transition, targets: Sequence[ChartNode], problems: Problems
 ) -> None:
     if not transition.internal:
         return
-    if any(not source.holds(t.index) or t.index == source.index for t in targets):
+    if any(not source.contains(t.index) or t.index == source.index for t in targets):
         label = f"an internal transition leads to what is inside `{source.path}`"
         problems.error("target", transition.span, label, "`to: []` where nothing is entered")
     elif targets and source.kind == "parallel":

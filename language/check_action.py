@@ -6,14 +6,14 @@ import dataclasses
 from collections.abc import Mapping
 
 from language.check_rewind import check_rewind
-from language.check_writer import check_continued
+from language.check_writer import check_memory_continue
 from language.declaration import Formula
-from language.dimension import DimensionCheck
+from language.dimension import TypeChecker
 from language.model import Automaton, Mode, Transition
-from language.names import NAME
+from language.names import NAME_PATTERN
 from language.parameter import parameter_kinds
-from language.problem import Problems, nearest
-from language.syntax import EDGES, MEMORY, TIMES, names
+from language.problem import Problems, suggest_name
+from language.syntax import EDGE_FUNCTIONS, MEMORY_FUNCTIONS, TIME_FUNCTIONS, names
 from language.units import SECOND
 from language.wait import tunable_wait
 
@@ -21,25 +21,27 @@ from language.wait import tunable_wait
 def check_assignments(
     automaton: Automaton,
     formulas: Mapping[str, Formula],
-    check: DimensionCheck,
+    check: TypeChecker,
     problems: Problems,
 ) -> None:
     """Report assignments to what is not carried, and values of another kind."""
     for name, formula in formulas.items():
-        kind = check.scope.names.get(name)
-        if not NAME.fullmatch(name):
+        kind = check.environment.types.get(name)
+        if not NAME_PATTERN.fullmatch(name):
             continue  # told where it was read
-        if name not in automaton.carried:
-            hint = _instead(automaton, name) or nearest(name, automaton.carried)
+        if name not in automaton.state_variables:
+            hint = _assignment_hint(automaton, name) or suggest_name(
+                name, automaton.state_variables
+            )
             label = f"`{name}` is not a state or discrete variable"
             problems.error("name", formula.span, label, hint)
         elif kind is not None:
-            check.assigned(formula.tree, kind, name)
+            check.check_assignment(formula.tree, kind, name)
 
 
-def _instead(automaton: Automaton, name: str) -> str:
+def _assignment_hint(automaton: Automaton, name: str) -> str:
     """Return what is done with a known name that is not assigned."""
-    if automaton.tree and name in automaton.tree.signals:
+    if automaton.statechart and name in automaton.statechart.events:
         return f"it is an event: a transition raises it, `raise: {name}`"
     if name in automaton.inputs:
         return "it is an input, which is only read: `discrete` declares what is written"
@@ -48,48 +50,50 @@ def _instead(automaton: Automaton, name: str) -> str:
     return ""
 
 
-def check_ways(
+def check_mode_transitions(
     automaton: Automaton,
     mode: Mode,
-    check: DimensionCheck,
-    constant: DimensionCheck,
+    check: TypeChecker,
+    parameter_check: TypeChecker,
     problems: Problems,
 ) -> None:
-    """Report mistakes in the transitions and invariants of a mode; `constant` knows parameters."""
-    remembered = frozenset(MEMORY if automaton.is_sampled else ("delay", *EDGES, *TIMES))
-    guards = dataclasses.replace(check.scope, memory=remembered)
-    guard = DimensionCheck(guards, problems)
+    """Report mistakes in the transitions and invariants of a mode; `parameter_check` knows parameters."""
+    remembered = frozenset(
+        MEMORY_FUNCTIONS if automaton.is_sampled else ("delay", *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
+    )
+    guards = dataclasses.replace(check.environment, memory_functions=remembered)
+    guard = TypeChecker(guards, problems)
     for transition in mode.transitions:
         _check_target(automaton, transition, problems)
-        guard.truth(transition.when.tree, "when")
+        guard.check_condition(transition.when.tree, "when")
         if transition.wait:
-            constant.quantity(transition.wait.tree, SECOND, "wait")
+            parameter_check.check_quantity(transition.wait.tree, SECOND, "wait")
             if tunable_wait(automaton, transition.wait) is None:
-                _check_fixed(automaton, transition.wait, problems)
+                _check_fixed_time(automaton, transition.wait, problems)
         check_assignments(automaton, transition.reset, check, problems)
         if transition.rewind:
-            check.truth(transition.rewind.until.tree, "until")
-            constant.quantity(transition.rewind.within.tree, SECOND, "within")
-            _check_fixed(automaton, transition.rewind.within, problems)
+            check.check_condition(transition.rewind.until.tree, "until")
+            parameter_check.check_quantity(transition.rewind.within.tree, SECOND, "within")
+            _check_fixed_time(automaton, transition.rewind.within, problems)
             check_rewind(automaton, transition, problems)
-        if transition.memory == "continue" and automaton.tree is None:
-            check_continued(automaton, transition, problems)
+        if transition.memory == "continue" and automaton.statechart is None:
+            check_memory_continue(automaton, transition, problems)
     for invariant in mode.invariants.values():
-        check.truth(invariant.that.tree, "that")
+        check.check_condition(invariant.condition.tree, "that")
 
 
 def _check_target(automaton: Automaton, transition: Transition, problems: Problems) -> None:
     """In a chart its own check looks targets up."""
     region = automaton.region(transition.region)
-    if automaton.tree is None and transition.target not in region.modes:
+    if automaton.statechart is None and transition.target not in region.modes:
         label = f"there is no mode `{transition.target}`"
         if automaton.regions:
             label += f" in region `{region.name}`"
-        hint = nearest(transition.target, region.modes)
+        hint = suggest_name(transition.target, region.modes)
         problems.error("name", transition.span, label, hint)
 
 
-def _check_fixed(automaton: Automaton, time: Formula, problems: Problems) -> None:
+def _check_fixed_time(automaton: Automaton, time: Formula, problems: Problems) -> None:
     for read in names(time.tree):
         parameter = automaton.parameters.get(read.path)
         if parameter and parameter_kinds(automaton)[read.path] != "fixed":

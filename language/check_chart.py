@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 
 from language.activity import may_complete
-from language.chart import ROOT, Chart, Node
+from language.chart import ROOT, Chart, ChartNode
 from language.model import Automaton, Mode, Transition
 from language.problem import Problems, Span
 from language.syntax import Name, walk
@@ -14,70 +14,72 @@ from language.wiring import INACTIVE
 
 def check_chart(automaton: Automaton, problems: Problems) -> None:
     """Report what a chart cannot do."""
-    chart = automaton.tree
+    chart = automaton.statechart
     if chart is None:
         return
     if not automaton.is_sampled:
         label = "modes inside modes, events and micro-steps belong to a sampled automaton"
         problems.error("form", automaton.span, label, "give it a `period`")
     _check_writers(automaton, chart, problems)
-    _check_ranks(automaton, chart, problems)
+    _check_region_priorities(automaton, chart, problems)
     for node in chart.nodes[ROOT + 1 :]:
-        mode = automaton.by_key.get(node.mode)
+        mode = automaton.modes_by_key.get(node.mode_key)
         if mode:
             _check_inner(chart, node, mode, problems)
             for transition in mode.transitions:
                 _check_guard(chart, transition, problems)
-                _check_way(chart, node, transition, problems)
+                _check_transition(chart, node, transition, problems)
                 _check_memory(automaton, chart, transition, problems)
 
 
-def never_entered(automaton: Automaton, chart: Chart, silent: Set[str]) -> list[Mode]:
+def unreachable_chart_modes(
+    automaton: Automaton, chart: Chart, dead_transitions: Set[str]
+) -> list[Mode]:
     """Return the modes that nothing leads to but silent transitions, given by their key paths.
 
     Entering over-estimates what a history may enter.
     """
-    seen = {node.index for node in chart.started()}
+    seen = {node.index for node in chart.initial_configuration()}
     if automaton.fault_mode:
         seen.update(
-            _entered(chart, [n.index for n in chart.nodes if n.path == automaton.fault_mode])
+            _entry_set(chart, [n.index for n in chart.nodes if n.path == automaton.fault_mode])
         )
     while True:
         targets: list[int] = []
         for node in chart.nodes[ROOT + 1 :]:
-            mode = automaton.by_key.get(node.mode)
+            mode = automaton.modes_by_key.get(node.mode_key)
             if node.index in seen and mode:
-                ways = (way for way in mode.transitions if way.key not in silent)
-                targets += [t for way in ways for t in chart.ways[way.key].targets]
-        more = seen | _entered(chart, targets)
+                ways = (way for way in mode.transitions if way.key not in dead_transitions)
+                targets += [t for way in ways for t in chart.transitions[way.key].targets]
+        more = seen | _entry_set(chart, targets)
         if more == seen:
             break
         seen = more
-    nodes = (node for node in chart.nodes if node.mode and node.index not in seen)
-    return [automaton.by_key[node.mode] for node in nodes]
+    nodes = (node for node in chart.nodes if node.mode_key and node.index not in seen)
+    return [automaton.modes_by_key[node.mode_key] for node in nodes]
 
 
-def _entered(chart: Chart, targets: list[int]) -> set[int]:
+def _entry_set(chart: Chart, targets: list[int]) -> set[int]:
     """Return what entering some nodes enters: those around them and what they start with."""
     found: set[int] = set()
     for target in targets:
         node = chart.nodes[target]
-        found.update(inner.index for inner in chart.first(node, ()))
-        for outer in chart.outer(node):
+        found.update(inner.index for inner in chart.entry_set(node, ()))
+        for outer in chart.ancestors(node):
             found.add(outer.index)
             if outer.kind == "parallel":
-                found.update(inner.index for inner in chart.first(outer, [target]))
+                found.update(inner.index for inner in chart.entry_set(outer, [target]))
     return found
 
 
-def _check_inner(chart: Chart, node: Node, mode: Mode, problems: Problems) -> None:
-    if node.final and mode.transitions:
+def _check_inner(chart: Chart, node: ChartNode, mode: Mode, problems: Problems) -> None:
+    if node.is_final and mode.transitions:
         label = f"`{node.path}` is final: no transition leaves it"
         problems.error("form", mode.transitions[0].span, label)
     if node.name == INACTIVE and node.region != node.path:
         label = f"`{INACTIVE}` is what a region is in while its mode is left"
         problems.error("name", mode.span, label)
-    root = list(chart.outer(node))[-1]
+    root = list(chart.ancestors(node))[-1]
     if node.region == root.region:
         return
     for what, written in (("equations", mode.equations), ("flow", mode.flow)):
@@ -87,30 +89,34 @@ def _check_inner(chart: Chart, node: Node, mode: Mode, problems: Problems) -> No
             problems.error("form", mode.span, label, hint)
 
 
-def _check_way(chart: Chart, node: Node, transition: Transition, problems: Problems) -> None:
+def _check_transition(
+    chart: Chart, node: ChartNode, transition: Transition, problems: Problems
+) -> None:
     if transition.rewind:
         label = "a transition of a chart does not rewind"
         problems.error("form", transition.span, label)
-    if transition.completes and not may_complete(chart, node):
+    if transition.is_completion and not may_complete(chart, node):
         label = f"`{node.path}` never comes to its end: there is no final mode in it"
         hint = "`when: true` for a transition that is always enabled, else a guard"
         problems.error("missing", transition.span, label, hint)
     _check_history(chart, node, transition, problems)
     if transition.history:
-        for index in chart.ways[transition.key].targets:
+        for index in chart.transitions[transition.key].targets:
             target = chart.nodes[index]
             if target.kind not in ("compound", "parallel"):
                 label = f"`{target.path}` has no modes inside: there is no history of it"
                 problems.error("form", transition.span, label)
 
 
-def _check_history(chart: Chart, node: Node, transition: Transition, problems: Problems) -> None:
+def _check_history(
+    chart: Chart, node: ChartNode, transition: Transition, problems: Problems
+) -> None:
     """Warn of a history that is entered from inside: it tells of the time before."""
-    way = chart.ways[transition.key]
+    way = chart.transitions[transition.key]
     for index in way.targets:
         target = chart.nodes[index]
         outer = chart.nodes[target.parent]
-        stays = way.domain is not None and outer.holds(way.domain) and outer.holds(node.index)
+        stays = way.domain is not None and outer.contains(way.domain) and outer.contains(node.index)
         if target.kind == "history" and stays and target.initial:
             label = f"`{target.name}` is what `{outer.path}` was left in, which this does not leave"
             back = chart.nodes[target.initial[0]]
@@ -121,13 +127,13 @@ def _check_history(chart: Chart, node: Node, transition: Transition, problems: P
             problems.warning("form", transition.span, label, hint)
 
 
-def _check_ranks(automaton: Automaton, chart: Chart, problems: Problems) -> None:
+def _check_region_priorities(automaton: Automaton, chart: Chart, problems: Problems) -> None:
     """Regions side by side of which one leaves the other have different priorities (rule 3)."""
     for parallel in chart.nodes[ROOT + 1 :]:
-        regions = chart.inner_regions(parallel)
+        regions = chart.child_regions(parallel)
         for position, later in enumerate(regions):
             for earlier in regions[:position]:
-                if later.rank == earlier.rank and _leave(chart, earlier, later):
+                if later.priority == earlier.priority and _can_leave_both(chart, earlier, later):
                     label = f"a transition in `{earlier.path}` or `{later.path}` leaves both"
                     hint = "give them different priorities, like `priority: 1`: the smallest goes "
                     hint += "first where each has a transition"
@@ -135,11 +141,11 @@ def _check_ranks(automaton: Automaton, chart: Chart, problems: Problems) -> None
                     problems.error("priority", place, label, hint)
 
 
-def _leave(chart: Chart, left: Node, right: Node) -> bool:
+def _can_leave_both(chart: Chart, left: ChartNode, right: ChartNode) -> bool:
     """Tell whether in two regions transitions may be enabled together of which one leaves both."""
-    ways = [way for way in chart.ways.values() if way.domain is not None]
-    from_left = [way.domain for way in ways if left.holds(way.source)]
-    from_right = [way.domain for way in ways if right.holds(way.source)]
+    ways = [way for way in chart.transitions.values() if way.domain is not None]
+    from_left = [way.domain for way in ways if left.contains(way.source)]
+    from_right = [way.domain for way in ways if right.contains(way.source)]
     if not from_left or not from_right:
         return False
     outer = left.parent
@@ -149,7 +155,7 @@ def _leave(chart: Chart, left: Node, right: Node) -> bool:
 def _check_guard(chart: Chart, transition: Transition, problems: Problems) -> None:
     """Warn of a guard that reads the input of an event: it holds in all micro-steps of a tick."""
     for part in walk(transition.when.tree):
-        signal = chart.signals.get(part.path) if isinstance(part, Name) else None
+        signal = chart.events.get(part.path) if isinstance(part, Name) else None
         if signal and signal.is_input:
             label = f"`{signal.name}` is an event"
             hint = f"write `event: {signal.name}` beside `when`; as a guard it holds in every "
@@ -161,9 +167,9 @@ def _check_memory(
     automaton: Automaton, chart: Chart, transition: Transition, problems: Problems
 ) -> None:
     """`memory: continue` keeps the wait counters of what may be entered: there have to be some."""
-    targets = chart.ways[transition.key].targets
-    reached = [n for n in chart.nodes if any(chart.nested(n.index, t) for t in targets)]
-    modes = [automaton.by_key[node.mode] for node in reached if node.mode]
+    targets = chart.transitions[transition.key].targets
+    reached = [n for n in chart.nodes if any(chart.are_nested(n.index, t) for t in targets)]
+    modes = [automaton.modes_by_key[node.mode_key] for node in reached if node.mode_key]
     kept = any(way.wait for mode in modes for way in mode.transitions)
     if transition.memory == "continue" and not kept:
         label = "`memory: continue` keeps wait counters: nothing that is entered has one"
@@ -178,10 +184,10 @@ def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> No
     """
     writers: dict[str, list[tuple[str, bool]]] = {}
     for mode in automaton.all_modes:
-        for name, span, stays in _written(chart, mode):
+        for name, span, stays in _assigned_names(chart, mode):
             known = writers.setdefault(name, [])
             for region, stayed in known:
-                if _apart(chart, region, mode.region) or (
+                if _are_parallel(chart, region, mode.region) or (
                     region != mode.region and stays and stayed
                 ):
                     here = f"in region `{region}` and in region `{mode.region}`"
@@ -193,17 +199,17 @@ def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> No
                 known.append((mode.region, stays))
 
 
-def _written(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]]:
+def _assigned_names(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]]:
     """Yield what a mode writes, and whether it does while it stays active."""
     for formulas in (mode.entry, mode.exit):
         yield from ((name, formula.span, False) for name, formula in formulas.items())
     yield from ((name, formula.span, True) for name, formula in mode.update.items())
     for way in mode.transitions:
-        stays = chart.ways[way.key].domain is None
+        stays = chart.transitions[way.key].domain is None
         yield from ((name, formula.span, stays) for name, formula in way.reset.items())
 
 
-def _apart(chart: Chart, left: str, right: str) -> bool:
+def _are_parallel(chart: Chart, left: str, right: str) -> bool:
     """Tell whether two regions stand side by side, none inside the other."""
     a, b = chart.region_node(left), chart.region_node(right)
-    return not chart.nested(a.index, b.index)
+    return not chart.are_nested(a.index, b.index)

@@ -10,21 +10,21 @@ from contextlib import suppress
 from typing import Literal
 
 from language.balance import coefficient_of
-from language.inquiry import Inquiry
-from language.interval import ANYTHING, Interval
-from language.memory import actions
+from language.inquiry import QueryEngine
+from language.interval import UNBOUNDED, Interval
+from language.memory import action_formulas
 from language.model import CHART, Automaton, Mode
-from language.moment import Moment
+from language.moment import GuardSnapshot
 from language.operation import Compare, Unary, real
 from language.order import equation_order
 from language.parameter import parameter_order
 from language.problem import Problems, SpecError
-from language.ranging import Ranging
-from language.region import sources
-from language.syntax import Likeness, Tree
-from language.truth import decisions
+from language.ranging import RangeAnalysis
+from language.region import equation_formulas
+from language.syntax import SyntaxTree, TreeNumbering
+from language.truth import truth_table_formulas
 
-HELP = {
+HINTS = {
     "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
     "root": "`sqrt(max(..., 0))`, or exclude it by an enclosing `if`",
     "log": "`log(max(..., 0.001))`, or exclude it by an enclosing `if`",
@@ -38,7 +38,7 @@ LABELS = {
     "power": "this may be below 0, and `pow` takes bases of 0 and more",
     "inverse power": "this may be 0 or below, which has no power of a degree below 0",
 }
-OUTSIDE: Mapping[str, Literal["==", "<", "<="]] = {
+OUTSIDE_RELATION: Mapping[str, Literal["==", "<", "<="]] = {
     **{"divisor": "==", "root": "<", "log": "<="},
     **{"power": "<", "inverse power": "<="},
 }
@@ -48,17 +48,17 @@ OUTSIDE: Mapping[str, Literal["==", "<", "<="]] = {
 def check_domains(automaton: Automaton, problems: Problems) -> None:
     """Report divisors and roots whose declared ranges go beyond their domain."""
     fixed: dict[str, Interval] = {}
-    likeness = Likeness()
+    likeness = TreeNumbering()
     for mode in automaton.all_modes:
-        domains = _ModeDomains(automaton, mode, problems, fixed, likeness)
+        domains = _ModeDomainChecker(automaton, mode, problems, fixed, likeness)
         if not fixed:
-            fixed.update({name: domains.look(name) for name in parameter_order(automaton)})
+            fixed.update({name: domains.interval_of(name) for name in parameter_order(automaton)})
         domains.check()
         if mode is automaton.all_modes[0]:
-            domains.check_starts()
+            domains.check_initial_values()
 
 
-class _ModeDomains:
+class _ModeDomainChecker:
     """The intervals of the names of one mode, each equation's found once."""
 
     def __init__(
@@ -67,111 +67,118 @@ class _ModeDomains:
         mode: Mode,
         problems: Problems,
         fixed: Mapping[str, Interval],
-        likeness: Likeness,
+        likeness: TreeNumbering,
     ) -> None:
         self.automaton = automaton
         self.mode = mode
         self.problems = problems
-        self.formulas = sources(mode)
-        self.found: dict[str, Interval] = dict(fixed)
-        self.ranging = Ranging(self.look, self._table, likeness, self._report)
-        self.quiet = self.ranging.quiet
+        self.formulas = equation_formulas(mode)
+        self.intervals: dict[str, Interval] = dict(fixed)
+        self.range_analysis = RangeAnalysis(
+            self.interval_of, self._table_interval, likeness, self._report
+        )
+        self.unreported_range_analysis = self.range_analysis.unreported
 
     def check(self) -> None:
-        ranging = self.ranging
+        ranging = self.range_analysis
         for name in equation_order(self.mode):
-            self.look(name)
+            self.interval_of(name)
         tables = self.automaton.tables if self.mode.region == CHART else ()
-        for formula in (*actions(self.mode), *decisions(tables)):
-            ranging.expression(formula.tree)
+        for formula in (*action_formulas(self.mode), *truth_table_formulas(tables)):
+            ranging.analyse(formula.tree)
         for balance in self.mode.flow.values():
-            ranging.expression(balance.right)
+            ranging.analyse(balance.right)
             factor = coefficient_of(balance.left, balance.state)
             if factor is not None and not isinstance(factor, SpecError):
-                interval = ranging.expression(factor)
-                if interval.meets_zero:
+                interval = ranging.analyse(factor)
+                if interval.contains_zero:
                     self._report("divisor", factor, interval)
-        self._densities()
+        self._check_densities()
 
-    def _densities(self) -> None:
+    def _check_densities(self) -> None:
         """Warn of spectral densities of an observer that the ranges of what they read let be
         negative.
         """
         noise = self.mode.observer.process_noise if self.mode.observer else {}
         for name, formula in noise.items():
-            found = self.quiet.expression(formula.tree)
-            if found.known and found.low < 0.0:
+            found = self.unreported_range_analysis.analyse(formula.tree)
+            if found.is_certain and found.low < 0.0:
                 label = f"the density of `{name}` may be negative: from {found.low:g} on"
                 help = "its square, its `abs`, or `max(0, ...)`"
                 self.problems.warning("observer", formula.span, label, help)
 
-    def check_starts(self) -> None:
+    def check_initial_values(self) -> None:
         """Report start values that lie outside of their range, whatever tunables are."""
-        for state in self.automaton.carried.values():
+        for state in self.automaton.state_variables.values():
             if state.range:
                 start, (low, high) = (
-                    self.quiet.expression(state.initial.tree),
+                    self.unreported_range_analysis.analyse(state.initial.tree),
                     map(float, state.range),
                 )
                 if start.high < low or start.low > high:
                     label = f"`{state.name}` starts outside of its range"
                     self.problems.error("range", state.initial.span, label)
 
-    def look(self, name: str) -> Interval:
+    def interval_of(self, name: str) -> Interval:
         """Return the interval of a name; called in order, so that a long chain needs no stack.
 
         What is outside a domain in one of the mode's own equations is reported.
         """
-        if name not in self.found:
-            self.found[name] = ANYTHING
-            self.found[name] = self._interval(name)
-        return self.found[name]
+        if name not in self.intervals:
+            self.intervals[name] = UNBOUNDED
+            self.intervals[name] = self._compute_interval(name)
+        return self.intervals[name]
 
-    def _interval(self, name: str) -> Interval:
+    def _compute_interval(self, name: str) -> Interval:
         automaton = self.automaton
         parameter = automaton.parameters.get(name)
         if parameter is not None and parameter.derived:
-            return self.quiet.expression(parameter.derived.tree)
+            return self.unreported_range_analysis.analyse(parameter.derived.tree)
         if parameter is not None and parameter.kind == "fixed" and parameter.value is not None:
             return Interval(float(parameter.value), float(parameter.value), True)
-        thing = parameter or automaton.inputs.get(name) or automaton.carried.get(name)
+        thing = parameter or automaton.inputs.get(name) or automaton.state_variables.get(name)
         if thing is not None:
             limits = thing.range
-            return Interval(float(limits[0]), float(limits[1]), True) if limits else ANYTHING
-        ranging = self.ranging if name in self.mode.equations else self.quiet
-        parts = [ranging.expression(formula.tree) for formula in self.formulas.get(name, ())]
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else UNBOUNDED
+        ranging = (
+            self.range_analysis if name in self.mode.equations else self.unreported_range_analysis
+        )
+        parts = [ranging.analyse(formula.tree) for formula in self.formulas.get(name, ())]
         if not parts:
-            return ANYTHING
+            return UNBOUNDED
         result = parts[0]
         for part in parts[1:]:
-            result = result.joined(part)
+            result = result.hull(part)
         return result
 
-    def _table(self, name: str) -> Interval:
+    def _table_interval(self, name: str) -> Interval:
         parameter = self.automaton.parameters[name]
         if parameter.kind == "tunable" or parameter.table is None:
             limits = parameter.range
-            return Interval(float(limits[0]), float(limits[1]), True) if limits else ANYTHING
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else UNBOUNDED
         values = parameter.table.values
         return Interval(float(min(values)), float(max(values)), True)
 
-    def _report(self, what: str, tree: Tree, interval: Interval) -> None:
-        if not interval.known:
+    def _report(self, what: str, tree: SyntaxTree, interval: Interval) -> None:
+        if not interval.is_certain:
             return
         if self._is_excluded(what, tree):
             return
         span = f"{interval.low:.4g} to {interval.high:.4g}"
         label = f"{LABELS[what]}: it lies from {span}"
-        self.problems.error("domain", tree.span, label, HELP[what])
+        self.problems.error("domain", tree.span, label, HINTS[what])
 
-    def _is_excluded(self, what: str, tree: Tree) -> bool:
+    def _is_excluded(self, what: str, tree: SyntaxTree) -> bool:
         """Tell whether what is around a place excludes what is outside of the domain there."""
         with suppress(KeyError, SpecError):
-            moment = Moment(self.automaton, self.mode)
-            around = [(moment.expression(part), holds) for part, holds in self.ranging.path]
+            snapshot = GuardSnapshot(self.automaton, self.mode)
+            around = [
+                (snapshot.lower_expression(part), holds)
+                for part, holds in self.range_analysis.branch_path
+            ]
             conditions = [part if holds else Unary("not", part) for part, holds in around]
-            value = moment.expression(tree)
-            conditions.append(Compare(OUTSIDE[what], value, real(0)))
-            inquiry = Inquiry(self.automaton)
-            return inquiry.never(inquiry.question(moment.story, conditions))
+            value = snapshot.lower_expression(tree)
+            conditions.append(Compare(OUTSIDE_RELATION[what], value, real(0)))
+            inquiry = QueryEngine(self.automaton)
+            return inquiry.is_unsatisfiable(inquiry.build_query(snapshot.path, conditions))
         return False

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from language.chart import ROOT, Chart, Node
+from language.chart import ROOT, Chart, ChartNode
 from language.chart_target import mode_paths
 from language.model import Automaton
 from language.problem import Problems
-from language.syntax import Application, Name, walk
+from language.syntax import FunctionCall, Name, walk
 
 
-def check_ends(automaton: Automaton, problems: Problems) -> None:
+def check_final_modes(automaton: Automaton, problems: Problems) -> None:
     """Warn of final modes from which nothing goes on; those of a region of the root end it."""
-    chart = automaton.tree
+    chart = automaton.statechart
     if chart is None:
         return
-    asked = _asked(automaton, chart)
+    asked = _queried_nodes(automaton, chart)
     for node in chart.nodes[ROOT + 1 :]:
-        around = _around(chart, node)
-        if not node.final or around is None or node.index in asked:
+        around = _completed_mode(chart, node)
+        if not node.is_final or around is None or node.index in asked:
             continue
-        owner = automaton.by_key[around.mode]
-        if not any(way.completes for way in owner.transitions):
+        owner = automaton.modes_by_key[around.mode_key]
+        if not any(way.is_completion for way in owner.transitions):
             label = f"`{node.name}` is final, but nothing goes on when `{around.name}` is at its "
             label += "end"
             hint = f"a transition of `{around.name}` without `when` and `event`; else leave `final`"
             hint += " out"
-            problems.warning("stuck", automaton.by_key[node.mode].span, label, hint)
+            problems.warning("stuck", automaton.modes_by_key[node.mode_key].span, label, hint)
 
 
-def _around(chart: Chart, node: Node) -> Node | None:
+def _completed_mode(chart: Chart, node: ChartNode) -> ChartNode | None:
     """Return the mode that a final one may bring to its end, None for a region of the root."""
     outer = chart.nodes[node.parent]
     if outer.is_region:
@@ -36,14 +36,14 @@ def _around(chart: Chart, node: Node) -> Node | None:
     return None if outer.index == ROOT else outer
 
 
-def _asked(automaton: Automaton, chart: Chart) -> set[int]:
+def _queried_nodes(automaton: Automaton, chart: Chart) -> set[int]:
     """Return the nodes that some guard or equation asks for by `in(...)`."""
     paths = mode_paths(chart)
     trees = [way.when.tree for mode in automaton.all_modes for way in mode.transitions]
     trees += [each.tree for mode in automaton.all_modes for each in mode.equations.values()]
     found: set[int] = set()
     for part in (part for tree in trees for part in walk(tree)):
-        if isinstance(part, Application) and part.function == "in":
+        if isinstance(part, FunctionCall) and part.function == "in":
             name = part.arguments[0]
             if isinstance(name, Name) and name.path in paths:
                 found.add(paths[name.path].index)

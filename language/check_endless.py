@@ -9,53 +9,54 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
-from language.chart import ROOT, Chart, Node
-from language.check_cycle import MOST_WAYS_ROUND, Way, simple_cycles
-from language.constants import exact_value
-from language.inquiry import Inquiry, Witness
+from language.chart import ROOT, Chart, ChartNode
+from language.check_cycle import MAX_CYCLES, Cycle, simple_cycles
+from language.constants import evaluate_exactly
+from language.inquiry import QueryEngine, Witness
 from language.model import Automaton, Transition
-from language.moment import ELAPSED, Moment, Story
+from language.moment import TIME_IN_MODE, GuardSnapshot, SymbolicPath
 from language.operation import Expr, Ref, Unary
 from language.precedence import node_of
 from language.problem import Problems, SpecError
-from language.syntax import TIMES, Application, walk
+from language.syntax import TIME_FUNCTIONS, FunctionCall, walk
 
-TURNING = "memory.changed"
+CHANGED_PREFIX = "memory.changed"
 """What is true in the first micro-step of a tick only: what goes on goes on without it."""
-KEPT = ("memory.previous", "memory.delay")
+DELAYED_PREFIXES = ("memory.previous", "memory.delay")
 """What says of the ticks before how a value changed, as what turns does."""
-AGES = (ELAPSED, "memory.every")
+AGE_PREFIXES = (TIME_IN_MODE, "memory.every")
 """What is counted anew where a mode is entered."""
-ROUND_HINT = "let one of them wait, or its guard exclude the one before"
+CYCLE_HINT = "let one of them wait, or its guard exclude the one before"
 EVENT_HINT = "let one of them raise no event"
 
 
-def check_endless(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
+def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
     """Warn of transitions of a chart that use up all micro-steps of a tick."""
-    chart = automaton.tree
+    chart = automaton.statechart
     if chart is None or chart.micro_steps < 2:
         return
     ways = {way.key: way for mode in automaton.all_modes for way in mode.transitions}
-    after = {key: list(_followers(automaton, chart, way)) for key, way in ways.items()}
-    for members in islice(simple_cycles(after), MOST_WAYS_ROUND):
+    after = {key: list(_possible_successors(automaton, chart, way)) for key, way in ways.items()}
+    for members in islice(simple_cycles(after), MAX_CYCLES):
         way = tuple(ways[key] for key in members)
-        found = _forever(automaton, chart, way, inquiry)
+        found = _find_endless_witness(automaton, chart, way, query_engine)
         if found:
             path = " -> ".join(f"`{each.source}`" for each in (*way, way[0]))
             label = "this fires in every micro-step of a tick"
             label += f": {path}" if way[0].targets else ""
-            hint = EVENT_HINT if way[0].events else ROUND_HINT
-            hint = hint if way[0].targets else _staying(automaton, way[0])
-            problems.warning("cycle", way[-1].span, label, found.place + hint)
+            hint = EVENT_HINT if way[0].events else CYCLE_HINT
+            hint = hint if way[0].targets else _self_loop_hint(automaton, way[0])
+            problems.warning("cycle", way[-1].span, label, found.hint_prefix + hint)
 
 
-def _staying(automaton: Automaton, way: Transition) -> str:
+def _self_loop_hint(automaton: Automaton, transition: Transition) -> str:
     """Return what is written in place of a transition without target that fires on and on."""
-    own = automaton.source(way)
+    own = automaton.source_mode(transition)
     reads_time = any(
-        isinstance(part, Application) and part.function in TIMES for part in walk(way.when.tree)
+        isinstance(part, FunctionCall) and part.function in TIME_FUNCTIONS
+        for part in walk(transition.when.tree)
     )
-    if not reads_time and not way.wait:
+    if not reads_time and not transition.wait:
         return "`to: []` starts nothing anew: write `rising(...)`"
     if own in automaton.superstates:
         hint = f"`to: []` starts no time anew, and `to: {own.name}` starts what is inside anew: let"
@@ -64,82 +65,88 @@ def _staying(automaton: Automaton, way: Transition) -> str:
     return hint if reads_time else f"{hint}, or `rising(...)`"
 
 
-def _followers(automaton: Automaton, chart: Chart, way: Transition) -> Iterator[str]:
+def _possible_successors(
+    automaton: Automaton, chart: Chart, transition: Transition
+) -> Iterator[str]:
     """Yield the transitions that may follow one without any time, by their key paths."""
-    if way.completes or way.history:
+    if transition.is_completion or transition.history:
         return
-    if not way.targets:
-        yield way.key  # a wait that has elapsed stays so
+    if not transition.targets:
+        yield transition.key  # a wait that has elapsed stays so
         return
-    if way.wait and exact_value(way.wait, automaton):
+    if transition.wait and evaluate_exactly(transition.wait, automaton):
         return
-    targets = [chart.nodes[index] for index in chart.ways[way.key].targets]
+    targets = [chart.nodes[index] for index in chart.transitions[transition.key].targets]
     if any(target.kind == "history" for target in targets):
         return
-    entered = {node.index for target in targets for node in chart.first(target, ())}
-    around = {node.index for target in targets for node in chart.outer(target)}
+    entered = {node.index for target in targets for node in chart.entry_set(target, ())}
+    around = {node.index for target in targets for node in chart.ancestors(target)}
     for index in sorted(entered | around):
-        mode = automaton.by_key.get(chart.nodes[index].mode)
+        mode = automaton.modes_by_key.get(chart.nodes[index].mode_key)
         for other in mode.transitions if mode else ():
-            if other.targets and not (other.wait and exact_value(other.wait, automaton)):
+            if other.targets and not (other.wait and evaluate_exactly(other.wait, automaton)):
                 yield other.key
 
 
-def _forever(automaton: Automaton, chart: Chart, way: Way, inquiry: Inquiry) -> Witness | None:
+def _find_endless_witness(
+    automaton: Automaton, chart: Chart, cycle: Cycle, query_engine: QueryEngine
+) -> Witness | None:
     """Return values at which a way round is taken in every micro-step, None if none is certain."""
-    if not _has_its_events(automaton, chart, way):
+    if not _has_required_events(automaton, chart, cycle):
         return None
-    story = Story()
+    path = SymbolicPath()
     taken: list[Expr] = []
     between: list[Expr] = []
     try:
-        for each in way:
-            moment = Moment(automaton, automaton.source(each), story)
-            taken.append(moment.expression(each.when.tree))
-            for other in _rivals(automaton, chart, each, way):
-                between.append(Unary("not", moment.expression(other.when.tree)))
+        for each in cycle:
+            snapshot = GuardSnapshot(automaton, automaton.source_mode(each), path)
+            taken.append(snapshot.lower_expression(each.when.tree))
+            for other in _competing_transitions(automaton, chart, each, cycle):
+                between.append(Unary("not", snapshot.lower_expression(other.when.tree)))
     except (KeyError, SpecError):
         return None
-    still = [Unary("not", Ref(name)) for name in story.extents if name.startswith(TURNING)]
-    question = inquiry.question(story, (*taken, *between, *still))
-    moving = (AGES if way[0].targets else ()) + (KEPT if still else ())
-    if not _is_fixed(automaton, question.variables, moving):
+    still = [Unary("not", Ref(name)) for name in path.domains if name.startswith(CHANGED_PREFIX)]
+    query = query_engine.build_query(path, (*taken, *between, *still))
+    moving = (AGE_PREFIXES if cycle[0].targets else ()) + (DELAYED_PREFIXES if still else ())
+    if not _is_constant_in_tick(automaton, query.variables, moving):
         return None
-    if not question.variables:
-        return Witness({}, "") if question.holds_at({}) else None
-    found = inquiry.answer(question)
+    if not query.variables:
+        return Witness({}, "") if query.holds_at({}) else None
+    found = query_engine.answer(query)
     return found if isinstance(found, Witness) else None
 
 
-def _has_its_events(automaton: Automaton, chart: Chart, way: Way) -> bool:
+def _has_required_events(automaton: Automaton, chart: Chart, cycle: Cycle) -> bool:
     """Tell whether each transition raises the event of the next one, and the first may come."""
-    if not any(each.events for each in way):
+    if not any(each.events for each in cycle):
         return True
-    before = (way[-1], *way[:-1])
-    pairs = zip(before, way, strict=True)
+    before = (cycle[-1], *cycle[:-1])
+    pairs = zip(before, cycle, strict=True)
     if not all({*last.raises} & {*each.events} for last, each in pairs if each.events):
         return False
-    others = (each for mode in automaton.all_modes for each in mode.transitions if each not in way)
+    others = (
+        each for mode in automaton.all_modes for each in mode.transitions if each not in cycle
+    )
     come = {name for each in others for name in each.raises}
-    come |= {name for name, signal in chart.signals.items() if signal.is_input}
-    return any(not each.events or come & {*each.events} for each in way)
+    come |= {name for name, signal in chart.events.items() if signal.is_input}
+    return any(not each.events or come & {*each.events} for each in cycle)
 
 
-def _rivals(
-    automaton: Automaton, chart: Chart, transition: Transition, way: Way
+def _competing_transitions(
+    automaton: Automaton, chart: Chart, transition: Transition, cycle: Cycle
 ) -> Iterator[Transition]:
     """Yield the transitions that may be taken in place of one of a way round, or between two."""
-    source = automaton.source(transition)
+    source = automaton.source_mode(transition)
     node = node_of(automaton, source)
     assert node is not None
     rank = transition.priority or 0
     for mode in automaton.all_modes:
         other = node_of(automaton, mode)
         assert other is not None
-        for rival in mode.transitions if _is_near(chart, node, other) else ():
-            if rival in way or (rival.wait and exact_value(rival.wait, automaton)):
+        for rival in mode.transitions if _are_nested(chart, node, other) else ():
+            if rival in cycle or (rival.wait and evaluate_exactly(rival.wait, automaton)):
                 continue
-            if rival.completes and mode != source:
+            if rival.is_completion and mode != source:
                 continue  # an active mode that has transitions is no final one
             later = mode == source and (rival.priority or 0) > rank
             comes = {*rival.events} & {*transition.events} if rival.events else True
@@ -148,17 +155,19 @@ def _rivals(
                 yield rival
 
 
-def _is_near(chart: Chart, node: Node, other: Node) -> bool:
-    return other.index != ROOT and chart.nested(node.index, other.index)
+def _are_nested(chart: Chart, node: ChartNode, other: ChartNode) -> bool:
+    return other.index != ROOT and chart.are_nested(node.index, other.index)
 
 
-def _is_fixed(automaton: Automaton, variables: list[str], moving: tuple[str, ...]) -> bool:
+def _is_constant_in_tick(
+    automaton: Automaton, variables: list[str], changing_prefixes: tuple[str, ...]
+) -> bool:
     """Tell whether variables keep their values within a tick, whatever fires."""
     written: set[str] = set()
     for mode in automaton.all_modes:
         for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):
             written.update(formulas)
     return not any(
-        name.startswith(("mode.", *moving)) or name.partition(".")[2] in written
+        name.startswith(("mode.", *changing_prefixes)) or name.partition(".")[2] in written
         for name in variables
     )

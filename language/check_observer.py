@@ -6,16 +6,16 @@ import dataclasses
 from collections.abc import Mapping
 
 from language.declaration import Formula
-from language.dimension import DimensionCheck
-from language.kind import Kind
+from language.dimension import TypeChecker
+from language.kind import ExprType
 from language.model import Automaton, Observer
-from language.problem import Problems, nearest
+from language.problem import Problems, suggest_name
 from language.syntax import names as names_of
-from language.units import SECOND, Dimension, fits, product
+from language.units import SECOND, Dimension, are_compatible, dimension_product
 
 
 def check_observer(
-    automaton: Automaton, observer: Observer, kinds: Mapping[str, Kind], check: DimensionCheck
+    automaton: Automaton, observer: Observer, kinds: Mapping[str, ExprType], check: TypeChecker
 ) -> None:
     """Report unknown names, and entries that do not fit dx/dt = A x + B u + f, y = C x."""
     problems = check.problems
@@ -26,18 +26,18 @@ def check_observer(
         for name in listed:
             if name not in known:
                 label = f"`{name}` is not {what}"
-                problems.error("name", observer.span, label, nearest(name, known))
+                problems.error("name", observer.span, label, suggest_name(name, known))
     if observer.correct is not None and kinds.get(observer.correct) != "truth":
         label = f"`correct` names an input of type bool, `{observer.correct}` is none"
-        truths = [name for name, thing in automaton.inputs.items() if thing.truth]
-        problems.error("name", observer.span, label, nearest(observer.correct, truths))
+        truths = [name for name, thing in automaton.inputs.items() if thing.is_bool]
+        problems.error("name", observer.span, label, suggest_name(observer.correct, truths))
     _check_instants(automaton, observer, check)
-    equations = _equations(automaton, observer)
+    equations = _observed_equations(automaton, observer)
     for measure, state in observer.measures.items():
         if state not in observer.states and state not in equations:
             label = f"`{measure}` measures `{state}`, which is not a state of the observer"
             problems.error(
-                "name", observer.span, label, nearest(state, [*observer.states, *equations])
+                "name", observer.span, label, suggest_name(state, [*observer.states, *equations])
             )
     _check_reads(automaton, observer, kinds, problems)
     _check_point(automaton, observer, check)
@@ -49,13 +49,17 @@ def check_observer(
         _check_vectors(observer, sizes, check)
         _check_limits(observer, sizes, check)
         for measure, state in observer.measures.items():
-            if not observer.c and state in sizes and not fits(sizes[measure], sizes[state]):
+            if (
+                not observer.c
+                and state in sizes
+                and not are_compatible(sizes[measure], sizes[state])
+            ):
                 label = f"`{measure}` is in `{sizes[measure]}`, `{state}` is in `{sizes[state]}`"
                 problems.error("dimension", observer.span, label)
 
 
 def _check_reads(
-    automaton: Automaton, observer: Observer, kinds: Mapping[str, Kind], problems: Problems
+    automaton: Automaton, observer: Observer, kinds: Mapping[str, ExprType], problems: Problems
 ) -> None:
     for formula in observer.f.values():
         for read in names_of(formula.tree):
@@ -70,16 +74,16 @@ def _check_reads(
                 problems.error("observer", read.span, label)
 
 
-def _check_instants(automaton: Automaton, observer: Observer, check: DimensionCheck) -> None:
+def _check_instants(automaton: Automaton, observer: Observer, check: TypeChecker) -> None:
     known = [name for name, thing in automaton.inputs.items() if thing.type == "real"]
     for name, formula in observer.unknown_instant.items():
         if name not in known:
             label = f"`unknown_instant` is of real inputs, `{name}` is none"
-            check.problems.error("name", formula.span, label, nearest(name, known))
-        check.quantity(formula.tree, SECOND, "unknown_instant")
+            check.problems.error("name", formula.span, label, suggest_name(name, known))
+        check.check_quantity(formula.tree, SECOND, "unknown_instant")
 
 
-def _equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:
+def _observed_equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:
     """Equations of the observer's mode of the model: a measurement may be of one of these."""
     model = automaton.model
     if observer.of is None or model is None:
@@ -88,48 +92,44 @@ def _equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]
     return {name: model.dimensions[name] for name in found if name in model.dimensions}
 
 
-def _check_point(automaton: Automaton, observer: Observer, check: DimensionCheck) -> None:
+def _check_point(automaton: Automaton, observer: Observer, check: TypeChecker) -> None:
     known = automaton.model.dimensions if automaton.model else {}
     for name, formula in observer.at.items():
         if name in known:
-            check.quantity(formula.tree, known[name], name)
+            check.check_quantity(formula.tree, known[name], name)
 
 
-def _check_matrices(
-    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
-) -> None:
+def _check_matrices(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
     for matrix, per_second in ((observer.a, True), (observer.b, True), (observer.c, False)):
         for row, entries in matrix.items():
-            result = _rate(sizes[row]) if per_second else sizes[row]
+            result = _rate_dimension(sizes[row]) if per_second else sizes[row]
             for column, formula in entries.items():
-                _fits(check, formula, product(result, sizes[column], -1))
+                _check_entry(check, formula, dimension_product(result, sizes[column], -1))
 
 
-def _check_vectors(
-    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
-) -> None:
+def _check_vectors(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
     for row, formula in observer.f.items():
-        _fits(check, formula, _rate(sizes[row]))
+        _check_entry(check, formula, _rate_dimension(sizes[row]))
     memory = frozenset({"previous"} if observer.gain == "recursive" else ())
-    noise = DimensionCheck(dataclasses.replace(check.scope, memory=memory), check.problems)
+    noise = TypeChecker(
+        dataclasses.replace(check.environment, memory_functions=memory), check.problems
+    )
     for row, formula in observer.process_noise.items():
-        _fits(noise, formula, _rate(product(sizes[row], sizes[row])))
+        _check_entry(noise, formula, _rate_dimension(dimension_product(sizes[row], sizes[row])))
     for row, formula in observer.measurement_noise.items():
-        _fits(check, formula, product(sizes[row], sizes[row]))
+        _check_entry(check, formula, dimension_product(sizes[row], sizes[row]))
 
 
-def _check_limits(
-    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
-) -> None:
-    for name, limits in observer.limits.items():
+def _check_limits(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
+    for name, limits in observer.variance_limits.items():
         for formula in limits:
-            _fits(check, formula, product(sizes[name], sizes[name]))
+            _check_entry(check, formula, dimension_product(sizes[name], sizes[name]))
 
 
-def _fits(check: DimensionCheck, formula: Formula, want: Dimension) -> None:
+def _check_entry(check: TypeChecker, formula: Formula, expected: Dimension) -> None:
     """Entries are quotients of quantities: their power of the angle is free."""
-    check.quantity(formula.tree, Dimension(want.powers, None), formula.key)
+    check.check_quantity(formula.tree, Dimension(expected.powers, None), formula.key)
 
 
-def _rate(dimension: Dimension) -> Dimension:
-    return Dimension(product(dimension, SECOND, -1).powers, dimension.angle)
+def _rate_dimension(dimension: Dimension) -> Dimension:
+    return Dimension(dimension_product(dimension, SECOND, -1).powers, dimension.angle)

@@ -10,33 +10,35 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from language.declaration import Formula, Limits, State
-from language.inquiry import Inquiry, Witness
-from language.lower import WHOLE_TYPES, assigned
+from language.declaration import Formula, RangePolicy, State
+from language.inquiry import QueryEngine, Witness
+from language.lower import WHOLE_TYPES, lower_assigned_value
 from language.model import Automaton, Mode
-from language.moment import Moment
-from language.number import rounded
+from language.moment import GuardSnapshot
+from language.number import round_to_type
 from language.operation import Binary, Compare, Expr, real
 from language.problem import Problems, SpecError
 
-STATES = ("state.", "discrete.", "memory.")
+STATE_PREFIXES = ("state.", "discrete.", "memory.")
 """What is carried: how far it gets is not known."""
 
 
-def check_past(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
+def check_range_violations(
+    automaton: Automaton, query_engine: QueryEngine, problems: Problems
+) -> None:
     """Warn of assignments that may give a value past the range of their target, with a witness."""
     for mode in automaton.all_modes:
         for formulas, guard in _assignments(mode):
             for name, formula in formulas.items():
-                target = automaton.carried.get(name)
-                if target is None or not _is_watched(target):
+                target = automaton.state_variables.get(name)
+                if target is None or not _is_checked(target):
                     continue
                 try:
-                    found = _past(automaton, mode, formula, guard, target, inquiry)
+                    found = _find_violation(automaton, mode, formula, guard, target, query_engine)
                 except (KeyError, SpecError):
                     continue
                 if found:
-                    label = f"`{name}` may be past its range of {_shown(target)} here"
+                    label = f"`{name}` may be past its range of {_format_range(target)} here"
                     hint = f"at {found.text} in SI; limit the value with `clip`, or widen the range"
                     problems.warning("past", formula.span, label, hint)
 
@@ -46,39 +48,44 @@ def _assignments(mode: Mode) -> Iterator[tuple[Mapping[str, Formula], Formula | 
     for formulas in (mode.entry, mode.exit, mode.update):
         yield formulas, None
     for transition in mode.transitions:
-        if not (transition.events or transition.completes):
+        if not (transition.events or transition.is_completion):
             yield transition.reset, transition.when
 
 
-def _is_watched(target: State) -> bool:
+def _is_checked(target: State) -> bool:
     """Tell whether a range is that of a real value, and nothing more is said about leaving it."""
-    return target.range is not None and target.type == "real" and target.limits == Limits()
+    return (
+        target.range is not None and target.type == "real" and target.range_policy == RangePolicy()
+    )
 
 
-def _past(
+def _find_violation(
     automaton: Automaton,
     mode: Mode,
     formula: Formula,
     guard: Formula | None,
     target: State,
-    inquiry: Inquiry,
+    query_engine: QueryEngine,
 ) -> Witness | None:
-    moment = Moment(automaton, mode)
-    conditions: list[Expr] = [moment.expression(guard.tree)] if guard else []
-    moment.expression(formula.tree)
-    value = assigned(formula.tree, moment.known, target.type in WHOLE_TYPES)
+    snapshot = GuardSnapshot(automaton, mode)
+    conditions: list[Expr] = [snapshot.lower_expression(guard.tree)] if guard else []
+    snapshot.lower_expression(formula.tree)
+    value = lower_assigned_value(formula.tree, snapshot.bindings, target.type in WHOLE_TYPES)
     assert target.range
-    low, high = (rounded(Fraction(bound), automaton.numbers) for bound in target.range)
-    if any(name.startswith(STATES) for name in inquiry.question(moment.story, [value]).read):
+    low, high = (round_to_type(Fraction(bound), automaton.numbers) for bound in target.range)
+    if any(
+        name.startswith(STATE_PREFIXES)
+        for name in query_engine.build_query(snapshot.path, [value]).names_read
+    ):
         return None
     below, above = Compare("<", value, real(low)), Compare(">", value, real(high))
-    found = inquiry.answer(
-        inquiry.question(moment.story, [*conditions, Binary("or", below, above)])
+    found = query_engine.answer(
+        query_engine.build_query(snapshot.path, [*conditions, Binary("or", below, above)])
     )
     return found if isinstance(found, Witness) else None
 
 
-def _shown(target: State) -> str:
+def _format_range(target: State) -> str:
     """Return a range in the unit of its declaration."""
     assert target.range
     unit = target.unit

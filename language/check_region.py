@@ -45,11 +45,11 @@ def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
 def _check_writers(automaton: Automaton, problems: Problems) -> None:
     """One region defines, balances or assigns to a name, whatever the stage."""
     for what in ("equation", "balance", "assignment"):
-        if automaton.tree and what == "assignment":
+        if automaton.statechart and what == "assignment":
             continue
         writers: dict[str, str] = {}
         for region in automaton.all_regions:
-            for name, span in _written(region, what):
+            for name, span in _written_names(region, what):
                 first = writers.setdefault(name, region.name)
                 if first != region.name:
                     a = "a" if what == "balance" else "an"
@@ -59,7 +59,7 @@ def _check_writers(automaton: Automaton, problems: Problems) -> None:
                     problems.error("writer", span, label, hint)
 
 
-def _written(region: Region, what: str) -> Iterator[tuple[str, Span]]:
+def _written_names(region: Region, what: str) -> Iterator[tuple[str, Span]]:
     for mode in region.modes.values():
         if what == "equation":
             yield from ((name, formula.span) for name, formula in mode.equations.items())

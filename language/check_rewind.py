@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.constants import exact_value
+from language.constants import evaluate_exactly
 from language.declaration import Formula
 from language.memory import MAX_REWIND
-from language.model import Automaton, Mode, Rewind, Run, Transition
+from language.model import Automaton, Mode, ModelRun, Rewind, Transition
 from language.problem import Problems
-from language.region import closure, sources
-from language.syntax import MEMORY, Application, Tree, walk
+from language.region import equation_closure, equation_formulas
+from language.syntax import MEMORY_FUNCTIONS, FunctionCall, SyntaxTree, walk
 
 
 def check_rewind(automaton: Automaton, transition: Transition, problems: Problems) -> None:
@@ -24,27 +24,29 @@ def check_rewind(automaton: Automaton, transition: Transition, problems: Problem
         label = "`rewind` belongs to a sampled automaton: a continuous one locates its crossings"
         problems.error("form", rewind.span, label)
         return
-    _one_chart(automaton, rewind, problems)
+    _check_no_regions(automaton, rewind, problems)
     region = automaton.region(transition.region)
     source, target = region.modes[transition.source], region.modes.get(transition.target)
-    _turns(automaton, source, rewind, problems)
-    _without_memory(source, rewind, problems)
-    _flow_back(automaton, source, rewind, problems)
+    _check_until_varies(automaton, source, rewind, problems)
+    _check_until_memory(source, rewind, problems)
+    _check_source_flow(automaton, source, rewind, problems)
     if target is not None:
-        _carried_on(automaton, target, rewind, problems)
+        _check_target_run(automaton, target, rewind, problems)
 
 
-def check_reach(automaton: Automaton, problems: Problems) -> None:
+def check_rewind_depth(automaton: Automaton, problems: Problems) -> None:
     """Report how far the rewinds of a checked automaton cannot go."""
     for mode in automaton.all_modes:
         for transition in mode.transitions:
             if transition.rewind and automaton.period is not None:
-                with problems.collecting():
-                    _reach(automaton, automaton.period, transition.rewind.within, problems)
+                with problems.collect_errors():
+                    _check_depth(automaton, automaton.period, transition.rewind.within, problems)
 
 
-def _reach(automaton: Automaton, period: Fraction, within: Formula, problems: Problems) -> None:
-    time = exact_value(within, automaton)
+def _check_depth(
+    automaton: Automaton, period: Fraction, within: Formula, problems: Problems
+) -> None:
+    time = evaluate_exactly(within, automaton)
     ticks = math.ceil(time / period)
     if time <= 0:
         problems.error("rewind", within.span, "`within` is above zero")
@@ -53,7 +55,7 @@ def _reach(automaton: Automaton, period: Fraction, within: Formula, problems: Pr
         problems.error("rewind", within.span, label, "a smaller `within`")
 
 
-def _one_chart(automaton: Automaton, rewind: Rewind, problems: Problems) -> None:
+def _check_no_regions(automaton: Automaton, rewind: Rewind, problems: Problems) -> None:
     """What runs beside the chart has acted meanwhile: it is not taken back."""
     for thing in (automaton, automaton.model):
         if thing and thing.regions:
@@ -61,33 +63,37 @@ def _one_chart(automaton: Automaton, rewind: Rewind, problems: Problems) -> None
             problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
 
 
-def _turns(automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems) -> None:
+def _check_until_varies(
+    automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems
+) -> None:
     """`until` is looked for where it turned true: what never changes does not."""
-    read = {*rewind.until.reads, *closure(source, rewind.until.reads)}
+    read = {*rewind.until.reads, *equation_closure(source, rewind.until.reads)}
     if read <= set(automaton.parameters):
         label = "`until` never changes: it reads neither states nor inputs"
         problems.error("rewind", rewind.until.span, label)
 
 
-def _without_memory(source: Mode, rewind: Rewind, problems: Problems) -> None:
+def _check_until_memory(source: Mode, rewind: Rewind, problems: Problems) -> None:
     """`until` is looked up in the past: what remembers has no past of its own."""
-    found: Mapping[str, tuple[Tree, ...]] = {
+    found: Mapping[str, tuple[SyntaxTree, ...]] = {
         name: tuple(formula.tree for formula in formulas)
-        for name, formulas in sources(source).items()
+        for name, formulas in equation_formulas(source).items()
     }
-    read = [tree for name in closure(source, rewind.until.reads) for tree in found[name]]
+    read = [tree for name in equation_closure(source, rewind.until.reads) for tree in found[name]]
     for tree in (rewind.until.tree, *read):
         for part in walk(tree):
-            if isinstance(part, Application) and part.function in MEMORY:
+            if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
                 label = f"`until` reads `{part.function}`: it is asked of states and inputs alone"
                 problems.error("rewind", part.span, label)
                 return
 
 
-def _flow_back(automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems) -> None:
+def _check_source_flow(
+    automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems
+) -> None:
     """Between two ticks the source has one flow, or its states stand still."""
     if source.run:
-        _one_substep(source, rewind, problems)
+        _check_one_substep(source, rewind, problems)
         model = automaton.model
         own = model.modes.get(source.run.mode) if model else None
         if own and own.transitions and source.run.follow:
@@ -98,20 +104,22 @@ def _flow_back(automaton: Automaton, source: Mode, rewind: Rewind, problems: Pro
         label = f"the observer of `{source.name}` has written matrices: no flow leads back"
         hint = "`of: <model>.<mode>` takes them from a flow"
         problems.error("rewind", rewind.span, label, hint)
-    _no_update(automaton, source, rewind, problems)
+    _check_no_update(automaton, source, rewind, problems)
 
 
-def _carried_on(automaton: Automaton, target: Mode, rewind: Rewind, problems: Problems) -> None:
+def _check_target_run(
+    automaton: Automaton, target: Mode, rewind: Rewind, problems: Problems
+) -> None:
     if target.run is None:
         label = f"mode `{target.name}` has no `runs`: nothing carries the states on from there"
         problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
         return
-    _one_substep(target, rewind, problems)
-    _no_update(automaton, target, rewind, problems)
+    _check_one_substep(target, rewind, problems)
+    _check_no_update(automaton, target, rewind, problems)
 
 
-def _one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
-    run: Run | None = mode.run
+def _check_one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
+    run: ModelRun | None = mode.run
     if run and run.substeps != 1:
         label = (
             f"the run of `{mode.name}` has {run.substeps} substeps: a rewind takes whole periods"
@@ -119,7 +127,7 @@ def _one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
         problems.error("rewind", rewind.span, label, "`substeps: 1` with a shorter `period`")
 
 
-def _no_update(automaton: Automaton, mode: Mode, rewind: Rewind, problems: Problems) -> None:
+def _check_no_update(automaton: Automaton, mode: Mode, rewind: Rewind, problems: Problems) -> None:
     """What is taken back are the states of the model: a flow moves them, nothing else."""
     written = [name for name in mode.update if automaton.model and name in automaton.model.states]
     if written:

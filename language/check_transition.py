@@ -8,283 +8,299 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from fractions import Fraction
 
-from language.constants import exact_value
+from language.constants import evaluate_exactly
 from language.declaration import Formula, Range
-from language.inquiry import Inquiry
+from language.inquiry import QueryEngine
 from language.model import Automaton, Mode, Transition
-from language.moment import ELAPSED, Moment
-from language.operation import Compare, Expr, Ref, Unary, Value, real, whole
+from language.moment import TIME_IN_MODE, GuardSnapshot
+from language.operation import Compare, Expr, Ref, Unary, Value, integer, real
 from language.precedence import (
-    comes_along,
-    events_that_come,
-    inside_first,
-    means_the_same,
-    winners,
+    covers_events,
+    inner_preceding_transitions,
+    is_guard_portable,
+    possible_events,
+    preceding_transitions,
 )
 from language.problem import Problems, Span, SpecError
-from language.region import by_priority
+from language.region import transitions_by_priority
 from language.transition_table import STAY
-from language.wait import range_in_ticks, ticks_of, tunable_wait
+from language.wait import seconds_to_ticks, tunable_wait, wait_range_in_ticks
 
-BY_PRIORITY = "give it a smaller priority, or "
-BY_ORDER = "let the other guard exclude it, choose the other `order`, or "
+PRIORITY_HINT = "give it a smaller priority, or "
+ORDER_HINT = "let the other guard exclude it, choose the other `order`, or "
 
 
-def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> set[str]:
+def check_dead_transitions(
+    automaton: Automaton, query_engine: QueryEngine, problems: Problems
+) -> set[str]:
     """Warn of transitions that never fire; return the keys of them."""
-    silent: set[str] = set()
+    dead_transitions: set[str] = set()
     for mode in automaton.all_modes:
-        guards = _Guards(automaton, mode, inquiry)
-        for _, transition in by_priority(mode):
-            if _never_raised(automaton, transition):
+        guards = _ModeGuards(automaton, mode, query_engine)
+        for _, transition in transitions_by_priority(mode):
+            if _waits_for_unraised_event(automaton, transition):
                 names = " or ".join(f"`{name}`" for name in transition.events)
                 label = f"this never fires: nothing raises {names}, and no input is it"
                 one = transition.events[0]
                 hint = f"`raise: {one}` on a transition, or `events: {{{one}: {{from: input}}}}`"
                 problems.warning("dead", transition.span, label, hint)
-                silent.add(transition.key)
+                dead_transitions.add(transition.key)
                 continue
-            if guards.is_first_inside(transition, problems):
-                silent.add(transition.key)
+            if guards.report_inner_shadow(transition, problems):
+                dead_transitions.add(transition.key)
                 continue
-            if not guards.is_silent(transition):
+            if not guards.never_fires(transition):
                 continue
-            if guards.never(transition):
-                if transition.completes:
+            if guards.never_holds(transition):
+                if transition.is_completion:
                     continue  # language/check_chart.py
-                label = f"{_guard(transition)} never holds within the declared ranges"
+                label = f"{_describe_guard(transition)} never holds within the declared ranges"
                 hint = "they exclude it, with the equations of the mode: correct one of them"
-                problems.warning("dead", _place(transition, transition.when), label, hint)
+                problems.warning("dead", _span_of(transition, transition.when), label, hint)
             elif not guards.report_shadow(transition, problems):
                 continue
-            silent.add(transition.key)
-    return silent
+            dead_transitions.add(transition.key)
+    return dead_transitions
 
 
-def _never_raised(automaton: Automaton, transition: Transition) -> bool:
+def _waits_for_unraised_event(automaton: Automaton, transition: Transition) -> bool:
     """Tell whether a transition waits for events that never come."""
-    return bool(transition.events) and not events_that_come(automaton) & {*transition.events}
+    return bool(transition.events) and not possible_events(automaton) & {*transition.events}
 
 
-def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
+def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
     """Warn of two waits that differ by less than a period (rule 10)."""
     if automaton.period is None:
         return
     for mode in automaton.all_modes:
-        guards = _Guards(automaton, mode, inquiry)
-        for earlier, later in _pairs(mode):
+        guards = _ModeGuards(automaton, mode, query_engine)
+        for earlier, later in _waiting_pairs(mode):
             if any(tunable_wait(automaton, way.wait) for way in (earlier, later)):
                 continue
-            first, second = (_wait(automaton, way) for way in (earlier, later))
+            first, second = (_wait_seconds(automaton, way) for way in (earlier, later))
             apart = abs(first - second)
             if first and second and 0 < apart < automaton.period:
-                if guards.exclude(earlier, later):
+                if guards.are_exclusive(earlier, later):
                     continue
                 times = [f"{float(time) * 1e3:g} ms" for time in (second, first, automaton.period)]
                 label = f"{times[0]} are nearer to the {times[1]} of `{earlier.name}` "
                 label += f"than a period of {times[2]}"
                 hint = "which of them elapses first may differ between simulation and target"
                 assert later.wait
-                problems.warning("near", _place(later, later.wait), label, hint)
+                problems.warning("near", _span_of(later, later.wait), label, hint)
 
 
-def check_stuck(automaton: Automaton, silent: set[str], problems: Problems) -> None:
+def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems: Problems) -> None:
     """Warn of modes that only transitions which never fire leave; those of superstates count."""
     superstates = {mode.key for mode in automaton.superstates}
     for mode in automaton.all_modes:
-        ways = [way for each in _around(automaton, mode) for way in each.transitions]
-        if mode.key not in superstates and ways and all(way.key in silent for way in ways):
+        ways = [way for each in _enclosing_modes(automaton, mode) for way in each.transitions]
+        if (
+            mode.key not in superstates
+            and ways
+            and all(way.key in dead_transitions for way in ways)
+        ):
             label = f"mode `{mode.name}` cannot be left: none of its transitions ever fires"
             problems.warning("stuck", mode.span, label)
 
 
-def _around(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
+def _enclosing_modes(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
     """Yield a mode and those that it stands in."""
     yield mode
-    chart = automaton.tree
-    own = next(node for node in chart.nodes if node.mode == mode.key) if chart else None
-    for node in chart.outer(own) if chart and own else ():
-        if node.mode != mode.key and node.mode in automaton.by_key:
-            yield automaton.by_key[node.mode]
+    chart = automaton.statechart
+    own = next(node for node in chart.nodes if node.mode_key == mode.key) if chart else None
+    for node in chart.ancestors(own) if chart and own else ():
+        if node.mode_key != mode.key and node.mode_key in automaton.modes_by_key:
+            yield automaton.modes_by_key[node.mode_key]
 
 
-class _Guards:
+class _ModeGuards:
     """The guards of one mode at one moment."""
 
-    def __init__(self, automaton: Automaton, mode: Mode, inquiry: Inquiry) -> None:
+    def __init__(self, automaton: Automaton, mode: Mode, query_engine: QueryEngine) -> None:
         self.automaton = automaton
         self.mode = mode
-        self.inquiry = inquiry
-        self.moment = Moment(automaton, mode)
-        self.known: dict[str, Expr | None] = {}
+        self.query_engine = query_engine
+        self.snapshot = GuardSnapshot(automaton, mode)
+        self.guards: dict[str, Expr | None] = {}
         self.waits: dict[str, Fraction] = {}
         for transition in mode.transitions:
-            self.of(transition)
+            self.guard_of(transition)
 
-    def of(self, transition: Transition) -> Expr | None:
+    def guard_of(self, transition: Transition) -> Expr | None:
         """Return a guard, None if it has no form that questions can be asked of."""
-        if transition.key not in self.known:
-            self.known[transition.key] = None
+        if transition.key not in self.guards:
+            self.guards[transition.key] = None
             with suppress(KeyError, SpecError):
-                self.known[transition.key] = self._guard(transition)
-        return self.known[transition.key]
+                self.guards[transition.key] = self._lower_guard(transition)
+        return self.guards[transition.key]
 
-    def held(self, transition: Transition) -> Fraction:
+    def wait_of(self, transition: Transition) -> Fraction:
         """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
 
         At most, where that is tunable.
         """
         if transition.key not in self.waits:
-            self.waits[transition.key] = _longest(self.automaton, transition)
+            self.waits[transition.key] = _longest_wait(self.automaton, transition)
         return self.waits[transition.key]
 
-    def _guard(self, transition: Transition) -> Expr | None:
-        source = self.automaton.source(transition)
+    def _lower_guard(self, transition: Transition) -> Expr | None:
+        source = self.automaton.source_mode(transition)
         if source.key == self.mode.key:
-            return self.moment.guard(transition)
-        if not means_the_same(transition):
+            return self.snapshot.lower_guard(transition)
+        if not is_guard_portable(transition):
             return None
-        return self.moment.seen_by(source).guard(transition)
+        return self.snapshot.in_enclosing_mode(source).lower_guard(transition)
 
-    def together_never(self, *conditions: Expr | None) -> bool:
+    def are_incompatible(self, *conditions: Expr | None) -> bool:
         """Tell whether conditions never hold together, whatever the tunables are."""
         found = [condition for condition in conditions if condition is not None]
         if len(found) < len(conditions):
             return False
-        return self.inquiry.never(self.inquiry.question(self.moment.story, found))
+        return self.query_engine.is_unsatisfiable(
+            self.query_engine.build_query(self.snapshot.path, found)
+        )
 
-    def is_first_inside(self, transition: Transition, problems: Problems) -> bool:
+    def report_inner_shadow(self, transition: Transition, problems: Problems) -> bool:
         """Warn of a superstate's transition before which one inside always fires."""
-        found = list(inside_first(self.automaton, self.mode))
-        held = self.held(transition)
+        found = list(inner_preceding_transitions(self.automaton, self.mode))
+        held = self.wait_of(transition)
         for leaf, ways in found:
-            inside = _Guards(self.automaton, leaf, self.inquiry)
-            first = [way for way in ways if not self.held(way)]
-            first = [way for way in first if comes_along(self.automaton, way, transition)]
-            others = [_not(guard) for guard in map(inside.of, first) if guard is not None]
-            if not others or not inside.together_never(inside.of(transition), *others):
+            inside = _ModeGuards(self.automaton, leaf, self.query_engine)
+            first = [way for way in ways if not self.wait_of(way)]
+            first = [way for way in first if covers_events(self.automaton, way, transition)]
+            others = [_negate(guard) for guard in map(inside.guard_of, first) if guard is not None]
+            if not others or not inside.are_incompatible(inside.guard_of(transition), *others):
                 return False
         what = "one of the transitions inside, which win by `order`, fires"
-        return bool(found) and _report_shadow(transition, what, bool(held), problems, BY_ORDER)
+        return bool(found) and _report_shadow(transition, what, bool(held), problems, ORDER_HINT)
 
-    def is_silent(self, transition: Transition) -> bool:
+    def never_fires(self, transition: Transition) -> bool:
         """Tell whether a guard never holds where none does that comes first.
 
         Where that is not so it is neither dead nor shadowed: one question for most transitions.
         """
-        held = self.held(transition)
-        others = (_not(self.of(way)) for way in self._first(transition))
-        return self.together_never(self.of(transition), *self._lasted(held), *others)
+        held = self.wait_of(transition)
+        others = (_negate(self.guard_of(way)) for way in self._earlier_transitions(transition))
+        return self.are_incompatible(self.guard_of(transition), *self._active_for(held), *others)
 
-    def never(self, transition: Transition) -> bool:
+    def never_holds(self, transition: Transition) -> bool:
         """Tell whether a guard never holds."""
-        return self.together_never(self.of(transition))
+        return self.are_incompatible(self.guard_of(transition))
 
-    def exclude(self, first: Transition, second: Transition) -> bool:
+    def are_exclusive(self, first: Transition, second: Transition) -> bool:
         """Tell whether two guards never hold together."""
-        return self.together_never(self.of(first), self.of(second))
+        return self.are_incompatible(self.guard_of(first), self.guard_of(second))
 
     def report_shadow(self, transition: Transition, problems: Problems) -> bool:
         """Warn of a transition before which others always fire; tell whether it was so."""
-        guard = self.of(transition)
+        guard = self.guard_of(transition)
         if guard is None:
             return False
-        before = {way.key for way in winners(self.automaton, self.mode, transition)}
-        wait = _shortest(self.automaton, transition)
-        first = self._first(transition)
-        at_once = [way for way in first if way.key in before and not self.held(way)]
-        lasted = self._lasted(wait)
+        before = {way.key for way in preceding_transitions(self.automaton, self.mode, transition)}
+        wait = _shortest_wait(self.automaton, transition)
+        first = self._earlier_transitions(transition)
+        at_once = [way for way in first if way.key in before and not self.wait_of(way)]
+        lasted = self._active_for(wait)
         for way in first:
-            own = self._lasted(wait - self.held(way)) if way.key in before else ()
-            if self.together_never(guard, *own, _not(self.of(way))):
-                what, hint = f"`{way.name}` fires", BY_PRIORITY
+            own = self._active_for(wait - self.wait_of(way)) if way.key in before else ()
+            if self.are_incompatible(guard, *own, _negate(self.guard_of(way))):
+                what, hint = f"`{way.name}` fires", PRIORITY_HINT
                 if way.source != transition.source:
                     what, hint = (
                         f"`{way.name}` of `{way.source}`, which is around it, fires",
-                        BY_ORDER,
+                        ORDER_HINT,
                     )
                 return _report_shadow(transition, what, bool(wait), problems, hint)
-        others = [_not(self.of(way)) for way in at_once]
-        if len(others) > 1 and self.together_never(guard, *lasted, *others):
+        others = [_negate(self.guard_of(way)) for way in at_once]
+        if len(others) > 1 and self.are_incompatible(guard, *lasted, *others):
             names = ", ".join(f"`{way.name}`" for way in at_once)
             what = f"one of {names} fires"
-            return _report_shadow(transition, what, bool(wait), problems, BY_PRIORITY)
+            return _report_shadow(transition, what, bool(wait), problems, PRIORITY_HINT)
         return False
 
-    def _first(self, transition: Transition) -> list[Transition]:
+    def _earlier_transitions(self, transition: Transition) -> list[Transition]:
         """Return the transitions that fire first wherever both guards hold from one time on."""
-        wait = _shortest(self.automaton, transition)
-        before = {way.key: way for way in winners(self.automaton, self.mode, transition)}
+        wait = _shortest_wait(self.automaton, transition)
+        before = {
+            way.key: way for way in preceding_transitions(self.automaton, self.mode, transition)
+        }
         own = self.mode.transitions
-        along = {way.key: way for way in own if comes_along(self.automaton, way, transition)}
+        along = {way.key: way for way in own if covers_events(self.automaton, way, transition)}
         ways = {**along, **before}.values()
-        return [way for way in ways if self.of(way) is not None and self._wins(way, before, wait)]
+        return [
+            way
+            for way in ways
+            if self.guard_of(way) is not None and self._fires_before(way, before, wait)
+        ]
 
-    def _wins(self, way: Transition, before: Mapping[str, Transition], wait: Fraction) -> bool:
-        own = self.held(way)
+    def _fires_before(
+        self, other: Transition, before: Mapping[str, Transition], wait: Fraction
+    ) -> bool:
+        own = self.wait_of(other)
         if not wait:
-            return not own and way.key in before
-        leaves = bool(way.targets) and not way.internal
-        return (leaves and own < wait) or (own == wait and way.key in before)
+            return not own and other.key in before
+        leaves = bool(other.targets) and not other.internal
+        return (leaves and own < wait) or (own == wait and other.key in before)
 
-    def _lasted(self, wait: Fraction) -> tuple[Expr, ...]:
+    def _active_for(self, wait: Fraction) -> tuple[Expr, ...]:
         """Return that the mode has been active for a wait, where its age matters."""
-        if not wait or ELAPSED not in self.moment.story.extents:
+        if not wait or TIME_IN_MODE not in self.snapshot.path.domains:
             return ()
         is_sampled = self.automaton.is_sampled
-        limit = whole(int(wait)) if is_sampled else real(wait)
-        return (Compare(">=", Ref(ELAPSED, is_sampled), limit),)
+        limit = integer(int(wait)) if is_sampled else real(wait)
+        return (Compare(">=", Ref(TIME_IN_MODE, is_sampled), limit),)
 
 
 def _report_shadow(
     transition: Transition, what: str, waits: bool, problems: Problems, hint: str
 ) -> bool:
-    other = f"write `{STAY}`" if transition.in_cell else "remove it"
+    other = f"write `{STAY}`" if transition.is_table_cell else "remove it"
     if waits:
         label = f"this wait never elapses: {what} before, whenever the guard holds"
         assert transition.wait
-        place = _place(transition, transition.wait)
+        place = _span_of(transition, transition.wait)
         problems.warning("timer", place, label, f"wait for less, or {other}")
     else:
-        label = f"this never fires: {what} first, whenever {_guard(transition)} holds"
-        problems.warning("shadowed", _place(transition, transition.when), label, hint + other)
+        label = f"this never fires: {what} first, whenever {_describe_guard(transition)} holds"
+        problems.warning("shadowed", _span_of(transition, transition.when), label, hint + other)
     return True
 
 
-def _place(transition: Transition, formula: Formula) -> Span:
+def _span_of(transition: Transition, formula: Formula) -> Span:
     """Return where a formula stands; of a transition table its cell: other rows share it."""
-    return transition.span if transition.in_cell else formula.span
+    return transition.span if transition.is_table_cell else formula.span
 
 
-def _guard(transition: Transition) -> str:
-    return f"the guard of `{transition.name}`" if transition.in_cell else "this"
+def _describe_guard(transition: Transition) -> str:
+    return f"the guard of `{transition.name}`" if transition.is_table_cell else "this"
 
 
-def _wait(automaton: Automaton, transition: Transition) -> Fraction:
+def _wait_seconds(automaton: Automaton, transition: Transition) -> Fraction:
     """Return how long a guard has to hold [s]."""
-    return exact_value(transition.wait, automaton) if transition.wait else Fraction(0)
+    return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
 
 
-def _shortest(automaton: Automaton, transition: Transition) -> Fraction:
+def _shortest_wait(automaton: Automaton, transition: Transition) -> Fraction:
     """Return how long a guard has to hold at least: ticks of a sampled automaton, else [s]."""
-    return _held(automaton, transition)[0]
+    return _wait_range(automaton, transition)[0]
 
 
-def _longest(automaton: Automaton, transition: Transition) -> Fraction:
+def _longest_wait(automaton: Automaton, transition: Transition) -> Fraction:
     """Return the same at most: it differs where the wait is tunable."""
-    return _held(automaton, transition)[1]
+    return _wait_range(automaton, transition)[1]
 
 
-def _held(automaton: Automaton, transition: Transition) -> Range:
+def _wait_range(automaton: Automaton, transition: Transition) -> Range:
     tunable = tunable_wait(automaton, transition.wait)
     if tunable:
-        return range_in_ticks(automaton, automaton.parameters[tunable])
-    wait = _wait(automaton, transition)
-    held = Fraction(ticks_of(automaton, wait)) if automaton.period else wait
+        return wait_range_in_ticks(automaton, automaton.parameters[tunable])
+    wait = _wait_seconds(automaton, transition)
+    held = Fraction(seconds_to_ticks(automaton, wait)) if automaton.period else wait
     return held, held
 
 
-def _pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
+def _waiting_pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
     """Yield each two transitions of a mode that wait."""
     waiting = [way for way in mode.transitions if way.wait]
     for position, later in enumerate(waiting):
@@ -292,7 +308,7 @@ def _pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
             yield earlier, later
 
 
-def _not(condition: Expr | None) -> Expr | None:
+def _negate(condition: Expr | None) -> Expr | None:
     if isinstance(condition, Value):
         return Value(not condition.value)
     return None if condition is None else Unary("not", condition)

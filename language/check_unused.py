@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from language.model import Automaton, Mode
-from language.problem import Problems, nearest
-from language.reading import all_names
+from language.problem import Problems, suggest_name
+from language.reading import names_read_by
 
-HINT = "make it an output, or remove it"
+UNUSED_HINT = "make it an output, or remove it"
 
 
 def check_unused(automaton: Automaton, problems: Problems) -> None:
@@ -16,43 +16,43 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
     writer. What an automaton has from its model is looked at there.
     """
     model = automaton.model
-    read = {*all_names(automaton), *map(automaton.source_of, automaton.outputs)}
+    read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
     read |= {name for m in automaton.all_modes for way in m.transitions for name in way.events}
-    read |= {*_observed(automaton), *(_run_names(automaton) if model else ())}
+    read |= {*_observer_names(automaton), *(_run_names(automaton) if model else ())}
     for name, parameter in automaton.parameters.items():
         if not (model and name in model.parameters) and name not in read:
-            hint = nearest(name, automaton.parameters.keys() - {name})
+            hint = suggest_name(name, automaton.parameters.keys() - {name})
             problems.warning("unused", parameter.span, f"parameter `{name}` is read nowhere", hint)
     for name, thing in automaton.inputs.items():
         if name not in read:
             problems.warning("unused", thing.span, f"input `{name}` is read nowhere")
-    for name, state in automaton.carried.items():
+    for name, state in automaton.state_variables.items():
         if name not in read:
-            problems.warning("unused", state.span, f"state `{name}` is read nowhere", HINT)
+            problems.warning("unused", state.span, f"state `{name}` is read nowhere", UNUSED_HINT)
     _check_equations(automaton, read, problems)
     _check_unwritten(automaton, problems)
 
 
 def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -> None:
-    told = set()
+    reported = set()
     for mode in automaton.all_modes:
         for name, formula in mode.equations.items():
-            if name not in read and name not in told:
-                told.add(name)
+            if name not in read and name not in reported:
+                reported.add(name)
                 label = f"equation `{name}` is read nowhere"
-                problems.warning("unused", formula.span, label, HINT)
+                problems.warning("unused", formula.span, label, UNUSED_HINT)
 
 
 def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
-    written = {name for mode in automaton.all_modes for name in _written(automaton, mode)}
-    written |= {name for table in automaton.tables for name in table.written}
-    for name, state in automaton.carried.items():
+    written = {name for mode in automaton.all_modes for name in _written_names(automaton, mode)}
+    written |= {name for table in automaton.tables for name in table.assigned_names}
+    for name, state in automaton.state_variables.items():
         if name not in written:
             label = f"`{name}` is written nowhere: it keeps its start value"
             problems.warning("unwritten", state.span, label, "declare it as a parameter")
 
 
-def _written(automaton: Automaton, mode: Mode) -> Iterator[str]:
+def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
     """Yield what a mode or a transition out of it writes."""
     for group in (mode.update, mode.entry, mode.exit, mode.flow):
         yield from group
@@ -64,7 +64,7 @@ def _written(automaton: Automaton, mode: Mode) -> Iterator[str]:
         yield from automaton.model.states
 
 
-def _observed(automaton: Automaton) -> Iterator[str]:
+def _observer_names(automaton: Automaton) -> Iterator[str]:
     """Yield the inputs and states that observers name beside their formulas."""
     for mode in automaton.modes.values():
         if mode.observer:

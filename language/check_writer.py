@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from language.model import Automaton, Mode, Transition
-from language.problem import Problems, nearest
-from language.region import sources
+from language.problem import Problems, suggest_name
+from language.region import equation_formulas
 
 
 def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
     """Report what carries a state beside something else that does, or belongs elsewhere."""
-    if mode.observer and mode.run and not mode.observer.runs:
+    if mode.observer and mode.run and not mode.observer.predicts_by_run:
         label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
         help = "or the run predicts for the observer: `predict: runs`"
         problems.error("writer", mode.span, label, help)
-    if mode.observer and mode.observer.runs and not mode.run:
+    if mode.observer and mode.observer.predicts_by_run and not mode.run:
         label = "`predict: runs` needs `runs:` in this mode"
         problems.error("observer", mode.observer.span, label)
     wrong = ("flow",) if automaton.is_sampled else ("update", "observer", "run")
@@ -42,7 +42,7 @@ def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
             writers[name] = what
 
 
-def check_continued(automaton: Automaton, transition: Transition, problems: Problems) -> None:
+def check_memory_continue(automaton: Automaton, transition: Transition, problems: Problems) -> None:
     """`memory: continue` keeps the wait counters of the target: there have to be some."""
     modes = automaton.region(transition.region).modes
     target = modes.get(transition.target)
@@ -57,27 +57,27 @@ def check_continued(automaton: Automaton, transition: Transition, problems: Prob
 
 def check_outputs(automaton: Automaton, problems: Problems) -> None:
     """Report outputs that are not known, or have no value in some mode."""
-    equations = equations_of(automaton.all_modes)
+    equations = equation_names_of(automaton.all_modes)
     for output, span in automaton.outputs.items():
-        name = automaton.source_of(output)
-        if name == "mode" or name in automaton.carried:
+        name = automaton.output_source(output)
+        if name == "mode" or name in automaton.state_variables:
             continue
         if name == "faults" and automaton.is_sampled:
             continue
         if name in (region.name for region in automaton.all_regions):
             continue
         if name not in equations:
-            hint = nearest(name, [*equations, *automaton.carried, "mode"])
+            hint = suggest_name(name, [*equations, *automaton.state_variables, "mode"])
             label = f"output `{name}` is not a state, an equation or `mode`"
             problems.error("name", span, label, hint)
             continue
         for mode in automaton.modes.values():
-            if name not in sources(mode):
+            if name not in equation_formulas(mode):
                 label = f"output `{name}` has no value in mode `{mode.name}`"
                 problems.error("missing", span, label)
 
 
-def check_scaled(automaton: Automaton, problems: Problems) -> None:
+def check_scaling_ranges(automaton: Automaton, problems: Problems) -> None:
     """Report states without a range where the method of integration scales with it."""
     used = {m.run.method for m in automaton.modes.values() if m.run}
     used |= set() if automaton.is_sampled else {automaton.method}
@@ -89,6 +89,6 @@ def check_scaled(automaton: Automaton, problems: Problems) -> None:
             problems.error("missing", state.span, label)
 
 
-def equations_of(modes: Iterable[Mode]) -> list[str]:
+def equation_names_of(modes: Iterable[Mode]) -> list[str]:
     """Return the names of the equations of some modes, each once."""
     return list(dict.fromkeys(name for mode in modes for name in mode.equations))

@@ -9,33 +9,39 @@ from typing import Any
 
 from language.declaration import Formula
 from language.evaluate import Scalar, evaluate
-from language.lower import assigned
+from language.lower import lower_assigned_value
 from language.model import Automaton
-from language.number import rounded
+from language.number import round_to_type
 from language.operation import Assign, Block
 from language.operators import ARITHMETIC
-from language.parameter import constant_names, constant_of, owner, parameter_kinds, parameter_order
+from language.parameter import (
+    constant_bindings,
+    constant_of,
+    declaring_automaton,
+    parameter_kinds,
+    parameter_order,
+)
 from language.problem import Problems, SpecError
 from language.program import Constant
-from language.syntax import Arithmetic, Name, Negative, Number, Power, Tree
-from language.wait import ticks_of, tunable_waits
+from language.syntax import Arithmetic, Name, Negation, NumberLiteral, Power, SyntaxTree
+from language.wait import seconds_to_ticks, tunable_waits
 
 
 def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, Constant]:
     """Return the constant of every parameter, by name. Reports one that is not finite."""
-    known = constant_names(automaton)
+    known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
     values: dict[str, Scalar] = {}
     found: dict[str, Constant] = {}
     for name in parameter_order(automaton):
         parameter = automaton.parameters[name]
         if parameter.derived:
-            formula = assigned(parameter.derived.tree, known, False)
+            formula = lower_assigned_value(parameter.derived.tree, known, False)
             value = float(evaluate(formula, values, automaton.numbers))
         elif name in tunable_waits(automaton):
-            value = ticks_of(automaton, parameter.value or Fraction(0))
+            value = seconds_to_ticks(automaton, parameter.value or Fraction(0))
         else:
-            value = rounded(parameter.value or Fraction(0), automaton.numbers)
+            value = round_to_type(parameter.value or Fraction(0), automaton.numbers)
         if not math.isfinite(value):
             problems.error(
                 "value",
@@ -47,14 +53,14 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
         new = {name: constant_of(automaton, name, kinds[name], value)}
         new.update({axis.name: axis for axis in axis_constants(automaton, name)})
         found.update(new)
-        values.update(values_of(new))
+        values.update(constant_values(new))
     return found
 
 
 def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
     """Return the axes of a table parameter as constants; axes are fixed, whatever the values."""
     table = automaton.parameters[name].table
-    key = f"{owner(automaton, name)} {automaton.parameters[name].key}.table.over"
+    key = f"{declaring_automaton(automaton, name)} {automaton.parameters[name].key}.table.over"
     return [
         Constant(
             name=f"axis.{name}_{k}",
@@ -62,7 +68,7 @@ def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
             value=0.0,
             unit=str(axis.unit.dimension),
             key=f"{key} {axis.name}",
-            items=tuple(rounded(point, automaton.numbers) for point in axis.points),
+            items=tuple(round_to_type(point, automaton.numbers) for point in axis.points),
         )
         for k, axis in enumerate(table.axes if table else (), start=1)
     ]
@@ -70,34 +76,40 @@ def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
 
 def derive_block(automaton: Automaton) -> Block:
     """Return the assignments of what is derived from tunable parameters, in order."""
-    known = constant_names(automaton)
+    known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
     ops = []
     for name in parameter_order(automaton):
         derived = automaton.parameters[name].derived
         if derived and kinds[name] == "derived":
             key = f"{automaton.name} {derived.key}"
-            ops.append(Assign(f"derived.{name}", assigned(derived.tree, known, False), key))
+            ops.append(
+                Assign(f"derived.{name}", lower_assigned_value(derived.tree, known, False), key)
+            )
     return tuple(ops)
 
 
-def values_of(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
+def constant_values(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
     """Return the values by the Program's names, a tuple for an array."""
     found: dict[str, Any] = {c.name: c.items or c.value for c in constants.values()}
     return found
 
 
-def constant_value(
+def evaluate_constant(
     formula: Formula, automaton: Automaton, values: Mapping[str, Scalar], what: str
 ) -> float:
     """Return a formula of parameters, computed in double. Raises SpecError where it is not one."""
     problems = Problems()
     try:
-        value = float(evaluate(assigned(formula.tree, constant_names(automaton), False), values))
+        value = float(
+            evaluate(
+                lower_assigned_value(formula.tree, constant_bindings(automaton), False), values
+            )
+        )
     except KeyError as error:
         label = f"`{error.args[0]}` is not a parameter: {what} is made of parameters"
         problems.error("constant", formula.span, label)
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None
     if not math.isfinite(value):
         problems.error(
             "value",
@@ -105,17 +117,17 @@ def constant_value(
             f"this is {value}, not a finite number",
             "look for a division by zero or a huge power",
         )
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     return value
 
 
-def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
+def evaluate_exactly(formula: Formula, automaton: Automaton) -> Fraction:
     """Return a formula of fixed parameters exactly (for times). Raises SpecError."""
     problems = Problems()
 
-    def value(tree: Tree) -> Fraction:
+    def value(tree: SyntaxTree) -> Fraction:
         match tree:
-            case Number(number, _, _):
+            case NumberLiteral(number, _, _):
                 return number
             case Name(path, _) if path in automaton.parameters:
                 parameter = automaton.parameters[path]
@@ -124,7 +136,7 @@ def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
                     if parameter.derived
                     else parameter.value or Fraction(0)
                 )
-            case Negative(operand, _):
+            case Negation(operand, _):
                 return -value(operand)
             case Power(base, exponent, _):
                 return value(base) ** exponent
@@ -139,4 +151,4 @@ def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
     except (TypeError, ZeroDivisionError):
         label = "a time is made of numbers, parameters and + - * /"
         problems.error("wait", formula.span, label)
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None

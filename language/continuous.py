@@ -18,71 +18,76 @@ import dataclasses
 from collections.abc import Collection, Mapping
 
 from language.action import discrete_variables
-from language.constants import parameter_constants, values_of
+from language.constants import constant_values, parameter_constants
 from language.field import (
-    Field,
+    VectorField,
     field_blocks,
     field_variables,
-    switch,
+    lower_single_region_step,
 )
 from language.history import (
-    AGE,
-    History,
-    alarm_names,
+    RECORD_AGE,
+    ContinuousDelay,
+    alarm_bindings,
     alarms_of,
-    delayed,
-    histories_of,
-    history_variables,
+    continuous_delay_variables,
+    continuous_delays_of,
+    delayed_value_bindings,
 )
-from language.integration import method_of
-from language.invariant import INVARIANTS, invariant_block, invariant_variables
-from language.linear import Point
-from language.lower import Names, equations, variable_names
+from language.integration import build_method
+from language.invariant import INVARIANTS, invariant_blocks, invariant_variables
+from language.linear import LinearisationPoint
+from language.lower import NameBindings, lower_equations, variable_bindings
 from language.model import Automaton, Mode, Transition
-from language.motion import FLOW_HALVINGS, Method, motion_blocks, motion_variables
+from language.motion import (
+    FLOW_BISECTIONS,
+    IntegrationMethod,
+    continuous_step_blocks,
+    continuous_step_variables,
+)
 from language.operation import (
     Assign,
     Binary,
     Block,
     Expr,
     Ref,
-    Run,
+    RunBlock,
     add,
+    integer,
     multiply,
-    whole,
 )
-from language.parallel import Selection, parallel_blocks, parallel_step
-from language.parameter import constant_names
-from language.part import parts_block
+from language.parallel import TransitionSelection, lower_parallel_step, parallel_blocks
+from language.parameter import constant_bindings
+from language.part import engine_blocks
 from language.problem import Problems
-from language.program import MotionLimit, Program, TransitionInfo, Variable, fired_variable
-from language.region import in_modes
+from language.program import Program, StabilityLimit, TransitionInfo, Variable, fired_variable
+from language.region import mode_bindings
 from language.stepping import (
-    BETWEEN,
     LIVELOCK,
+    STEP_INTERFACE,
     ZENO,
-    Waits,
-    begun,
-    ended,
-    is_over,
-    of_mode,
-    step_block,
-    stepping_blocks,
-    stepping_variables,
-    waits_of,
+    WaitTimers,
+    begin_blocks,
+    block_of_mode,
+    end_blocks,
+    is_wait_over,
+    major_step_block,
+    major_step_blocks,
+    major_step_variables,
+    wait_timers_of,
 )
-from language.transition import infos_of, transition_infos
-from language.turning import edge_names, forgotten, level_variables
+from language.transition import infos_of_mode, transition_infos
+from language.turning import edge_bindings, level_variables, reset_levels
 from language.wiring import (
-    assembled,
-    finished,
+    assemble_program,
+    finalise_program,
     input_variables,
-    mode_and_fired,
+    region_variables,
     state_variables,
 )
 
-ENTRIES = ("init", "derive", "step")
-PARTS = (
+ENTRY_BLOCKS = ("init", "derive", "step")
+ENGINE_BLOCKS = (
     "latch",
     "start",
     "equations",
@@ -99,120 +104,133 @@ PARTS = (
 """What an engine runs one by one; of a Program with inputs that vary there is no `step`."""
 
 
-def continuous_program(
-    automaton: Automaton, problems: Problems, varying: Collection[str] = ()
+def lower_continuous_automaton(
+    automaton: Automaton, problems: Problems, varying_inputs: Collection[str] = ()
 ) -> Program:
     """Return the Program of a checked continuous automaton. Raises SpecError.
 
-    `varying` names the inputs that change inside a step.
+    `varying_inputs` names the inputs that change inside a step.
     """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
-    histories, alarms = histories_of(automaton), alarms_of(automaton)
-    known = _known(automaton, histories)
-    field = _field(automaton, known, varying, bool(histories))
+    histories, alarms = continuous_delays_of(automaton), alarms_of(automaton)
+    known = _base_bindings(automaton, histories)
+    field = _vector_field(automaton, known, varying_inputs, bool(histories))
     flows = field_blocks(field)
-    point = Point(automaton, values_of(parameters), {})
-    method, info = method_of(
+    point = LinearisationPoint(automaton, constant_values(parameters), {})
+    method, info = build_method(
         automaton.method, field, flows, point, automaton.step, automaton.span, problems
     )
-    waits = waits_of(transitions, alarms)
+    waits = wait_timers_of(transitions, alarms)
     blocks = {
         **flows,
-        **_motion(field, method, flows),
-        **stepping_blocks(field, waits, (AGE.name,) if histories else ()),
-        **_in_modes(field, known, transitions, _selection(automaton, transitions, waits)),
-        **invariant_block(automaton, known),
-        **parts_block(field, known, waits, histories),
+        **_continuous_step(field, method, flows),
+        **major_step_blocks(field, waits, (RECORD_AGE.name,) if histories else ()),
+        **_mode_blocks(field, known, transitions, _selection(automaton, transitions, waits)),
+        **invariant_blocks(automaton, known),
+        **engine_blocks(field, known, waits, histories),
     }
-    blocks["step"] = step_block(field, bool(histories), blocks)
-    problems.stop_if_any()
-    variables = [*_variables(automaton, field), *stepping_variables(field, waits)]
-    variables += motion_variables(field, method)
-    variables += [Variable(name, "real") for name in _courses(varying)]
-    variables += history_variables(histories)
+    blocks["step"] = major_step_block(field, bool(histories), blocks)
+    problems.raise_if_errors()
+    variables = [*_variables(automaton, field), *major_step_variables(field, waits)]
+    variables += continuous_step_variables(field, method)
+    variables += [Variable(name, "real") for name in _parabola_variables(varying_inputs)]
+    variables += continuous_delay_variables(histories)
     variables += [Variable(alarm.variable, "truth") for alarm in alarms]
     constants = (*parameters.values(), *method.constants)
-    program = assembled(automaton, blocks, constants, variables, transitions)
-    program = dataclasses.replace(program, motion=info, faults=(ZENO, LIVELOCK))
-    entries = (*(ENTRIES if not varying else ENTRIES[:2]), *PARTS)
-    return finished(program, entries, keep=(*BETWEEN, *_courses(varying)))
-
-
-def step_limits(automaton: Automaton) -> tuple[MotionLimit, ...]:
-    """Return the largest stable step of each mode that has one, whatever the step is."""
-    problems = Problems()
-    histories = histories_of(automaton)
-    field = _field(automaton, _known(automaton, histories), (), bool(histories))
-    point = Point(automaton, values_of(parameter_constants(automaton, problems)), {})
-    place = (automaton.step, automaton.span, problems)
-    return method_of(automaton.method, field, field_blocks(field), point, *place)[1].limits
-
-
-def _known(automaton: Automaton, histories: tuple[History, ...]) -> Names:
-    return {
-        **constant_names(automaton),
-        **variable_names(automaton, "before"),
-        **in_modes(automaton, "memory.mode"),
-        **delayed(automaton, histories),
-    }
-
-
-def _field(
-    automaton: Automaton, known: Names, varying: Collection[str], has_history: bool
-) -> Field:
-    held = {name: known[name] for name in automaton.inputs}
-    return Field(
-        automaton,
-        known,
-        {**held, **{name: _parabola(name) for name in varying}},
-        "memory.mode",
-        f"{automaton.name} ",
-        bool(varying or has_history),
-        _remembered(automaton),
+    program = assemble_program(automaton, blocks, constants, variables, transitions)
+    program = dataclasses.replace(program, integration=info, faults=(ZENO, LIVELOCK))
+    entries = (*(ENTRY_BLOCKS if not varying_inputs else ENTRY_BLOCKS[:2]), *ENGINE_BLOCKS)
+    return finalise_program(
+        program, entries, keep=(*STEP_INTERFACE, *_parabola_variables(varying_inputs))
     )
 
 
-def _motion(field: Field, method: Method, flows: Mapping[str, Block]) -> dict[str, Block]:
+def stable_step_limits(automaton: Automaton) -> tuple[StabilityLimit, ...]:
+    """Return the largest stable step of each mode that has one, whatever the step is."""
+    problems = Problems()
+    histories = continuous_delays_of(automaton)
+    field = _vector_field(automaton, _base_bindings(automaton, histories), (), bool(histories))
+    point = LinearisationPoint(
+        automaton, constant_values(parameter_constants(automaton, problems)), {}
+    )
+    place = (automaton.step, automaton.span, problems)
+    return build_method(automaton.method, field, field_blocks(field), point, *place)[
+        1
+    ].stability_limits
+
+
+def _base_bindings(automaton: Automaton, delays: tuple[ContinuousDelay, ...]) -> NameBindings:
+    return {
+        **constant_bindings(automaton),
+        **variable_bindings(automaton, "before"),
+        **mode_bindings(automaton, "memory.mode"),
+        **delayed_value_bindings(automaton, delays),
+    }
+
+
+def _vector_field(
+    automaton: Automaton, known: NameBindings, varying_inputs: Collection[str], has_history: bool
+) -> VectorField:
+    held = {name: known[name] for name in automaton.inputs}
+    return VectorField(
+        automaton,
+        known,
+        {**held, **{name: _input_parabola(name) for name in varying_inputs}},
+        "memory.mode",
+        f"{automaton.name} ",
+        bool(varying_inputs or has_history),
+        _guard_memory(automaton),
+    )
+
+
+def _continuous_step(
+    field: VectorField, method: IntegrationMethod, flows: Mapping[str, Block]
+) -> dict[str, Block]:
     """The flow of each mode up to the first change of a guard, by the method's steps."""
-    armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
-    halvings = FLOW_HALVINGS[field.automaton.numbers]
+    armed = {slot: f"memory.armed_{slot}" for slot in field.guard_slots}
+    halvings = FLOW_BISECTIONS[field.automaton.numbers]
     merge, is_wait = Ref("work.merge"), Ref("work.is_wait")
-    moves = motion_blocks(field, method, flows, merge, halvings, lambda mode: armed, is_wait)
+    moves = continuous_step_blocks(
+        field, method, flows, merge, halvings, lambda mode: armed, is_wait
+    )
     return {**method.blocks, **moves}
 
 
-def _in_modes(
-    field: Field, known: Names, infos: tuple[TransitionInfo, ...], selection: Selection
+def _mode_blocks(
+    field: VectorField,
+    known: NameBindings,
+    infos: tuple[TransitionInfo, ...],
+    selection: TransitionSelection,
 ) -> dict[str, Block]:
     """What each mode evaluates, and where it goes."""
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes.values():
-        ops = equations(mode, dict(known), "equation.", field.prefix)
+        ops = lower_equations(mode, dict(known), "equation.", field.key_prefix)
         blocks[f"equations_{mode.name}"] = tuple(ops)
-        blocks[f"jump_{mode.name}"] = _jump(field, mode, infos, selection)
+        blocks[f"jump_{mode.name}"] = _jump_block(field, mode, infos, selection)
     if field.automaton.regions:
         blocks.update(parallel_blocks(field, selection))
     return blocks
 
 
-def _parabola(name: str) -> Expr:
+def _input_parabola(name: str) -> Expr:
     s, bend = Ref("work.s"), Ref(f"work.bend_{name}")
     inner = add(Ref(f"work.rise_{name}"), multiply(s, bend))
     return add(Ref(f"before.{name}"), multiply(s, inner))
 
 
-def _courses(varying: Collection[str]) -> list[str]:
-    return [f"work.{part}_{name}" for name in varying for part in ("rise", "bend")]
+def _parabola_variables(varying_inputs: Collection[str]) -> list[str]:
+    return [f"work.{part}_{name}" for name in varying_inputs for part in ("rise", "bend")]
 
 
-def _variables(automaton: Automaton, field: Field) -> list[Variable]:
+def _variables(automaton: Automaton, field: VectorField) -> list[Variable]:
     return [
         *input_variables(automaton, "input"),
         *state_variables(automaton),
         *input_variables(automaton, "before"),
-        *mode_and_fired(automaton, "micro-step"),
-        *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
+        *region_variables(automaton, "micro-step"),
+        *(Variable(f"memory.armed_{slot}", "truth") for slot in field.guard_slots),
         *discrete_variables(automaton),
         *invariant_variables(automaton),
         *field_variables(field),
@@ -221,50 +239,55 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
     ]
 
 
-def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: Waits) -> Selection:
+def _selection(
+    automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: WaitTimers
+) -> TransitionSelection:
     by_key = {info.key: info for info in infos}
-    begins, ends = begun(waits), ended(waits)
+    begins, ends = begin_blocks(waits), end_blocks(waits)
 
     def info_of(transition: Transition) -> TransitionInfo:
         return by_key[f"{automaton.name} {transition.key}"]
 
     def enabled(transition: Transition, slot: str) -> Expr:
         guard, info = Ref(f"work.guard_{slot}"), info_of(transition)
-        return Binary("and", guard, is_over(info)) if info.timer else guard
+        return Binary("and", guard, is_wait_over(info)) if info.timer else guard
 
-    return Selection(
-        verb="jump",
-        taken=fired_variable,
-        number=lambda transition: info_of(transition).number,
-        enabled=enabled,
-        moved=lambda t: (
-            *of_mode(ends, automaton.source(t)),
-            *forgotten(automaton, automaton.source(t)),
-            *of_mode(begins, automaton.target(t)),
+    return TransitionSelection(
+        block_prefix="jump",
+        selected_variable=fired_variable,
+        number_of=lambda transition: info_of(transition).number,
+        enabled_condition=enabled,
+        after_switch=lambda t: (
+            *block_of_mode(ends, automaton.source_mode(t)),
+            *reset_levels(automaton, automaton.source_mode(t)),
+            *block_of_mode(begins, automaton.target_mode(t)),
         ),
     )
 
 
-def _jump(
-    field: Field, mode: Mode, infos: tuple[TransitionInfo, ...], selection: Selection
+def _jump_block(
+    field: VectorField,
+    mode: Mode,
+    infos: tuple[TransitionInfo, ...],
+    selection: TransitionSelection,
 ) -> Block:
-    guards = Run(f"guards_{mode.name}")
-    if mode.beside:
-        return (guards, *parallel_step(field, mode, selection))
+    guards = RunBlock(f"guards_{mode.name}")
+    if mode.parallel_regions:
+        return (guards, *lower_parallel_step(field, mode, selection))
     enabled: dict[int, Expr] = {}
     fired: dict[int, Block] = {}
     for k, (transition, info) in enumerate(
-        zip(mode.transitions, infos_of(field.automaton, mode, infos), strict=True)
+        zip(mode.transitions, infos_of_mode(field.automaton, mode, infos), strict=True)
     ):
-        enabled[k] = selection.enabled(transition, info.slot)
+        enabled[k] = selection.enabled_condition(transition, info.slot)
         fired[k] = (
-            Assign("memory.fired", whole(info.number), info.key),
-            *selection.moved(transition),
+            Assign("memory.fired", integer(info.number), info.key),
+            *selection.after_switch(transition),
         )
-    return (guards, *switch(field, mode, enabled, fired))
+    return (guards, *lower_single_region_step(field, mode, enabled, fired))
 
 
-def _remembered(automaton: Automaton) -> dict[str, Names]:
+def _guard_memory(automaton: Automaton) -> dict[str, NameBindings]:
     """Return, by the key of a mode, what `after` and edges in its guards are."""
-    alarms, edges = alarm_names(automaton), edge_names(automaton)
+    alarms, edges = alarm_bindings(automaton), edge_bindings(automaton)
     return {mode.key: {**alarms[mode.key], **edges[mode.key]} for mode in automaton.all_modes}

@@ -10,10 +10,10 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.constants import constant_value
+from language.constants import evaluate_constant
 from language.evaluate import Scalar
 from language.kalman import SolvedNames
-from language.limit import stored
+from language.limit import store_saturated
 from language.matrix import Matrix
 from language.model import Automaton, Mode, Observer
 from language.operation import (
@@ -33,27 +33,27 @@ from language.operation import (
     multiply as times,
     real,
     subtract,
-    total,
+    sum_of,
 )
 from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Variable
-from language.syntax import form
+from language.syntax import structural_key
 
 COVARIANCE_RANGE = "covariance_range"
-States = tuple[str, ...]
+StateNames = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Ahead:
+class PredictionMatrices:
     """The numbers of one prediction: Phi, Qd of constant densities, N_<state> per unit of others.
 
     `tag` opens the names of its solved constants; A (n, n) [unit_i/(unit_j s)].
     """
 
-    tag: str
+    name_prefix: str
     a: Matrix
-    numbers: Mapping[str, Matrix]
+    matrices: Mapping[str, Matrix]
 
 
 def covariance_variables(automaton: Automaton) -> list[Variable]:
@@ -70,7 +70,7 @@ def covariance_variables(automaton: Automaton) -> list[Variable]:
                 name = f"work.t_{row}__{column}"
                 found[name] = Variable(name, "real", unit)
                 if i <= j:
-                    name = entry(row, column)
+                    name = covariance_entry(row, column)
                     about = f"covariance of {row} and {column}"
                     found[name] = Variable(name, "real", unit, about=about)
             for what in ("pc", "gain", "density"):
@@ -80,70 +80,70 @@ def covariance_variables(automaton: Automaton) -> list[Variable]:
     return list(found.values())
 
 
-def entry(row: str, column: str) -> str:
+def covariance_entry(row: str, column: str) -> str:
     """Return the variable of a covariance; the row stands before the column among the states."""
     return f"memory.P_{row}__{column}"
 
 
-def pairs(states: States) -> Iterator[tuple[str, str]]:
+def state_pairs(states: StateNames) -> Iterator[tuple[str, str]]:
     """Yield the pairs of states whose covariance is stored."""
     for i, row in enumerate(states):
         for column in states[i:]:
             yield row, column
 
 
-def rows(solved: SolvedNames, ahead: Ahead) -> Block:
+def covariance_rows_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
     """T = Phi P, of P = Phi P Phi' + Qd over a period."""
-    states, phi = solved.observer.states, ahead.numbers["Phi"]
+    states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
     for row in states:
         for column in states:
-            old: dict[str, Expr] = {name: _of(states, name, column) for name in states}
-            parts = solved.row("Phi", phi, row, old)
-            ops.append(Assign(f"work.t_{row}__{column}", total(parts)))
+            old: dict[str, Expr] = {name: _symmetric_entry(states, name, column) for name in states}
+            parts = solved.row_products("Phi", phi, row, old)
+            ops.append(Assign(f"work.t_{row}__{column}", sum_of(parts)))
     return tuple(ops)
 
 
-def columns(solved: SolvedNames, ahead: Ahead) -> Block:
+def covariance_columns_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
     """P = T Phi' + Qd; `work.density_<state>` are the varying densities."""
-    states, phi = solved.observer.states, ahead.numbers["Phi"]
+    states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
-    for row, column in pairs(states):
+    for row, column in state_pairs(states):
         half: dict[str, Expr] = {name: Ref(f"work.t_{row}__{name}") for name in states}
-        parts = solved.row("Phi", phi, column, half)
-        parts += _noise(solved, ahead, row, column)
-        ops.append(Assign(entry(row, column), total(parts)))
+        parts = solved.row_products("Phi", phi, column, half)
+        parts += _process_noise_terms(solved, prediction, row, column)
+        ops.append(Assign(covariance_entry(row, column), sum_of(parts)))
     return tuple(ops)
 
 
-def corrected(
-    automaton: Automaton, solved: SolvedNames, c: Matrix, measure: str, error: Expr
+def correct_by_measurement(
+    automaton: Automaton, solved: SolvedNames, c: Matrix, measure: str, residual: Expr
 ) -> Block:
-    """Correct states and P by one measurement; `error` is what it differs from its expectation.
+    """Correct states and P by one measurement; `residual` is what it differs from its expectation.
 
     The spread c P c' + r is at least r: where rounding takes it below, it is r.
     """
     states = solved.observer.states
     variance = Ref(f"solved.{solved.mode}_R.{measure}")
-    ops: list[Op] = [Assign("work.residual", error)]
+    ops: list[Op] = [Assign("work.residual", residual)]
     for row in states:
-        old: dict[str, Expr] = {column: _of(states, row, column) for column in states}
-        ops.append(Assign(f"work.pc_{row}", total(solved.row("C", c, measure, old))))
+        old: dict[str, Expr] = {column: _symmetric_entry(states, row, column) for column in states}
+        ops.append(Assign(f"work.pc_{row}", sum_of(solved.row_products("C", c, measure, old))))
     pc: dict[str, Expr] = {row: Ref(f"work.pc_{row}") for row in states}
-    size = add(total(solved.row("C", c, measure, pc)), variance)
+    size = add(sum_of(solved.row_products("C", c, measure, pc)), variance)
     ops.append(Assign("work.spread", Call("max", (size, variance))))
     for row in states:
         ops.append(Assign(f"work.gain_{row}", divide(pc[row], Ref("work.spread"))))
         moved = times(Ref(f"work.gain_{row}"), Ref("work.residual"))
-        ops += stored(automaton, row, add(Ref(f"state.{row}"), moved))
-    for row, column in pairs(states):
-        before = Ref(entry(row, column))
+        ops += store_saturated(automaton, row, add(Ref(f"state.{row}"), moved))
+    for row, column in state_pairs(states):
+        before = Ref(covariance_entry(row, column))
         less = times(Ref(f"work.gain_{row}"), pc[column])
         ops.append(Assign(before.name, subtract(before, less)))
     return tuple(ops)
 
 
-def bounding(
+def covariance_limit_blocks(
     automaton: Automaton, mode: Mode, values: Mapping[str, Scalar], problems: Problems
 ) -> dict[str, Block]:
     """Return what keeps P within its limits at the end of a tick, or nothing: one block of all
@@ -151,17 +151,22 @@ def bounding(
     """
     observer = mode.observer
     assert observer
-    if not observer.limits:
+    if not observer.variance_limits:
         return {}
     limits = variance_limits(automaton, observer, values, problems)
     observers = {m.name: m.observer for m in automaton.modes.values() if m.observer}
-    first = next(n for n, other in observers.items() if _written(other) == _written(observer))
-    return {f"bound_{first}": bounded(observer.states, limits)}
+    first = next(
+        n for n, other in observers.items() if _limit_forms(other) == _limit_forms(observer)
+    )
+    return {f"bound_{first}": limit_covariance(observer.states, limits)}
 
 
-def _written(observer: Observer) -> dict[str, object]:
+def _limit_forms(observer: Observer) -> dict[str, object]:
     """Return the limits of variances as they are written."""
-    return {n: (form(low.tree), form(high.tree)) for n, (low, high) in observer.limits.items()}
+    return {
+        n: (structural_key(low.tree), structural_key(high.tree))
+        for n, (low, high) in observer.variance_limits.items()
+    }
 
 
 def variance_limits(
@@ -169,11 +174,11 @@ def variance_limits(
 ) -> dict[str, tuple[float, float]]:
     """Return the limits that an observer gives variances; report those that leave none."""
     found = {}
-    for name, pair in observer.limits.items():
+    for name, pair in observer.variance_limits.items():
         if tunables_of(automaton, pair):
             label = "the limits of a variance are made of fixed values"
             problems.error("observer", pair[0].span, label)
-        low, high = (constant_value(one, automaton, values, "a limit") for one in pair)
+        low, high = (evaluate_constant(one, automaton, values, "a limit") for one in pair)
         if not 0.0 <= low < high:
             label = f"the variance of `{name}` is kept from {low:g} to {high:g}"
             problems.error("observer", pair[0].span, label, "`[low, high]` with 0 <= low < high")
@@ -181,36 +186,38 @@ def variance_limits(
     return found
 
 
-def bounded(states: States, limits: Mapping[str, tuple[float, float]]) -> Block:
+def limit_covariance(states: StateNames, limits: Mapping[str, tuple[float, float]]) -> Block:
     """Keep variances within limits, covariances within what these allow; else set a fault bit."""
     ops: list[Op] = []
-    for row, column in pairs(states):
+    for row, column in state_pairs(states):
         if row not in limits or column not in limits:
             continue
         low, high = limits[row]
         if row != column:
             high = math.sqrt(limits[row][1]) * math.sqrt(limits[column][1])
             low = -high
-        value = Ref(entry(row, column))
+        value = Ref(covariance_entry(row, column))
         inside = Binary("and", Compare(">=", value, real(low)), Compare("<=", value, real(high)))
         clipped = Assign(value.name, Call("clip", (value, real(low), real(high))))
         ops.append(Branch(Unary("not", inside), (FaultBit(COVARIANCE_RANGE), clipped)))
     return tuple(ops)
 
 
-def _of(states: States, row: str, column: str) -> Ref:
+def _symmetric_entry(states: StateNames, row: str, column: str) -> Ref:
     i, j = states.index(row), states.index(column)
-    return Ref(entry(row, column) if i <= j else entry(column, row))
+    return Ref(covariance_entry(row, column) if i <= j else covariance_entry(column, row))
 
 
-def _noise(solved: SolvedNames, ahead: Ahead, row: str, column: str) -> list[Expr]:
+def _process_noise_terms(
+    solved: SolvedNames, prediction: PredictionMatrices, row: str, column: str
+) -> list[Expr]:
     states = solved.observer.states
     i, j = states.index(row), states.index(column)
     parts: list[Expr] = []
-    if ahead.numbers["Qd"][i][j] != 0.0:
-        parts.append(Ref(solved.of("Qd", row, column)))
+    if prediction.matrices["Qd"][i][j] != 0.0:
+        parts.append(Ref(solved.entry("Qd", row, column)))
     for name in states:
-        if f"N_{name}" in ahead.numbers and ahead.numbers[f"N_{name}"][i][j] != 0.0:
-            unit = Ref(solved.of(f"N_{name}", row, column))
+        if f"N_{name}" in prediction.matrices and prediction.matrices[f"N_{name}"][i][j] != 0.0:
+            unit = Ref(solved.entry(f"N_{name}", row, column))
             parts.append(times(Ref(f"work.density_{name}"), unit))
     return parts

@@ -7,17 +7,17 @@ commit. What a row does not write keeps its value. Equations are evaluated anew 
 
 from __future__ import annotations
 
-from language.action import committing, reading, work_variable
-from language.lower import Names, expression, reads_of
+from language.action import commit_stage, read_stage, stage_variable
+from language.lower import NameBindings, lower_expression, names_read
 from language.model import Automaton
 from language.operation import Assign, Binary, Block, Branch, Expr, Op, Ref, Unary
 from language.program import Variable
 from language.truth import TruthRow, TruthTable
 
-VERB = "decided"
+STAGE_NAME = "decided"
 
 
-def decision_block(automaton: Automaton, known: Names) -> Block:
+def truth_table_block(automaton: Automaton, known: NameBindings) -> Block:
     """Return `decide`: what all tables write; nothing where there is none."""
     conditions: list[Op] = []
     rows: list[Op] = []
@@ -25,59 +25,68 @@ def decision_block(automaton: Automaton, known: Names) -> Block:
         for name, formula in table.conditions.items():
             key = f"{automaton.name} {formula.key}"
             conditions.append(
-                Assign(_bit(automaton, table, name).name, expression(formula.tree, known), key)
+                Assign(
+                    _condition_ref(automaton, table, name).name,
+                    lower_expression(formula.tree, known),
+                    key,
+                )
             )
-        rows += _chain(automaton, table, known)
-    written = [name for table in automaton.tables for name in table.written]
-    return (*conditions, *rows, *committing(automaton, written, VERB))
+        rows += _lower_table(automaton, table, known)
+    written = [name for table in automaton.tables for name in table.assigned_names]
+    return (*conditions, *rows, *commit_stage(automaton, written, STAGE_NAME))
 
 
-def decided_equations(automaton: Automaton) -> bool:
+def has_table_dependent_equations(automaton: Automaton) -> bool:
     """Tell whether some equation reads what a table writes."""
-    written = {name for table in automaton.tables for name in table.written}
+    written = {name for table in automaton.tables for name in table.assigned_names}
     formulas = [formula for mode in automaton.all_modes for formula in mode.equations.values()]
-    return not written.isdisjoint(reads_of(formula.tree for formula in formulas))
+    return not written.isdisjoint(names_read(formula.tree for formula in formulas))
 
 
-def decision_variables(automaton: Automaton) -> list[Variable]:
+def truth_table_variables(automaton: Automaton) -> list[Variable]:
     """Return the work variables of the tables."""
     found: list[Variable] = []
     for table in automaton.tables:
-        found += [Variable(_bit(automaton, table, name).name, "truth") for name in table.conditions]
-        found += [work_variable(automaton, VERB, name) for name in table.written]
+        found += [
+            Variable(_condition_ref(automaton, table, name).name, "truth")
+            for name in table.conditions
+        ]
+        found += [stage_variable(automaton, STAGE_NAME, name) for name in table.assigned_names]
     return found
 
 
-def _chain(automaton: Automaton, table: TruthTable, known: Names) -> Block:
+def _lower_table(automaton: Automaton, table: TruthTable, known: NameBindings) -> Block:
     """Exactly one row holds (language/check_truth_table.py): the last one needs no question."""
     *others, last = table.rows
-    chain = _row(automaton, table, last, known)
+    chain = _lower_row(automaton, table, last, known)
     for row in reversed(others):
-        condition = _holds(automaton, table, row)
+        condition = _row_condition(automaton, table, row)
         assert condition is not None, f"{table.key}: a row beside others has no mark"
-        chain = (Branch(condition, _row(automaton, table, row, known), chain),)
+        chain = (Branch(condition, _lower_row(automaton, table, row, known), chain),)
     return chain
 
 
-def _row(automaton: Automaton, table: TruthTable, row: TruthRow, known: Names) -> Block:
+def _lower_row(
+    automaton: Automaton, table: TruthTable, row: TruthRow, known: NameBindings
+) -> Block:
     """What a row writes, and what it leaves as it is."""
     kept = [
-        Assign(f"work.{VERB}_{name}", known[name])
-        for name in table.written
-        if name not in row.results
+        Assign(f"work.{STAGE_NAME}_{name}", known[name])
+        for name in table.assigned_names
+        if name not in row.assignments
     ]
-    return (*reading(automaton, row.results, known, VERB), *kept)
+    return (*read_stage(automaton, row.assignments, known, STAGE_NAME), *kept)
 
 
-def _holds(automaton: Automaton, table: TruthTable, row: TruthRow) -> Expr | None:
+def _row_condition(automaton: Automaton, table: TruthTable, row: TruthRow) -> Expr | None:
     found: Expr | None = None
     for name, mark in zip(table.conditions, row.marks, strict=True):
         if mark is not None:
-            bit: Expr = _bit(automaton, table, name)
+            bit: Expr = _condition_ref(automaton, table, name)
             here = bit if mark else Unary("not", bit)
             found = here if found is None else Binary("and", found, here)
     return found
 
 
-def _bit(automaton: Automaton, table: TruthTable, condition: str) -> Ref:
+def _condition_ref(automaton: Automaton, table: TruthTable, condition: str) -> Ref:
     return Ref(f"work.decision_{automaton.tables.index(table) + 1}_{condition}")

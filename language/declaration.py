@@ -7,22 +7,22 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
-from language.kind import Type
+from language.kind import TypeName
 from language.problem import Span
-from language.syntax import Tree, names
+from language.syntax import SyntaxTree, names
 from language.units import Unit
 
 Range = tuple[Fraction, Fraction]
-Kind = Literal["fixed", "tunable", "derived"]
+ParameterKind = Literal["fixed", "tunable", "derived"]
 
 
 @dataclass(frozen=True)
 class Formula:
     """An expression and the key path that it stands under; `whole`: its value is whole."""
 
-    tree: Tree
+    tree: SyntaxTree
     key: str
-    whole: bool = False
+    is_integer: bool = False
 
     @cached_property
     def reads(self) -> tuple[str, ...]:
@@ -58,7 +58,7 @@ class Axis:
     name: str
     unit: Unit
     points: tuple[Fraction, ...]
-    written: tuple[str, ...] = ()
+    point_texts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Parameter:
     """
 
     name: str
-    kind: Kind
+    kind: ParameterKind
     unit: Unit
     value: Fraction | None
     derived: Formula | None
@@ -86,14 +86,14 @@ class Parameter:
     key: str
     span: Span
     fitting: Fitting = Fitting()
-    type: Type = "real"
+    type: TypeName = "real"
     values: tuple[str, ...] = ()
     table: LookupTable | None = None
     about: str = ""
 
 
 @dataclass(frozen=True)
-class Limits:
+class RangePolicy:
     """What becomes of a value outside its range (rule 18), and the fault bit that it sets.
 
     `fallback` (a value in SI, or `hold`) is for a value that is not finite.
@@ -110,17 +110,17 @@ class Input:
 
     name: str
     unit: Unit
-    type: Type
+    type: TypeName
     default: Fraction | None
     range: Range | None
     key: str
     span: Span
     values: tuple[str, ...] = ()
-    limits: Limits = Limits()
+    range_policy: RangePolicy = RangePolicy()
     about: str = ""
 
     @property
-    def truth(self) -> bool:
+    def is_bool(self) -> bool:
         """Tell whether it is true or false."""
         return self.type == "bool"
 
@@ -135,7 +135,7 @@ class State:
     range: Range | None
     key: str
     span: Span
-    type: Type = "real"
+    type: TypeName = "real"
     values: tuple[str, ...] = ()
-    limits: Limits = Limits()
+    range_policy: RangePolicy = RangePolicy()
     about: str = ""

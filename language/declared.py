@@ -2,99 +2,103 @@
 
 from __future__ import annotations
 
-from language.check_writer import equations_of
+from language.check_writer import equation_names_of
 from language.declaration import Input, Parameter, State
 from language.experiment import SystemInput
-from language.kind import Enumeration, Kind, Whole
+from language.kind import EnumType, ExprType, IntType
 from language.model import Automaton
-from language.names import report_case_twins
+from language.names import report_case_collisions
 from language.problem import Problems, Span
 
-RESERVED = ("mode", "faults")
+BUILTIN_NAMES = ("mode", "faults")
 
 
-def declared_kind(thing: Parameter | Input | State | SystemInput) -> Kind:
+def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprType:
     """Return the kind that a declaration says; a whole number lies in its range."""
-    if thing.type == "bool":
+    if declaration.type == "bool":
         return "truth"
-    if thing.type == "enum":
-        return Enumeration(thing.values)
-    if thing.type == "int":
-        if isinstance(thing, Parameter) and thing.kind == "fixed" and thing.value is not None:
-            return Whole(int(thing.value), int(thing.value))
-        limits = getattr(thing, "range", None)
-        return Whole(int(limits[0]), int(limits[1])) if limits else Whole()
-    return thing.unit.dimension
+    if declaration.type == "enum":
+        return EnumType(declaration.values)
+    if declaration.type == "int":
+        if (
+            isinstance(declaration, Parameter)
+            and declaration.kind == "fixed"
+            and declaration.value is not None
+        ):
+            return IntType(int(declaration.value), int(declaration.value))
+        limits = getattr(declaration, "range", None)
+        return IntType(int(limits[0]), int(limits[1])) if limits else IntType()
+    return declaration.unit.dimension
 
 
 def declared_names(
     automaton: Automaton, problems: Problems
-) -> tuple[dict[str, Kind], dict[str, Kind]]:
+) -> tuple[dict[str, ExprType], dict[str, ExprType]]:
     """Return the kinds of all names that are declared, and of the names in enumerations."""
-    declared = _Declared(automaton, problems)
+    declared = _DeclarationTable(automaton, problems)
     declared.declare()
-    return declared.names, declared.literals
+    return declared.kinds, declared.literal_kinds
 
 
-class _Declared:
+class _DeclarationTable:
     """What was declared so far, and where each name was given first."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
         self.automaton = automaton
         self.problems = problems
-        self.names: dict[str, Kind] = {}
-        self.literals: dict[str, Kind] = {}
-        self.first: dict[str, Span] = {}
+        self.kinds: dict[str, ExprType] = {}
+        self.literal_kinds: dict[str, ExprType] = {}
+        self.first_spans: dict[str, Span] = {}
 
     def declare(self) -> None:
         automaton = self.automaton
-        groups = (automaton.parameters, automaton.inputs, automaton.carried)
+        groups = (automaton.parameters, automaton.inputs, automaton.state_variables)
         for group in groups:
             for name, thing in group.items():
-                self._new(name, declared_kind(thing), thing.span)
+                self._declare_name(name, declared_kind(thing), thing.span)
         for group in groups:
             for thing in group.values():
                 if thing.values:
-                    self._literals(thing)
-        for name in equations_of(automaton.all_modes):
+                    self._declare_literals(thing)
+        for name in equation_names_of(automaton.all_modes):
             for mode in automaton.all_modes:
                 if name in mode.equations:
-                    self._clash(name, mode.equations[name].span)
+                    self._report_clash(name, mode.equations[name].span)
                     break
         for region in automaton.regions:
-            self._clash(region.name, region.span)
-        self._case_twins()
+            self._report_clash(region.name, region.span)
+        self._report_case_twins()
 
-    def _case_twins(self) -> None:
+    def _report_case_twins(self) -> None:
         automaton = self.automaton
-        named = list(self.first.items())
+        named = list(self.first_spans.items())
         for mode in automaton.all_modes:
             named += [(name, formula.span) for name, formula in mode.equations.items()]
-        report_case_twins(named, self.problems)
-        report_case_twins([(m.name, m.span) for m in automaton.all_modes], self.problems)
+        report_case_collisions(named, self.problems)
+        report_case_collisions([(m.name, m.span) for m in automaton.all_modes], self.problems)
 
-    def _new(self, name: str, kind: Kind, span: Span) -> None:
-        self._clash(name, span)
-        self.names[name] = kind
-        self.first.setdefault(name, span)
+    def _declare_name(self, name: str, kind: ExprType, span: Span) -> None:
+        self._report_clash(name, span)
+        self.kinds[name] = kind
+        self.first_spans.setdefault(name, span)
 
-    def _literals(self, thing: Parameter | Input | State) -> None:
+    def _declare_literals(self, declaration: Parameter | Input | State) -> None:
         """The names of an enumeration are known; two that share a name have the same list."""
-        kind = Enumeration(thing.values)
-        for value in thing.values:
-            known = self.names.get(value)
+        kind = EnumType(declaration.values)
+        for value in declaration.values:
+            known = self.kinds.get(value)
             if known is None:
-                self.names[value] = kind
-                self.first[value] = thing.span
-                self.literals[value] = kind
-            elif known != kind or value not in self.literals:
-                self._clash(value, thing.span)
+                self.kinds[value] = kind
+                self.first_spans[value] = declaration.span
+                self.literal_kinds[value] = kind
+            elif known != kind or value not in self.literal_kinds:
+                self._report_clash(value, declaration.span)
 
-    def _clash(self, name: str, span: Span) -> None:
-        if name in self.first:
-            hint = f"it is given first at {self.first[name]}"
+    def _report_clash(self, name: str, span: Span) -> None:
+        if name in self.first_spans:
+            hint = f"it is given first at {self.first_spans[name]}"
             self.problems.error(
                 "duplicate", span, f"`{name}` is already the name of something", hint
             )
-        elif name in RESERVED:
+        elif name in BUILTIN_NAMES:
             self.problems.error("name", span, f"`{name}` is a word of the language")

@@ -6,26 +6,26 @@ from collections.abc import Mapping
 
 from language.declaration import Formula
 from language.evaluate import Scalar, evaluate
-from language.lower import expression
+from language.lower import lower_expression
 from language.model import Automaton
 from language.operation import Expr, real
-from language.parameter import constant_names
-from language.syntax import Application, memory_key, names as names_of, walk
+from language.parameter import constant_bindings
+from language.syntax import FunctionCall, memory_key, names as names_of, walk
 
 
-def varies(automaton: Automaton, formula: Formula) -> bool:
+def is_time_varying(automaton: Automaton, formula: Formula) -> bool:
     """Tell whether a density reads inputs, states or what they were."""
-    memory = any(isinstance(part, Application) and part.function == "previous"
+    memory = any(isinstance(part, FunctionCall) and part.function == "previous"
                  for part in walk(formula.tree))  # fmt: skip
     reads = {read.path for read in names_of(formula.tree)}
     return memory or not reads <= set(automaton.parameters)
 
 
-def at_rest(formula: Formula, automaton: Automaton, values: Mapping[str, Scalar]) -> float:
+def density_at_rest(formula: Formula, automaton: Automaton, values: Mapping[str, Scalar]) -> float:
     """Return a density while all inputs and states are 0."""
     known: dict[str, Expr] = {n: real(0.0) for n in (*automaton.inputs, *automaton.states)}
-    known.update(constant_names(automaton))
+    known.update(constant_bindings(automaton))
     for part in walk(formula.tree):
-        if isinstance(part, Application) and part.function == "previous":
+        if isinstance(part, FunctionCall) and part.function == "previous":
             known[memory_key(part)] = real(0.0)
-    return float(evaluate(expression(formula.tree, known), values))
+    return float(evaluate(lower_expression(formula.tree, known), values))

@@ -12,155 +12,172 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from language.problem import Problems, Span, SpecError
-from language.simplify import minus, negative, number, over, plus, power, times
+from language.simplify import add, divide, make_number, multiply, negate, raise_to_power, subtract
 from language.syntax import (
-    Application,
     Arithmetic,
-    Choice,
+    BoolLiteral,
+    Conditional,
+    FunctionCall,
     Logic,
     Name,
-    Negative,
+    Negation,
     Not,
     Power,
     Relation,
-    Tree,
-    Truth,
+    SyntaxTree,
     names,
 )
 
-At = Callable[[Tree], float | bool]
+PointValue = Callable[[SyntaxTree], float | bool]
 """The value of an expression at the point. Raises SpecError where it has none there."""
 
-CONDITIONS = {"<": "<", "<=": "<", ">": ">", ">=": ">"}
+STRICT_RELATIONS = {"<": "<", "<=": "<", ">": ">", ">=": ">"}
 
 
-def derivative(tree: Tree, name: str, at: At) -> Tree:
+def differentiate(tree: SyntaxTree, name: str, value_at: PointValue) -> SyntaxTree:
     """Return d tree / d name, simplified. Raises SpecError where there is none at the point."""
     if all(read.path != name for read in names(tree)):
-        return number(0, tree.span)
+        return make_number(0, tree.span)
     match tree:
         case Name():
-            return number(1, tree.span)
-        case Negative(operand, _):
-            return negative(derivative(operand, name, at))
+            return make_number(1, tree.span)
+        case Negation(operand, _):
+            return negate(differentiate(operand, name, value_at))
         case Arithmetic(operator, left, right, _):
-            return _arithmetic(operator, left, right, name, at)
+            return _differentiate_arithmetic(operator, left, right, name, value_at)
         case Power(base, exponent, span):
-            inner = power(base, exponent - 1)
-            outer = times(number(exponent, span), inner)
-            return times(outer, derivative(base, name, at))
-        case Application("atan2", (y, x), _):
-            turn = minus(times(x, derivative(y, name, at)), times(y, derivative(x, name, at)))
-            return over(turn, plus(power(x, 2), power(y, 2)))
-        case Application("pow", (base, degree), span):
-            lower = Application("pow", (base, minus(degree, number(1, span))), span)
-            by_base = times(times(degree, lower), derivative(base, name, at))
-            by_degree = times(times(tree, _call("log", base)), derivative(degree, name, at))
-            return plus(by_base, by_degree)
-        case Application(function, (argument,), _) if function in OUTER:
-            return times(OUTER[function](argument), derivative(argument, name, at))
+            inner = raise_to_power(base, exponent - 1)
+            outer = multiply(make_number(exponent, span), inner)
+            return multiply(outer, differentiate(base, name, value_at))
+        case FunctionCall("atan2", (y, x), _):
+            turn = subtract(
+                multiply(x, differentiate(y, name, value_at)),
+                multiply(y, differentiate(x, name, value_at)),
+            )
+            return divide(turn, add(raise_to_power(x, 2), raise_to_power(y, 2)))
+        case FunctionCall("pow", (base, degree), span):
+            lower = FunctionCall("pow", (base, subtract(degree, make_number(1, span))), span)
+            by_base = multiply(multiply(degree, lower), differentiate(base, name, value_at))
+            by_degree = multiply(
+                multiply(tree, _call("log", base)), differentiate(degree, name, value_at)
+            )
+            return add(by_base, by_degree)
+        case FunctionCall(function, (argument,), _) if function in OUTER_DERIVATIVES:
+            return multiply(
+                OUTER_DERIVATIVES[function](argument), differentiate(argument, name, value_at)
+            )
         case _:
-            return derivative(taken(tree, at), name, at)
+            return differentiate(select_branch(tree, value_at), name, value_at)
 
 
-def taken(tree: Tree, at: At) -> Tree:
+def select_branch(tree: SyntaxTree, value_at: PointValue) -> SyntaxTree:
     """Return the branch that an expression takes at the point. Raises SpecError on its corner."""
     match tree:
-        case Choice(condition, then, other, _):
-            return then if decided(condition, at) else other
-        case Application("abs", (operand,), span):
-            return operand if _less(tree, number(0, span), operand, at) else negative(operand)
-        case Application("sign", (operand,), span):
-            return number(1 if _less(tree, number(0, span), operand, at) else -1, span)
-        case Application("floor", (operand,), span):
-            below = number(math.floor(at(operand)), span)
-            _less(tree, below, operand, at)
+        case Conditional(condition, then, other, _):
+            return then if decide_condition(condition, value_at) else other
+        case FunctionCall("abs", (operand,), span):
+            return (
+                operand
+                if _is_less(tree, make_number(0, span), operand, value_at)
+                else negate(operand)
+            )
+        case FunctionCall("sign", (operand,), span):
+            return make_number(
+                1 if _is_less(tree, make_number(0, span), operand, value_at) else -1, span
+            )
+        case FunctionCall("floor", (operand,), span):
+            below = make_number(math.floor(value_at(operand)), span)
+            _is_less(tree, below, operand, value_at)
             return below
-        case Application("min", (left, right), _):
-            return left if _less(tree, left, right, at) else right
-        case Application("max", (left, right), _):
-            return right if _less(tree, left, right, at) else left
-        case Application("clip", (operand, low, high), _):
-            if _less(tree, operand, low, at):
+        case FunctionCall("min", (left, right), _):
+            return left if _is_less(tree, left, right, value_at) else right
+        case FunctionCall("max", (left, right), _):
+            return right if _is_less(tree, left, right, value_at) else left
+        case FunctionCall("clip", (operand, low, high), _):
+            if _is_less(tree, operand, low, value_at):
                 return low
-            return high if _less(tree, high, operand, at) else operand
-        case Application(function, _, span):
-            raise refused(span, f"`{function}` has no derivative here")
+            return high if _is_less(tree, high, operand, value_at) else operand
+        case FunctionCall(function, _, span):
+            raise derivative_error(span, f"`{function}` has no derivative here")
         case _:
-            raise refused(tree.span, "this has no derivative")
+            raise derivative_error(tree.span, "this has no derivative")
 
 
-def decided(condition: Tree, at: At) -> bool:
+def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
     """Return a condition at the point. Raises SpecError where it changes exactly there."""
     match condition:
-        case Truth(value, _):
+        case BoolLiteral(value, _):
             return value
         case Not(operand, _):
-            return not decided(operand, at)
+            return not decide_condition(operand, value_at)
         case Logic(operator, left, right, _):
-            sides = decided(left, at), decided(right, at)
+            sides = decide_condition(left, value_at), decide_condition(right, value_at)
             return all(sides) if operator == "and" else any(sides)
-        case Relation(operator, left, right, span) if operator in CONDITIONS:
-            a, b = float(at(left)), float(at(right))
+        case Relation(operator, left, right, span) if operator in STRICT_RELATIONS:
+            a, b = float(value_at(left)), float(value_at(right))
             if a == b:
-                raise refused(span, "both sides are equal at the point: no derivative there")
-            return (a < b) == (CONDITIONS[operator] == "<")
+                raise derivative_error(
+                    span, "both sides are equal at the point: no derivative there"
+                )
+            return (a < b) == (STRICT_RELATIONS[operator] == "<")
         case _:
-            return bool(at(condition))
+            return bool(value_at(condition))
 
 
-def refused(span: Span, label: str, help: str = "") -> SpecError:
+def derivative_error(span: Span, label: str, help: str = "") -> SpecError:
     """Return the error of an expression that cannot be differentiated at the point."""
     problems = Problems()
     problems.error("derivative", span, label, help)
-    return SpecError(problems.found)
+    return SpecError(problems.reported)
 
 
-def _arithmetic(operator: str, left: Tree, right: Tree, name: str, at: At) -> Tree:
-    a, b = derivative(left, name, at), derivative(right, name, at)
+def _differentiate_arithmetic(
+    operator: str, left: SyntaxTree, right: SyntaxTree, name: str, value_at: PointValue
+) -> SyntaxTree:
+    a, b = differentiate(left, name, value_at), differentiate(right, name, value_at)
     match operator:
         case "+":
-            return plus(a, b)
+            return add(a, b)
         case "-":
-            return minus(a, b)
+            return subtract(a, b)
         case "*":
-            return plus(times(a, right), times(left, b))
+            return add(multiply(a, right), multiply(left, b))
         case _:
-            return over(minus(a, times(over(left, right), b)), right)
+            return divide(subtract(a, multiply(divide(left, right), b)), right)
 
 
-def _less(tree: Application, left: Tree, right: Tree, at: At) -> bool:
-    a, b = float(at(left)), float(at(right))
+def _is_less(tree: FunctionCall, left: SyntaxTree, right: SyntaxTree, value_at: PointValue) -> bool:
+    a, b = float(value_at(left)), float(value_at(right))
     if a == b:
         label = f"`{tree.function}` has its corner exactly at the point: no derivative there"
-        raise refused(tree.span, label, "choose another point in `at`")
+        raise derivative_error(tree.span, label, "choose another point in `at`")
     return a < b
 
 
-def _call(function: str, argument: Tree) -> Tree:
-    return Application(function, (argument,), argument.span)
+def _call(function: str, argument: SyntaxTree) -> SyntaxTree:
+    return FunctionCall(function, (argument,), argument.span)
 
 
-def _exp(u: Tree) -> Tree:
+def _exp_derivative(u: SyntaxTree) -> SyntaxTree:
     return _call("exp", u)
 
 
-def _root(u: Tree) -> Tree:
-    return over(number(Fraction(1, 2), u.span), _call("sqrt", u))
+def _sqrt_derivative(u: SyntaxTree) -> SyntaxTree:
+    return divide(make_number(Fraction(1, 2), u.span), _call("sqrt", u))
 
 
-def _bell(u: Tree) -> Tree:
-    return minus(number(1, u.span), power(_call("tanh", u), 2))
+def _tanh_derivative(u: SyntaxTree) -> SyntaxTree:
+    return subtract(make_number(1, u.span), raise_to_power(_call("tanh", u), 2))
 
 
-OUTER: Mapping[str, Callable[[Tree], Tree]] = {
+OUTER_DERIVATIVES: Mapping[str, Callable[[SyntaxTree], SyntaxTree]] = {
     "sin": lambda u: _call("cos", u),
-    "cos": lambda u: negative(_call("sin", u)),
-    "exp": _exp,
-    "log": lambda u: over(number(1, u.span), u),
-    "tanh": _bell,
-    "sqrt": _root,
-    "tan": lambda u: plus(number(1, u.span), power(_call("tan", u), 2)),
+    "cos": lambda u: negate(_call("sin", u)),
+    "exp": _exp_derivative,
+    "log": lambda u: divide(make_number(1, u.span), u),
+    "tanh": _tanh_derivative,
+    "sqrt": _sqrt_derivative,
+    "tan": lambda u: add(make_number(1, u.span), raise_to_power(_call("tan", u), 2)),
 }
 """Derivative of each smooth function of one argument."""
-SMOOTH = {*OUTER, "atan2", "pow"}
+SMOOTH_FUNCTIONS = {*OUTER_DERIVATIVES, "atan2", "pow"}

@@ -8,14 +8,22 @@ from contextlib import suppress
 
 from language.declaration import Formula
 from language.evaluate import Scalar
-from language.linear import Point, Rows, inlined, matrix, rates, remains, tangent
+from language.linear import (
+    LinearisationPoint,
+    SymbolicMatrix,
+    affine_form,
+    affine_offset,
+    inline_equations,
+    symbolic_jacobian,
+    symbolic_rates,
+)
 from language.model import Automaton, Mode, Observer
-from language.problem import Problems, SpecError, nearest
-from language.simplify import is_zero, number
-from language.syntax import Name, Number, Tree, Truth, names
+from language.problem import Problems, SpecError, suggest_name
+from language.simplify import is_zero, make_number
+from language.syntax import BoolLiteral, Name, NumberLiteral, SyntaxTree, names
 
 
-def with_model(
+def derive_observer_matrices(
     automaton: Automaton,
     name: str,
     observer: Observer,
@@ -33,26 +41,28 @@ def with_model(
         return observer
     mode = model.modes[observer.of]
     at = {name: formula.tree for name, formula in observer.at.items()}
-    with problems.collecting():
-        known = inlined(mode, _absent_inputs(automaton, observer))
-        flow = rates(mode, known)
+    with problems.collect_errors():
+        known = inline_equations(mode, _default_inputs(automaton, observer))
+        flow = symbolic_rates(mode, known)
         _check_states(automaton, observer, mode, flow)
-        seen = _measured(observer, mode, known)
-        point = Point(automaton, values, at)
+        seen = _output_equations(observer, mode, known)
+        point = LinearisationPoint(automaton, values, at)
         balances = {name: flow[name] for name in observer.states}
-        a = matrix(balances, observer.states, point)
-        c = matrix(seen, observer.states, point)
+        a = symbolic_jacobian(balances, observer.states, point)
+        c = symbolic_jacobian(seen, observer.states, point)
         _check_constant(automaton, observer, {"A": a, "C": c})
-        b = _inputs(automaton, balances, point)
+        b = _input_matrix(automaton, balances, point)
         inputs = tuple(u for u in automaton.inputs if any(u in row for row in b.values()))
-        f, f_constants = _rests(balances, (*observer.states, *inputs), point, f"{name}_f_constant")
-        g, g_constants = _rests(seen, observer.states, point, f"{name}_g_constant")
+        f, f_constants = _affine_offsets(
+            balances, (*observer.states, *inputs), point, f"{name}_f_constant"
+        )
+        g, g_constants = _affine_offsets(seen, observer.states, point, f"{name}_g_constant")
         return dataclasses.replace(
             observer,
             inputs=inputs,
-            a=_formulas(a, f"{observer.key}.A"),
-            b=_formulas(b, f"{observer.key}.B"),
-            c=_formulas(c, f"{observer.key}.C"),
+            a=_to_formulas(a, f"{observer.key}.A"),
+            b=_to_formulas(b, f"{observer.key}.B"),
+            c=_to_formulas(c, f"{observer.key}.C"),
             f={row: Formula(tree, f"{observer.key}.of") for row, tree in f.items()},
             g={row: Formula(tree, f"{observer.key}.g.{row}") for row, tree in g.items()},
             constants={
@@ -63,20 +73,20 @@ def with_model(
     return None
 
 
-def _absent_inputs(automaton: Automaton, observer: Observer) -> dict[str, Tree]:
+def _default_inputs(automaton: Automaton, observer: Observer) -> dict[str, SyntaxTree]:
     """Inputs of the model that are none of ours have their default, as in a run."""
     assert automaton.model
-    found: dict[str, Tree] = {}
+    found: dict[str, SyntaxTree] = {}
     for name, thing in automaton.model.inputs.items():
         if name not in automaton.inputs and thing.default is not None:
             default = thing.default
-            truth = Truth(bool(default), observer.span)
-            found[name] = truth if thing.type == "bool" else number(default, observer.span)
+            truth = BoolLiteral(bool(default), observer.span)
+            found[name] = truth if thing.type == "bool" else make_number(default, observer.span)
     return found
 
 
 def _check_states(
-    automaton: Automaton, observer: Observer, mode: Mode, flow: Mapping[str, Tree]
+    automaton: Automaton, observer: Observer, mode: Mode, flow: Mapping[str, SyntaxTree]
 ) -> None:
     """What the observer leaves out stands still in that mode and has a value here."""
     problems = Problems()
@@ -84,10 +94,10 @@ def _check_states(
     for name in observer.states:
         if name not in flow:
             label = f"`{name}` is not a state of `{automaton.model.name}`"
-            problems.error("observer", observer.span, label, nearest(name, flow))
-    problems.stop_if_any()
+            problems.error("observer", observer.span, label, suggest_name(name, flow))
+    problems.raise_if_errors()
     for name, tree in flow.items():
-        if name not in observer.states and not observer.runs and not is_zero(tree):
+        if name not in observer.states and not observer.predicts_by_run and not is_zero(tree):
             label = f"`{name}` moves in `{automaton.model.name}.{mode.name}`: the observer has to "
             problems.error("observer", observer.span, f"{label}have it among its states")
     known = {*automaton.parameters, *automaton.inputs, *automaton.states}
@@ -97,17 +107,21 @@ def _check_states(
                 label = f"the balance of `{name}` reads `{read.path}`, which has no value here"
                 help = f"give `{automaton.name}` a state or an input `{read.path}`"
                 problems.error("observer", observer.span, label, help)
-    problems.stop_if_any()
+    problems.raise_if_errors()
 
 
-def _measured(observer: Observer, mode: Mode, known: Mapping[str, Tree]) -> dict[str, Tree]:
-    found: dict[str, Tree] = {}
+def _output_equations(
+    observer: Observer, mode: Mode, known: Mapping[str, SyntaxTree]
+) -> dict[str, SyntaxTree]:
+    found: dict[str, SyntaxTree] = {}
     for measure, name in observer.measures.items():
         found[measure] = known[name] if name in mode.equations else Name(name, observer.span)
     return found
 
 
-def _check_constant(automaton: Automaton, observer: Observer, matrices: Mapping[str, Rows]) -> None:
+def _check_constant(
+    automaton: Automaton, observer: Observer, matrices: Mapping[str, SymbolicMatrix]
+) -> None:
     problems = Problems()
     known = [(what, row, m[row]) for what, m in matrices.items() for row in m]
     for what, row, entries in known:
@@ -117,17 +131,19 @@ def _check_constant(automaton: Automaton, observer: Observer, matrices: Mapping[
                     label = f"{what} has no constant entry {row}, {column}: it depends on `{name}`"
                     help = f"give the point: `at: {{{name}: ...}}`, made of parameters"
                     problems.error("observer", observer.span, label, help)
-    problems.stop_if_any()
+    problems.raise_if_errors()
 
 
-def _inputs(automaton: Automaton, balances: Mapping[str, Tree], point: Point) -> Rows:
+def _input_matrix(
+    automaton: Automaton, balances: Mapping[str, SyntaxTree], point: LinearisationPoint
+) -> SymbolicMatrix:
     """The columns of B: of the inputs that enter linearly; any other stays in f by its value."""
-    found: Rows = {}
+    found: SymbolicMatrix = {}
     for name, thing in automaton.inputs.items():
         if thing.type != "real":
             continue
         try:
-            column = matrix(balances, (name,), point)
+            column = symbolic_jacobian(balances, (name,), point)
         except SpecError:
             continue
         if all(_is_constant(automaton, row[name]) for row in column.values()):
@@ -136,34 +152,37 @@ def _inputs(automaton: Automaton, balances: Mapping[str, Tree], point: Point) ->
     return found
 
 
-def _rests(
-    trees: Mapping[str, Tree], columns: tuple[str, ...], point: Point, prefix: str
-) -> tuple[dict[str, Tree], dict[str, Tree]]:
+def _affine_offsets(
+    trees: Mapping[str, SyntaxTree],
+    columns: tuple[str, ...],
+    point: LinearisationPoint,
+    prefix: str,
+) -> tuple[dict[str, SyntaxTree], dict[str, SyntaxTree]]:
     """Return what is neither A x nor B u, as sums of slope * value and a constant, and these."""
-    found: dict[str, Tree] = {}
-    constants: dict[str, Tree] = {}
+    found: dict[str, SyntaxTree] = {}
+    constants: dict[str, SyntaxTree] = {}
     for row, tree in trees.items():
-        left = remains(tree, columns, point)
+        left = affine_offset(tree, columns, point)
         reads = dict.fromkeys(read.path for read in names(left))
         values = [name for name in reads if name not in point.automaton.parameters]
         with suppress(SpecError):  # what does not enter linearly is read as it stands
-            slopes = matrix({row: left}, values, point).get(row, {})
+            slopes = symbolic_jacobian({row: left}, values, point).get(row, {})
             if all(_is_constant(point.automaton, slope) for slope in slopes.values()):
-                constant = remains(left, values, point)
-                if not isinstance(constant, Number):
+                constant = affine_offset(left, values, point)
+                if not isinstance(constant, NumberLiteral):
                     constants[f"{prefix}.{row}"] = constant
                     constant = Name(f"{prefix}.{row}", tree.span)
-                left = tangent(slopes, constant)
+                left = affine_form(slopes, constant)
         if not is_zero(left):
             found[row] = left
     return found, constants
 
 
-def _is_constant(automaton: Automaton, tree: Tree) -> bool:
+def _is_constant(automaton: Automaton, tree: SyntaxTree) -> bool:
     return all(read.path in automaton.parameters for read in names(tree))
 
 
-def _formulas(rows: Rows, key: str) -> dict[str, dict[str, Formula]]:
+def _to_formulas(rows: SymbolicMatrix, key: str) -> dict[str, dict[str, Formula]]:
     return {
         row: {column: Formula(tree, f"{key}.{row}.{column}") for column, tree in entries.items()}
         for row, entries in rows.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from fractions import Fraction
 
-from language.document import Node
+from language.document import YamlNode
 from language.problem import Span
 from language.reader import Reader
 from language.units import Unit
@@ -14,13 +14,15 @@ LABEL = "a temperature in degC is a point, not a difference"
 HINT = "write a difference in K"
 
 
-def difference(reader: Reader, node: Node | None, what: str, span: Span, unit: Unit) -> Fraction:
+def read_difference(
+    reader: Reader, node: YamlNode | None, what: str, span: Span, unit: Unit
+) -> Fraction:
     """Return a literal in SI; a bare number is in `unit`, whose zero has no influence.
 
     One with a unit that has a zero of its own (degC) is a point: reported.
     """
     own_zero = dataclasses.replace(unit, offset=Fraction(0))
-    value, own = reader.quantity(node, what, span, own_zero)
+    value, own = reader.read_quantity(node, what, span, own_zero)
     if own.offset:
         reader.problems.error("dimension", node.span if node else span, LABEL, HINT)
     return value

@@ -18,7 +18,7 @@ LINE_END = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
 
 
 @dataclass(frozen=True)
-class Scalar:
+class ScalarNode:
     """A leaf: its text as written (quotes removed), resolved by who reads it.
 
     `changes` are the places of the overlays that rewrote a part of the text, in order.
@@ -33,8 +33,8 @@ class Scalar:
     def text_span(self) -> Span:
         """The place of the first character of the text itself, behind an opening quote."""
         if self.changes:
-            return dataclasses.replace(self.span, whole=True)
-        return self.span.inside(1, len(self.text)) if self.quoted else self.span
+            return dataclasses.replace(self.span, is_atomic=True)
+        return self.span.subspan(1, len(self.text)) if self.quoted else self.span
 
 
 @dataclass(frozen=True)
@@ -43,23 +43,23 @@ class Entry:
 
     key: str
     span: Span
-    node: Node
+    node: YamlNode
 
     @property
     def text_span(self) -> Span:
         """The place of the key itself, without its quotes."""
         is_quoted = self.span.width == len(self.key) + 2
-        return self.span.inside(1, len(self.key)) if is_quoted else self.span
+        return self.span.subspan(1, len(self.key)) if is_quoted else self.span
 
 
 @dataclass(frozen=True)
-class Table:
+class MappingNode:
     """A mapping, in the order of the file."""
 
     entries: dict[str, Entry]
     span: Span
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> YamlNode | None:
         """Return the value of a key, or None."""
         entry = self.entries.get(key)
         return entry.node if entry else None
@@ -70,14 +70,14 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Items:
+class SequenceNode:
     """A sequence."""
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[YamlNode, ...]
     span: Span
 
 
-Node = Scalar | Table | Items
+YamlNode = ScalarNode | MappingNode | SequenceNode
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Document:
     kind: str
     name: str
     name_span: Span
-    root: Table
+    root: MappingNode
     source: Source = field(repr=False)
 
 
@@ -99,12 +99,12 @@ def require_kind(document: Document, kind: str, problems: Problems) -> None:
         )
         label = f"`{document.name}` is {given}, not {wanted}"
         problems.error("form", document.name_span, label)
-        problems.stop_if_any()
+        problems.raise_if_errors()
 
 
-def read_text(path: Path, shown: str | None = None) -> tuple[Source, str]:
+def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]:
     """Read a file as UTF-8 text. Raises SpecError for a missing, huge or binary file."""
-    name = shown or str(path)
+    name = display_name or str(path)
     place = Span(Source(name), 1, 1)
     problems = Problems()
     try:
@@ -113,24 +113,24 @@ def read_text(path: Path, shown: str | None = None) -> tuple[Source, str]:
         if not stat.S_ISREG(status.st_mode):
             label = "the file cannot be read: it is a folder, a pipe or a device"
             problems.error("unreadable", place, label)
-        problems.stop_if_any()
+        problems.raise_if_errors()
         data = path.read_bytes() if size <= MAX_BYTES else b""
     except OSError as error:
         problems.error("unreadable", place, f"the file cannot be read: {error.strerror}")
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None
     except ValueError:
         problems.error("unreadable", place, "this is not the name of a file")
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None
     if size > MAX_BYTES:
         problems.error("huge", place, f"the file has {size} bytes; a spec has at most {MAX_BYTES}")
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         place = Span(Source(name), line, 1)
         problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None
     return Source(name, lines_of(text)), text
 
 

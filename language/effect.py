@@ -5,23 +5,46 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from language.check_effect import check_functions, check_holes, check_parameters, report_hole
-from language.document import Document, Entry, Node, Scalar, Table, require_kind
+from language.check_effect import (
+    check_functions,
+    check_holes,
+    check_parameters,
+    report_unknown_hole,
+)
+from language.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
 from language.names import check_name
 from language.parse import parse_balance, parse_expression
-from language.passage import EFFECT, Path, changed
-from language.problem import Problems, Span, nearest
+from language.passage import EFFECT_SITES, KeyPath, map_formulas
+from language.problem import Problems, Span, suggest_name
 from language.reader import Reader
-from language.syntax import Name, Tree, names
+from language.syntax import Name, SyntaxTree, names
 from language.units import Dimension
 
-FindEffect = Callable[[str, Span], Document]
+EffectLookup = Callable[[str, Span], Document]
 """From an effect's name (asked for at a place) to its document."""
 
-TEXT_KEYS = ("signature", "confused_with", "separated_by", "references")
-ADDED = ("parameters", "states", "equations", "flow", "terms", "discrete", "elements", "regions")
-EFFECT_KEYS = ("language", "effect", "at", "reads", *ADDED, "redirect", "move", *TEXT_KEYS)
-FIT_KEYS = {
+DESCRIPTION_KEYS = ("signature", "confused_with", "separated_by", "references")
+ADDED_SECTIONS = (
+    "parameters",
+    "states",
+    "equations",
+    "flow",
+    "terms",
+    "discrete",
+    "elements",
+    "regions",
+)
+EFFECT_KEYS = (
+    "language",
+    "effect",
+    "at",
+    "reads",
+    *ADDED_SECTIONS,
+    "redirect",
+    "move",
+    *DESCRIPTION_KEYS,
+)
+PLACE_PATTERN_KEYS = {
     "balance": ("of", "unit", "has"),
     "input": ("unit", "has"),
     "output": ("unit", "has"),
@@ -31,7 +54,7 @@ ELEMENT_PARTS = (
     *("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
     *("speed", "inertia"),
 )
-HOLES = {
+HOLES_BY_PLACE_KIND = {
     "balance": ("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
     "input": ("u", "unit", "unit_rate"),
     "output": ("y", "unit", "unit_rate"),
@@ -44,7 +67,7 @@ HOLES = {
 
 
 @dataclass(frozen=True)
-class Fit:
+class PlacePattern:
     """One kind of place where an effect fits."""
 
     kind: str
@@ -60,8 +83,8 @@ class Effect:
 
     name: str
     about: str
-    fits: tuple[Fit, ...]
-    body: Table
+    place_patterns: tuple[PlacePattern, ...]
+    body: MappingNode
     signature: str
     confused_with: tuple[str, ...]
     separated_by: tuple[str, ...]
@@ -70,12 +93,12 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Laying:
+class EffectApplication:
     """An effect with the place where it is asked for: one entry of `effects`."""
 
     effect: Effect
     place: str
-    ending: str
+    suffix: str
     rename: Mapping[str, Entry]
     values: Mapping[str, Entry]
     span: Span
@@ -83,10 +106,10 @@ class Laying:
     @property
     def place_span(self) -> Span:
         """Where the place is written, behind the `@`."""
-        return self.span.inside(len(self.effect.name) + 1, len(self.place))
+        return self.span.subspan(len(self.effect.name) + 1, len(self.place))
 
     @property
-    def title(self) -> str:
+    def layer_name(self) -> str:
         """The name of the layer."""
         return f"effect {self.effect.name}@{self.place}"
 
@@ -97,65 +120,71 @@ def read_effect(document: Document, problems: Problems) -> Effect:
     return _EffectReader(problems).read(document)
 
 
-def read_laying(entry: Entry, find: FindEffect, problems: Problems) -> Laying:
+def read_effect_application(
+    entry: Entry, lookup: EffectLookup, problems: Problems
+) -> EffectApplication:
     """Read one entry of `effects`: `name@place: {values: ..., as: ..., rename: ...}`."""
     reader = Reader(problems)
     name, sign, place = entry.key.partition("@")
     if not (name and sign and place):
         label = f"`{entry.key}` does not say where the effect is laid"
         problems.error("effect", entry.span, label, "`coulomb_friction@w_em`: effect, place")
-        problems.stop_if_any()
-    table = reader.table(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
-    ending = reader.text(table.get("as"), "as", entry.span) if "as" in table.entries else place
-    values = _scalars(reader, table.get("values"), f"effects.{entry.key}.values")
-    rename = _scalars(reader, table.get("rename"), f"effects.{entry.key}.rename")
-    effect = read_effect(find(name, entry.span.inside(0, len(name))), problems)
-    problems.stop_if_any()
-    return Laying(effect, place, ending, rename, values, entry.span)
+        problems.raise_if_errors()
+    table = reader.read_mapping(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
+    ending = (
+        reader.read_string(table.get("as"), "as", entry.span) if "as" in table.entries else place
+    )
+    values = _read_scalar_entries(reader, table.get("values"), f"effects.{entry.key}.values")
+    rename = _read_scalar_entries(reader, table.get("rename"), f"effects.{entry.key}.rename")
+    effect = read_effect(lookup(name, entry.span.subspan(0, len(name))), problems)
+    problems.raise_if_errors()
+    return EffectApplication(effect, place, ending, rename, values, entry.span)
 
 
-def own_names(body: Table) -> dict[str, Span]:
+def added_names(body: MappingNode) -> dict[str, Span]:
     """Return the names that an effect adds and expressions may read."""
-    found: dict[str, Span] = {}
+    spans: dict[str, Span] = {}
     for section in ("parameters", "states", "discrete", "equations"):
         for entry in _entries(body.get(section)):
             if not entry.key.startswith("$"):
-                found.setdefault(entry.key, entry.span)
+                spans.setdefault(entry.key, entry.span)
     for entry in _region_equations(body.get("regions")):
-        found.setdefault(entry.key, entry.span)
-    return found
+        spans.setdefault(entry.key, entry.span)
+    return spans
 
 
-def foreign_names(body: Table) -> list[str]:
+def external_names(body: MappingNode) -> list[str]:
     """Return the names that expressions of an effect read, neither holes nor its own."""
-    own, found = own_names(body), dict[str, None]()
+    own, found = added_names(body), dict[str, None]()
 
-    def look(path: Path, scalar: Scalar) -> Scalar:
-        for name in (name for part in _parsed(path, scalar, Problems()) for name in names(part)):
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        for name in (
+            name for part in _parse_formula(path, scalar, Problems()) for name in names(part)
+        ):
             if not (name.path.startswith("$") or name.path in own or name.path == "base"):
                 found.setdefault(name.path)
         return scalar
 
-    changed(body, EFFECT, look)
+    map_formulas(body, EFFECT_SITES, look)
     return list(found)
 
 
-def _region_equations(node: Node | None) -> Iterator[Entry]:
+def _region_equations(node: YamlNode | None) -> Iterator[Entry]:
     for owner in _entries(node):
-        if isinstance(owner.node, Table):
+        if isinstance(owner.node, MappingNode):
             yield from _entries(owner.node.get("equations"))
             yield from _region_equations(owner.node.get("modes"))
 
 
-def _entries(node: Node | None) -> Iterator[Entry]:
-    if isinstance(node, Table):
+def _entries(node: YamlNode | None) -> Iterator[Entry]:
+    if isinstance(node, MappingNode):
         yield from node
 
 
-def _scalars(reader: Reader, node: Node | None, what: str) -> dict[str, Entry]:
+def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> dict[str, Entry]:
     found = {}
-    for entry in reader.table(node, what):
-        if reader.scalar(entry.node, entry.key, entry.span):
+    for entry in reader.read_mapping(node, what):
+        if reader.read_scalar(entry.node, entry.key, entry.span):
             found[entry.key] = entry
     return found
 
@@ -164,106 +193,108 @@ class _EffectReader(Reader):
     """The sections of an effect, one method each."""
 
     def read(self, document: Document) -> Effect:
-        tree = self.table(document.root, f"effect {document.name}", EFFECT_KEYS)
+        tree = self.read_mapping(document.root, f"effect {document.name}", EFFECT_KEYS)
         check_name(document.name, document.name_span, self.problems)
-        fits = self._fits(tree.get("at"), document.name_span)
-        self._sections(tree)
+        fits = self._read_place_patterns(tree.get("at"), document.name_span)
+        self._check_sections(tree)
         check_parameters(tree, self.problems)
-        self._names(tree, fits)
+        self._check_names(tree, fits)
         about = tree.get("about")
         signature = tree.get("signature")
         return Effect(
             name=document.name,
-            about=about.text if isinstance(about, Scalar) else "",
-            fits=fits,
+            about=about.text if isinstance(about, ScalarNode) else "",
+            place_patterns=fits,
             body=tree,
-            signature=signature.text if isinstance(signature, Scalar) else "",
-            confused_with=self._texts(tree, "confused_with"),
-            separated_by=self._texts(tree, "separated_by"),
-            references=self._texts(tree, "references"),
+            signature=signature.text if isinstance(signature, ScalarNode) else "",
+            confused_with=self._read_texts(tree, "confused_with"),
+            separated_by=self._read_texts(tree, "separated_by"),
+            references=self._read_texts(tree, "references"),
             span=document.name_span,
         )
 
-    def _texts(self, tree: Table, key: str) -> tuple[str, ...]:
-        return tuple(item.text for item in self.items(tree.get(key), key))
+    def _read_texts(self, tree: MappingNode, key: str) -> tuple[str, ...]:
+        return tuple(item.text for item in self.read_list(tree.get(key), key))
 
-    def _fits(self, node: Node | None, span: Span) -> tuple[Fit, ...]:
-        table = self.table(node, "at", FIT_KEYS)
+    def _read_place_patterns(self, node: YamlNode | None, span: Span) -> tuple[PlacePattern, ...]:
+        table = self.read_mapping(node, "at", PLACE_PATTERN_KEYS)
         if not table.entries:
             self.problems.error("missing", span, "an effect says `at` what place it fits")
-        return tuple(self._fit(entry) for entry in table if entry.key in FIT_KEYS)
+        return tuple(
+            self._read_place_pattern(entry) for entry in table if entry.key in PLACE_PATTERN_KEYS
+        )
 
-    def _fit(self, entry: Entry) -> Fit:
+    def _read_place_pattern(self, entry: Entry) -> PlacePattern:
         what = f"at.{entry.key}"
-        table = self.table(entry.node, what, FIT_KEYS[entry.key])
-        of = self.choice(table.get("of"), "of", ("rate",), "")
-        of = self.choice(table.get("kind"), "kind", ("elastic", "inertia"), of)
+        table = self.read_mapping(entry.node, what, PLACE_PATTERN_KEYS[entry.key])
+        of = self.read_choice(table.get("of"), "of", ("rate",), "")
+        of = self.read_choice(table.get("kind"), "kind", ("elastic", "inertia"), of)
         if entry.key == "element" and not of:
             self.problems.error("missing", entry.span, f"`{what}.kind` is missing")
-        unit = self.unit(table.get("unit")).dimension if "unit" in table.entries else None
-        has = tuple(item.text for item in self.items(table.get("has"), "has"))
-        return Fit(entry.key, of, unit, has, entry.span)
+        unit = self.read_unit(table.get("unit")).dimension if "unit" in table.entries else None
+        has = tuple(item.text for item in self.read_list(table.get("has"), "has"))
+        return PlacePattern(entry.key, of, unit, has, entry.span)
 
-    def _sections(self, tree: Table) -> None:
+    def _check_sections(self, tree: MappingNode) -> None:
         """Names are names, and only what is named is changed."""
         for section in ("parameters", "states", "discrete", "elements", "regions", "flow"):
-            for entry in self.table(tree.get(section), section):
+            for entry in self.read_mapping(tree.get(section), section):
                 check_name(entry.key, entry.span, self.problems)
-        for entry in self.table(tree.get("equations"), "equations"):
+        for entry in self.read_mapping(tree.get("equations"), "equations"):
             if not entry.key.startswith("$"):
                 check_name(entry.key, entry.span, self.problems)
-        for entry in self.table(tree.get("terms"), "terms"):
-            for _ in self.named(entry.node, f"terms.{entry.key}"):
+        for entry in self.read_mapping(tree.get("terms"), "terms"):
+            for _ in self.named_entries(entry.node, f"terms.{entry.key}"):
                 pass
-        for entry in self.table(tree.get("flow"), "flow"):
-            if entry.key not in {e.key for e in self.table(tree.get("states"), "states")}:
+        for entry in self.read_mapping(tree.get("flow"), "flow"):
+            if entry.key not in {e.key for e in self.read_mapping(tree.get("states"), "states")}:
                 label = f"`{entry.key}` is not a state of the effect"
                 hint = "a summand of another balance is one of its `terms`"
                 self.problems.error("effect", entry.span, label, hint)
-        self.table(tree.get("redirect"), "redirect")
-        self.table(tree.get("move"), "move")
+        self.read_mapping(tree.get("redirect"), "redirect")
+        self.read_mapping(tree.get("move"), "move")
 
-    def _names(self, tree: Table, fits: tuple[Fit, ...]) -> None:
+    def _check_names(self, tree: MappingNode, fits: tuple[PlacePattern, ...]) -> None:
         """Expressions read what the effect brings, holes, and what it `reads` of a model."""
-        own = own_names(tree)
-        reads = {item.text: item for item in self.items(tree.get("reads"), "reads")}
+        own = added_names(tree)
+        reads = {item.text: item for item in self.read_list(tree.get("reads"), "reads")}
         for name, item in reads.items():
             check_name(name, item.span, self.problems)
             if name in own:
                 label = f"`{name}` is the effect's own: it is not read of the model"
                 self.problems.error("effect", item.span, label)
-        known = {f"${hole}" for fit in fits for hole in (*HOLES[fit.kind], *fit.has)}
+        known = {f"${hole}" for fit in fits for hole in (*HOLES_BY_PLACE_KIND[fit.kind], *fit.has)}
         check_holes(tree, known, self.problems)
 
-        def check(path: Path, scalar: Scalar) -> Scalar:
+        def check(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
             if path[:2] == ("redirect", "except"):
                 return scalar
             allowed = {*known, *own, *reads}
             if path[0] == "equations" and path[1].startswith("$"):
                 allowed.add("base")
-            for part in _parsed(path, scalar, self.problems):
+            for part in _parse_formula(path, scalar, self.problems):
                 check_functions(part, self.problems)
                 for name in names(part):
-                    self._known(name, allowed)
+                    self._check_name_is_known(name, allowed)
             return scalar
 
-        changed(tree, EFFECT, check)
+        map_formulas(tree, EFFECT_SITES, check)
 
-    def _known(self, name: Name, allowed: set[str]) -> None:
+    def _check_name_is_known(self, name: Name, allowed: set[str]) -> None:
         if name.path in allowed or "." in name.path:
             return
         if name.path.startswith("$"):
-            report_hole(name.path, name.span, allowed, self.problems)
+            report_unknown_hole(name.path, name.span, allowed, self.problems)
             return
         label = f"`{name.path}` is neither a hole nor a name of this effect"
-        hint = nearest(name.path, allowed)
+        hint = suggest_name(name.path, allowed)
         if not hint and name.path != "base":
             hint = f"or `reads: [{name.path}]` says that it is one of the model"
         self.problems.error("effect", name.span, label, hint)
 
 
-def _parsed(path: Path, scalar: Scalar, problems: Problems) -> tuple[Tree, ...]:
-    with problems.collecting():
+def _parse_formula(path: KeyPath, scalar: ScalarNode, problems: Problems) -> tuple[SyntaxTree, ...]:
+    with problems.collect_errors():
         if path[0] == "flow" or path[-2:-1] == ("flow",):
             return parse_balance(scalar)
         return (parse_expression(scalar),)

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 
-from language.matrix import Matrix, balancing, require_finite, shift
+from language.matrix import Matrix, balancing_exponents, require_finite, scale_by_powers
 
-Row = list[complex]
+ComplexRow = list[complex]
 
-SWEEPS = 60
+MAX_QR_SWEEPS = 60
 """Shifted QR steps per eigenvalue: a few are needed; the bound only makes the end certain."""
-NEGLIGIBLE = 2.0**-53
+DEFLATION_TOLERANCE = 2.0**-53
 """A subdiagonal entry of that size beside its diagonal is rounding (Golub and Van Loan, 7.5.1)."""
-NUDGE = 2.0**-40
+SHIFT_PERTURBATION = 2.0**-40
 """Part of an eigenvalue by which inverse iteration stays away from it: A - lambda is singular."""
 
 
@@ -29,30 +29,30 @@ def eigenvalues(a: Matrix) -> tuple[complex, ...]:
     require_finite("eigenvalues: A", a)
     if len(a[0]) != len(a):
         raise ValueError("eigenvalues: A is not square")
-    exponents = balancing(a)
-    balanced = shift(a, tuple(-e for e in exponents), exponents)
-    rows = _hessenberg([[complex(x) for x in row] for row in balanced])
-    found: list[complex] = []
+    exponents = balancing_exponents(a)
+    balanced = scale_by_powers(a, tuple(-e for e in exponents), exponents)
+    rows = _reduce_to_hessenberg([[complex(x) for x in row] for row in balanced])
+    values: list[complex] = []
     while rows:
         last = len(rows) - 1
-        for _ in range(SWEEPS):
-            start = _last_block(rows)
+        for _ in range(MAX_QR_SWEEPS):
+            start = _active_block_start(rows)
             if start == last:
                 break
             _qr_step(rows, start)
-        found.append(rows[last][last])
+        values.append(rows[last][last])
         rows = [row[:last] for row in rows[:last]]
-    return tuple(found)
+    return tuple(values)
 
 
-def governing_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
+def dominant_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
     """Return row and column of the entry that an eigenvalue of A (n, n) hangs on most.
 
     lambda = sum of y_i A_ij x_j / (y' x) with its left and right vectors: the largest summand,
     which no change of units alters.
     """
-    right = _vector(a, eigenvalue)
-    left = _vector(tuple(zip(*a, strict=True)), eigenvalue)
+    right = _eigenvector(a, eigenvalue)
+    left = _eigenvector(tuple(zip(*a, strict=True)), eigenvalue)
     sizes = {
         (i, j): abs(left[i] * entry * right[j])
         for i, row in enumerate(a)
@@ -61,7 +61,7 @@ def governing_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
     return max(sizes, key=lambda place: sizes[place])
 
 
-def _hessenberg(rows: list[Row]) -> list[Row]:
+def _reduce_to_hessenberg(rows: list[ComplexRow]) -> list[ComplexRow]:
     """Eliminate below the subdiagonal by similarity, with pivoting (elmhes of EISPACK)."""
     n = len(rows)
     for m in range(1, n - 1):
@@ -80,33 +80,33 @@ def _hessenberg(rows: list[Row]) -> list[Row]:
     return rows
 
 
-def _last_block(rows: list[Row]) -> int:
+def _active_block_start(rows: list[ComplexRow]) -> int:
     """Return where the last block begins that is not split off yet."""
     for k in range(len(rows) - 1, 0, -1):
         beside = abs(rows[k][k]) + abs(rows[k - 1][k - 1])
-        if abs(rows[k][k - 1]) <= NEGLIGIBLE * beside or rows[k][k - 1] == 0:
+        if abs(rows[k][k - 1]) <= DEFLATION_TOLERANCE * beside or rows[k][k - 1] == 0:
             rows[k][k - 1] = 0j
             return k
     return 0
 
 
-def _qr_step(rows: list[Row], start: int) -> None:
+def _qr_step(rows: list[ComplexRow], start: int) -> None:
     """A - mu I = Q R, then R Q + mu I, on the rows and columns from `start`."""
     n = len(rows)
-    mu = _wilkinson(rows)
+    mu = _wilkinson_shift(rows)
     for k in range(start, n):
         rows[k][k] -= mu
-    turns: list[tuple[complex, complex]] = []
+    rotations: list[tuple[complex, complex]] = []
     for k in range(start, n - 1):
         x, y = rows[k][k], rows[k + 1][k]
         size = math.hypot(abs(x), abs(y))
         c, s = (x / size, y / size) if size else (1 + 0j, 0j)
-        turns.append((c, s))
+        rotations.append((c, s))
         for j in range(k, n):
             p, q = rows[k][j], rows[k + 1][j]
             rows[k][j] = c.conjugate() * p + s.conjugate() * q
             rows[k + 1][j] = c * q - s * p
-    for k, (c, s) in enumerate(turns, start=start):
+    for k, (c, s) in enumerate(rotations, start=start):
         for i in range(start, min(k + 2, n)):
             p, q = rows[i][k], rows[i][k + 1]
             rows[i][k] = p * c + q * s
@@ -115,23 +115,23 @@ def _qr_step(rows: list[Row], start: int) -> None:
         rows[k][k] += mu
 
 
-def _wilkinson(rows: list[Row]) -> complex:
+def _wilkinson_shift(rows: list[ComplexRow]) -> complex:
     """Return the eigenvalue of the last 2 x 2 block that is nearer to its last entry."""
     (a, b), (c, d) = rows[-2][-2:], rows[-1][-2:]
     half = 0.5 * (a - d)
     root = (half * half + b * c) ** 0.5
-    one, other = d + half + root, d + half - root
-    return one if abs(one - d) <= abs(other - d) else other
+    plus_root, minus_root = d + half + root, d + half - root
+    return plus_root if abs(plus_root - d) <= abs(minus_root - d) else minus_root
 
 
-def _vector(a: Matrix, eigenvalue: complex) -> Row:
+def _eigenvector(a: Matrix, eigenvalue: complex) -> ComplexRow:
     """Return the vector of an eigenvalue by two steps of inverse iteration."""
     n = len(a)
     scale = max(abs(eigenvalue), max(abs(x) for row in a for x in row), 1e-300)
-    shifted = eigenvalue + NUDGE * scale
-    vector: Row = [1.0 + 0.1j * i for i in range(n)]
+    shifted = eigenvalue + SHIFT_PERTURBATION * scale
+    vector: ComplexRow = [1.0 + 0.1j * i for i in range(n)]
     for _ in range(2):
-        vector = _solved(
+        vector = _solve_linear(
             [
                 [(-shifted if i == j else 0j) + x for j, x in enumerate(row)]
                 for i, row in enumerate(a)
@@ -143,15 +143,15 @@ def _vector(a: Matrix, eigenvalue: complex) -> Row:
     return vector
 
 
-def _solved(rows: list[Row], right: Row) -> Row:
+def _solve_linear(rows: list[ComplexRow], rhs: ComplexRow) -> ComplexRow:
     """Solve by elimination with partial pivoting; a pivot of zero is taken as a tiny one."""
     n = len(rows)
-    work = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    work = [[*row, value] for row, value in zip(rows, rhs, strict=True)]
     for k in range(n):
         pivot = max(range(k, n), key=lambda i: abs(work[i][k]))
         work[k], work[pivot] = work[pivot], work[k]
         if work[k][k] == 0:
-            work[k][k] = complex(NUDGE)
+            work[k][k] = complex(SHIFT_PERTURBATION)
         for row in work[k + 1 :]:
             factor = row[k] / work[k][k]
             for j in range(k, n + 1):

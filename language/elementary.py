@@ -34,15 +34,15 @@ from language.operation import (
 )
 from language.program import Function
 
-ROUND = real(1.5 * 2.0**52)
+ROUNDING_CONSTANT = real(1.5 * 2.0**52)
 """Adding and subtracting it rounds |x| < 2^51 to the nearest integer, ties to even (rule C5)."""
-TINY = real(2.0**-27)
+TINY_ARGUMENT = real(2.0**-27)
 """Below it sin x and tanh x are x to 2^-54 / 3 relative; keeps -0.0 and the subnormals."""
 
-ANGLE = 1e5
+MAX_ANGLE = 1e5
 """Bound of the argument of sin and cos [rad]: 63 662 quarter turns, fewer than 2^16."""
-PER_QUARTER = real(0.6366197723675814)
-QUARTER = real(1.5707963267923333), real(2.563344151689835e-12), real(-9.531611933980011e-23)
+TWO_OVER_PI = real(0.6366197723675814)
+HALF_PI_PARTS = real(1.5707963267923333), real(2.563344151689835e-12), real(-9.531611933980011e-23)
 """pi/2 in three parts, together within 2^-127; the first two are multiples of 2^-36 and 2^-72."""
 SIN_SERIES = (
     -0.16666666666666632,
@@ -68,22 +68,22 @@ COS_SERIES = (
 )
 """(cos r - 1 + r^2 / 2) / r^4, degree 5 in r^2, |r| <= pi/4; error of cos r 2^-64.1."""
 
-TANH_FULL = real(20.0)
+TANH_SATURATION = real(20.0)
 """tanh x rounds to 1 from x = 19.07 on."""
 TANH_SPLIT = real(0.625)
-LAMBERT_ABOVE = (675675.0, 45045.0, 594.0, 1.0)
-LAMBERT_BELOW = (2027025.0, 945945.0, 51975.0, 630.0, 1.0)
+LAMBERT_NUMERATOR = (675675.0, 45045.0, 594.0, 1.0)
+LAMBERT_DENOMINATOR = (2027025.0, 945945.0, 51975.0, 630.0, 1.0)
 """x - tanh x = x z above(z) / below(z), z = x^2, within 2^-56.9 of x up to 0.625: Lambert's
 continued fraction x/(1 + z/(3 + z/(5 + ... + z/15))), whose coefficients are whole numbers."""
 
-PIECES = ("series", "centre", "upper")
+PIECE_NAMES = ("series", "centre", "upper")
 """Locals of a series, four coefficients each."""
 
 X = Ref("work.x")
 
 
 @dataclass
-class Body:
+class FunctionBuilder:
     """The assignments of a function, each to a local of its own, which `let` returns."""
 
     ops: list[Op] = field(default_factory=list)
@@ -95,44 +95,44 @@ class Body:
         self.ops.append(Assign(f"work.{name}", value))
         return Ref(f"work.{name}")
 
-    def function(self, name: str, about: str, parameters: tuple[str, ...] = ("x",)) -> Function:
+    def build(self, name: str, about: str, parameters: tuple[str, ...] = ("x",)) -> Function:
         """Return the function; its result is the local `y`."""
         return Function(name, tuple(self.ops), tuple(self.locals), about, parameters)
 
 
 @dataclass(frozen=True)
-class Circle:
+class TrigConstants:
     """What sin, cos and tan of a number type are made of.
 
     `reduced` gives quadrant, head and tail of x, `kernels` sin and cos of head + tail; below
     `tiny` sin and tan of x are x. `bound` is that of |x| [rad].
     """
 
-    reduced: Callable[[Body], tuple[Ref, Ref, Ref]]
-    kernels: Callable[[Body, Ref, Ref], tuple[Ref, Ref]]
+    reduce_angle: Callable[[FunctionBuilder], tuple[Ref, Ref, Ref]]
+    kernels: Callable[[FunctionBuilder, Ref, Ref], tuple[Ref, Ref]]
     tiny: Value
-    bound: str
+    bound_text: str
 
 
 @dataclass(frozen=True)
-class Lambert:
+class TanhConstants:
     """The numbers of tanh in one type: x - tanh x = x z above(z) / below(z), z = x^2.
 
     From `full` on tanh x rounds to 1, below `tiny` it is x.
     """
 
-    above: tuple[float, ...]
-    below: tuple[float, ...]
-    full: Value
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    saturation: Value
     tiny: Value
 
 
-def nearest(x: Expr, rounding: Value = ROUND) -> Expr:
-    """Return the whole number nearest to x, ties to even; `rounding` is that of its type."""
-    return subtract(add(x, rounding), rounding)
+def round_to_nearest(x: Expr, rounding_constant: Value = ROUNDING_CONSTANT) -> Expr:
+    """Return the whole number nearest to x, ties to even; `rounding_constant` is that of its type."""
+    return subtract(add(x, rounding_constant), rounding_constant)
 
 
-def within(x: Expr, low: Expr, high: Expr) -> Expr:
+def clamp(x: Expr, low: Expr, high: Expr) -> Expr:
     """Return x clamped; NaN stays NaN, unlike `clip` (rule C7)."""
     return Select(Compare(">", x, high), high, Select(Compare("<", x, low), low, x))
 
@@ -146,16 +146,16 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
     return result
 
 
-def pieced(body: Body, coefficients: tuple[float, ...], x: Expr) -> Expr:
+def horner_in_pieces(body: FunctionBuilder, coefficients: tuple[float, ...], x: Expr) -> Expr:
     """Return c0 + x (c1 + x (c2 + ...)), at most four coefficients a local."""
     rest: Expr | None = None
     for k in reversed(range(0, len(coefficients), 4)):
-        rest = body.let(PIECES[k // 4], horner(coefficients[k : k + 4], x, rest))
+        rest = body.let(PIECE_NAMES[k // 4], horner(coefficients[k : k + 4], x, rest))
     assert rest is not None
     return rest
 
 
-def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
+def reduce_angle(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
     """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
 
     Cody & Waite 1980, with three parts of pi/2; |head| <= pi/4. `coarse` and `fine` are
@@ -163,29 +163,33 @@ def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
     where |coarse| >= |fine|; else coarse - fine has at most 52 bits. Near a multiple of pi/2 the
     rest of x may be as small as 2^-60.5 (x = 45.553...); head + tail has it to 2^-110.
     """
-    bounded, quarters, quadrant = quartered(body, ANGLE, PER_QUARTER, ROUND)
-    coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
-    fine = body.let("fine", multiply(quarters, QUARTER[1]))
+    bounded, quarters, quadrant = count_quarter_turns(
+        body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
+    )
+    coarse = body.let("coarse", subtract(bounded, multiply(quarters, HALF_PI_PARTS[0])))
+    fine = body.let("fine", multiply(quarters, HALF_PI_PARTS[1]))
     head = body.let("head", subtract(coarse, fine))
     lost = body.let("lost", subtract(subtract(coarse, head), fine))
-    tail = body.let("tail", subtract(lost, multiply(quarters, QUARTER[2])))
+    tail = body.let("tail", subtract(lost, multiply(quarters, HALF_PI_PARTS[2])))
     return quadrant, head, tail
 
 
-def quartered(
-    body: Body, bound: float, per_quarter: Value, rounding: Value
+def count_quarter_turns(
+    body: FunctionBuilder, bound: float, two_over_pi: Value, rounding_constant: Value
 ) -> tuple[Ref, Ref, Ref]:
     """Return x within its bound, the whole number of quarter turns next to it, and its quadrant."""
-    bounded = body.let("bounded", within(X, real(-bound), real(bound)))
-    quarters = body.let("quarters", nearest(multiply(bounded, per_quarter), rounding))
+    bounded = body.let("bounded", clamp(X, real(-bound), real(bound)))
+    quarters = body.let(
+        "quarters", round_to_nearest(multiply(bounded, two_over_pi), rounding_constant)
+    )
     # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
     past = subtract(multiply(real(0.25), quarters), real(0.375))
-    turns = body.let("turns", nearest(past, rounding))
+    turns = body.let("turns", round_to_nearest(past, rounding_constant))
     quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
     return bounded, quarters, quadrant
 
 
-def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
+def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
     """Return (sin, cos) of head + tail, |head| <= pi/4; tail counts to first order.
 
     Largest terms last (Muller 2016); crest = 1 - half, near cos, has the exact rounding error
@@ -207,7 +211,7 @@ def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
     return sine, cosine
 
 
-def by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
+def select_by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
     """Return the one of four values that belongs to quadrant 0, 1, 2 or 3."""
     result = values[3]
     for number in (2, 1, 0):
@@ -215,48 +219,50 @@ def by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
     return result
 
 
-CIRCLE = Circle(reduced, kernels, TINY, "1e5")
+TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT, "1e5")
 
 
-def sine(circle: Circle = CIRCLE) -> Function:
+def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     """sin x, x clamped; x itself where tiny, so that sin -0.0 is -0.0."""
-    body = Body()
-    quadrant, head, tail = circle.reduced(body)
-    sin, cos = circle.kernels(body, head, tail)
-    turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
-    body.let("y", Select(Compare("<", Call("abs", (X,)), circle.tiny), X, turned))
-    return body.function("sin", f"sine; |x| <= {circle.bound} rad, clamped; error < 0.85 ULP")
+    body = FunctionBuilder()
+    quadrant, head, tail = constants.reduce_angle(body)
+    sin, cos = constants.kernels(body, head, tail)
+    turned = select_by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
+    body.let("y", Select(Compare("<", Call("abs", (X,)), constants.tiny), X, turned))
+    return body.build("sin", f"sine; |x| <= {constants.bound_text} rad, clamped; error < 0.85 ULP")
 
 
-def cosine(circle: Circle = CIRCLE) -> Function:
+def build_cos(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     """cos x, x clamped."""
-    body = Body()
-    quadrant, head, tail = circle.reduced(body)
-    sin, cos = circle.kernels(body, head, tail)
-    body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
-    return body.function("cos", f"cosine; |x| <= {circle.bound} rad, clamped; error < 0.85 ULP")
+    body = FunctionBuilder()
+    quadrant, head, tail = constants.reduce_angle(body)
+    sin, cos = constants.kernels(body, head, tail)
+    body.let("y", select_by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
+    return body.build(
+        "cos", f"cosine; |x| <= {constants.bound_text} rad, clamped; error < 0.85 ULP"
+    )
 
 
-LAMBERT = Lambert(LAMBERT_ABOVE, LAMBERT_BELOW, TANH_FULL, TINY)
+TANH_FLOAT64 = TanhConstants(LAMBERT_NUMERATOR, LAMBERT_DENOMINATOR, TANH_SATURATION, TINY_ARGUMENT)
 
 
-def hyperbolic_tangent(numbers: Lambert = LAMBERT) -> Function:
+def build_tanh(constants: TanhConstants = TANH_FLOAT64) -> Function:
     """tanh x by Lambert's fraction below 0.625, above as 1 - 2 / (e^2x + 1) (Cody & Waite 1980).
 
     Formed of |x| and given the sign of x; x itself where tiny, so that tanh -0.0 is -0.0.
     """
-    body = Body()
-    full = numbers.full
+    body = FunctionBuilder()
+    full = constants.saturation
     size = body.let("size", Call("abs", (X,)))
     bounded = body.let("bounded", Select(Compare(">", size, full), full, size))
     square = body.let("square", multiply(bounded, bounded))
-    above = body.let("above", horner(numbers.above, square))
-    below = body.let("below", horner(numbers.below, square))
+    above = body.let("above", horner(constants.numerator, square))
+    below = body.let("below", horner(constants.denominator, square))
     low = subtract(bounded, divide(multiply(multiply(bounded, square), above), below))
     power = Call("exp", (add(bounded, bounded),))
     high = subtract(real(1.0), divide(real(2.0), add(power, real(1.0))))
     split = Compare("<", bounded, TANH_SPLIT)
     magnitude = body.let("magnitude", Select(split, low, high))
     signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
-    body.let("y", Select(Compare("<", size, numbers.tiny), X, signed))
-    return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")
+    body.let("y", Select(Compare("<", size, constants.tiny), X, signed))
+    return body.build("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")

@@ -7,10 +7,16 @@ in ULP of the exact result, were measured at every float32 of the domain (tests/
 
 from __future__ import annotations
 
-from language.elementary import Body, Circle, Lambert, horner, quartered
-from language.exponent import Powers
-from language.logarithm import SERIES_SINGLE, Binades
-from language.number import LARGEST
+from language.elementary import (
+    FunctionBuilder,
+    TanhConstants,
+    TrigConstants,
+    count_quarter_turns,
+    horner,
+)
+from language.exponent import ExpConstants
+from language.logarithm import LOG_SERIES_FLOAT32, LogConstants
+from language.number import MAX_FINITE
 from language.operation import (
     Ref,
     add,
@@ -18,12 +24,12 @@ from language.operation import (
     real,
     subtract,
 )
-from language.power import PowerNumbers
-from language.tangent import ArcNumbers
+from language.power import PowConstants
+from language.tangent import Atan2Constants
 
-ROUND = real(1.5 * 2.0**23)
+ROUNDING_CONSTANT = real(1.5 * 2.0**23)
 """Adding and subtracting it rounds |x| < 2^22 to the nearest integer, ties to even (rule C5)."""
-TINY = real(2.0**-13)
+TINY_ARGUMENT = real(2.0**-13)
 """Below it sin x and tanh x are x to 2^-26 / 3 relative; keeps -0.0 and the subnormals."""
 
 EXP_LOWEST, EXP_HIGHEST = real(-87.0), real(88.0)
@@ -44,10 +50,10 @@ This and the next two: minimax by mpmath at 40 digits (Remez exchange), the lowe
 rounded to float32 and fixed, the rest fitted anew, and so on upwards.
 """
 
-ANGLE = 1000.0
+MAX_ANGLE = 1000.0
 """Bound of the argument of sin and cos [rad]: 637 quarter turns, fewer than 2^10."""
-PER_QUARTER = real(0.6366197466850281)
-QUARTER = (
+TWO_OVER_PI = real(0.6366197466850281)
+HALF_PI_PARTS = (
     real(1.57080078125),
     real(-4.455447196960449e-06),
     real(9.922587196342647e-10),
@@ -60,33 +66,35 @@ SIN_SERIES = (-0.16666653752326965, 0.00833209604024887, -0.00019505627278704196
 COS_SERIES = (0.04166664555668831, -0.0013887288514524698, 2.4428207325399853e-05)
 """(cos r - 1 + r^2 / 2) / r^4, degree 2 in r^2, |r| <= pi/4; error of cos r 2^-32.8."""
 
-TANH_FULL = real(10.0)
+TANH_SATURATION = real(10.0)
 """tanh x rounds to 1 from x = 9.02 on."""
-LAMBERT_ABOVE = (315.0, 14.0)
-LAMBERT_BELOW = (945.0, 420.0, 15.0)
+LAMBERT_NUMERATOR = (315.0, 14.0)
+LAMBERT_DENOMINATOR = (945.0, 420.0, 15.0)
 """x - tanh x = x z above(z) / below(z), z = x^2, within 2^-30 of x up to 0.625: Lambert's
 continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9))))."""
 
 
-def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
+def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
     """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
 
     `coarse`, `fine` and `finer` are exact. Two differences with their rounding errors (Dekker's
     fast two-sum) leave head + tail within 2^-56 of the rest of x, which is 2^-30 or more.
     """
-    bounded, quarters, quadrant = quartered(body, ANGLE, PER_QUARTER, ROUND)
-    coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
-    fine = body.let("fine", multiply(quarters, QUARTER[1]))
-    finer = body.let("finer", multiply(quarters, QUARTER[2]))
+    bounded, quarters, quadrant = count_quarter_turns(
+        body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
+    )
+    coarse = body.let("coarse", subtract(bounded, multiply(quarters, HALF_PI_PARTS[0])))
+    fine = body.let("fine", multiply(quarters, HALF_PI_PARTS[1]))
+    finer = body.let("finer", multiply(quarters, HALF_PI_PARTS[2]))
     first = body.let("first", subtract(coarse, fine))
     lost = body.let("lost", subtract(subtract(coarse, first), fine))
     head = body.let("head", subtract(first, finer))
     rest = body.let("rest", subtract(subtract(first, head), finer))
-    tail = body.let("tail", subtract(add(lost, rest), multiply(quarters, QUARTER[3])))
+    tail = body.let("tail", subtract(add(lost, rest), multiply(quarters, HALF_PI_PARTS[3])))
     return quadrant, head, tail
 
 
-def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
+def sin_cos_kernels_float32(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
     """Return (sin, cos) of head + tail, |head| <= pi/4, as in elementary.py."""
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))
@@ -102,10 +110,12 @@ def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
     return sine, cosine
 
 
-CIRCLE = Circle(reduced, kernels, TINY, "1000")
-POWERS = Powers(EXP_LOWEST, EXP_HIGHEST, real(-126.0), PER_LN_2, LN_2, EXP_SERIES, ROUND)
-LAMBERT = Lambert(LAMBERT_ABOVE, LAMBERT_BELOW, TANH_FULL, TINY)
-ARC = ArcNumbers(
+TRIG_FLOAT32 = TrigConstants(reduce_angle_float32, sin_cos_kernels_float32, TINY_ARGUMENT, "1000")
+EXP_FLOAT32 = ExpConstants(
+    EXP_LOWEST, EXP_HIGHEST, real(-126.0), PER_LN_2, LN_2, EXP_SERIES, ROUNDING_CONSTANT
+)
+TANH_FLOAT32 = TanhConstants(LAMBERT_NUMERATOR, LAMBERT_DENOMINATOR, TANH_SATURATION, TINY_ARGUMENT)
+ATAN2_FLOAT32 = Atan2Constants(
     series=(
         -0.33333301544189453,
         0.19997620582580566,
@@ -136,12 +146,17 @@ ARC = ArcNumbers(
         ),
     },
     huge=2.0**120,
-    smaller=2.0**-20,
+    scale=2.0**-20,
     largest=(2.0 - 2.0**-23) * 2.0**127,
 )
 """As in tangent.py; (atan r / r - 1) / r^2, degree 4 in r^2, error of atan r / r 2^-29.4."""
-BINADES = Binades(
-    -126, (64, 32, 16, 8, 4, 2, 1), LARGEST["float32"], 1.4142135381698608, SERIES_SINGLE, LN_2
+LOG_FLOAT32 = LogConstants(
+    -126,
+    (64, 32, 16, 8, 4, 2, 1),
+    MAX_FINITE["float32"],
+    1.4142135381698608,
+    LOG_SERIES_FLOAT32,
+    LN_2,
 )
 """Of log in float32."""
-POWER = PowerNumbers("float32", BINADES, POWERS, 6, 2.0**12 + 1.0)
+POW_FLOAT32 = PowConstants("float32", LOG_FLOAT32, EXP_FLOAT32, 6, 2.0**12 + 1.0)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.constants import constant_value
+from language.constants import evaluate_constant
 from language.declaration import Formula
 from language.evaluate import Scalar
 from language.matrix import Matrix
 from language.model import Automaton, Observer
 
 
-def number_matrix(
+def numeric_matrix(
     automaton: Automaton,
     values: Mapping[str, Scalar],
     entries: Mapping[str, Mapping[str, Formula]],
@@ -23,12 +23,12 @@ def number_matrix(
 
     def value(row: str, column: str) -> float:
         formula = entries.get(row, {}).get(column)
-        return constant_value(formula, automaton, values, what) if formula else 0.0
+        return evaluate_constant(formula, automaton, values, what) if formula else 0.0
 
     return tuple(tuple(value(row, column) for column in columns) for row in rows)
 
 
-def number_diagonal(
+def numeric_diagonal(
     automaton: Automaton,
     values: Mapping[str, Scalar],
     entries: Mapping[str, Formula],
@@ -36,14 +36,14 @@ def number_diagonal(
 ) -> Matrix:
     """Return a diagonal matrix of formulas in numbers."""
     rows = {name: {name: formula} for name, formula in entries.items()}
-    return number_matrix(automaton, values, rows, names, names, "noise")
+    return numeric_matrix(automaton, values, rows, names, names, "noise")
 
 
 def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
     """Return C (measures, states)."""
     measures = tuple(observer.measures)
     if observer.c:
-        return number_matrix(automaton, values, observer.c, measures, observer.states, "C")
+        return numeric_matrix(automaton, values, observer.c, measures, observer.states, "C")
     return tuple(
         tuple(1.0 if state == observer.measures[name] else 0.0 for state in observer.states)
         for name in measures

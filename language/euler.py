@@ -6,29 +6,35 @@ of the method; a curve through more rates would promise what the end of the step
 
 from __future__ import annotations
 
-from language.field import Field, at_state, at_time
-from language.motion import Method, at_rest, flat
-from language.operation import Assign, Block, Op, Ref, Run, Store, add, multiply, real, whole
-from language.resting import moving, never_moving
+from language.field import VectorField, set_point_time, set_point_to_state
+from language.motion import IntegrationMethod, clear_constant_series, hold_constant_states
+from language.operation import Assign, Block, Op, Ref, RunBlock, Store, add, integer, multiply, real
+from language.resting import never_varying_states, varying_states
 
 TERMS = 1
 
 
-def euler(field: Field) -> Method:
+def euler_method(field: VectorField) -> IntegrationMethod:
     """Return the method for a field, for the states that move in each mode."""
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes:
-        names = moving(field.automaton, mode)
-        lines = [Store(f"work.series_{n}", whole(0), Ref(f"work.rate_{n}")) for n in names]
-        blocks[f"step_{mode}"] = _step(field, mode)
-        blocks[f"series_{mode}"] = (*lines, *flat(field, mode, TERMS))
-    return Method(blocks, TERMS, (), (), resting=never_moving(field.automaton))
+        names = varying_states(field.automaton, mode)
+        lines = [Store(f"work.series_{n}", integer(0), Ref(f"work.rate_{n}")) for n in names]
+        blocks[f"step_{mode}"] = _step_block(field, mode)
+        blocks[f"series_{mode}"] = (*lines, *clear_constant_series(field, mode, TERMS))
+    return IntegrationMethod(
+        blocks, TERMS, (), (), constant_states=never_varying_states(field.automaton)
+    )
 
 
-def _step(field: Field, mode: str) -> Block:
+def _step_block(field: VectorField, mode: str) -> Block:
     """x + h f(x)."""
-    ops: list[Op] = [*at_state(field), *at_time(field, real(0.0)), Run(f"rates_{mode}")]
-    for name in moving(field.automaton, mode):
+    ops: list[Op] = [
+        *set_point_to_state(field),
+        *set_point_time(field, real(0.0)),
+        RunBlock(f"rates_{mode}"),
+    ]
+    for name in varying_states(field.automaton, mode):
         moved = multiply(Ref("work.h"), Ref(f"work.rate_{name}"))
         ops.append(Assign(f"work.end_{name}", add(Ref(f"state.{name}"), moved)))
-    return (*ops, *at_rest(field, mode))
+    return (*ops, *hold_constant_states(field, mode))

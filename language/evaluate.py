@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from language.functions import FUNCTIONS_OF
+from language.functions import FUNCTIONS_BY_TYPE
 from language.interpolation import Interpolation
-from language.number import ROUNDING, NumberType, single
+from language.number import ROUNDING_FUNCTIONS, NumberType, round_to_float32
 from language.operation import (
     Assign,
     Binary,
@@ -71,26 +71,26 @@ def power_of_two(k: float) -> float:
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
-LARGEST = 2147483520
+MAX_FLOAT32_INTEGER = 2147483520
 """Largest whole number made of a real: it is one in 32-bit floats too, with 24 bits."""
-NO_NUMBER = -(2**31)
+INTEGER_OF_NAN = -(2**31)
 """What a NaN becomes: outside every range, so that the clip of the target sees it."""
 
 
-def whole(x: float) -> int:
+def to_integer(x: float) -> int:
     """Return a whole-valued real as a whole number, the nearest of 32 bits (rule C8)."""
-    if -LARGEST <= x <= LARGEST:
+    if -MAX_FLOAT32_INTEGER <= x <= MAX_FLOAT32_INTEGER:
         return int(x)
-    return LARGEST if x > 0.0 else (-LARGEST if x < 0.0 else NO_NUMBER)
+    return MAX_FLOAT32_INTEGER if x > 0.0 else (-MAX_FLOAT32_INTEGER if x < 0.0 else INTEGER_OF_NAN)
 
 
-def power_of_two_single(k: float) -> float:
+def power_of_two_float32(k: float) -> float:
     """Return 2^k exactly for a whole-valued k from -126 to 127, anything else as it is."""
     return math.ldexp(1.0, int(k)) if -126.0 <= k <= 127.0 else k
 
 
-Elementary = Mapping[str, Callable[..., Scalar]]
-ELEMENTARY: Elementary = {
+FunctionMap = Mapping[str, Callable[..., Scalar]]
+ELEMENTARY: FunctionMap = {
     "abs": abs,
     "sqrt": square_root,
     "min": minimum,
@@ -100,22 +100,22 @@ ELEMENTARY: Elementary = {
     "pow2": power_of_two,
     "real": float,
     "floor": floor,
-    "whole": whole,
+    "whole": to_integer,
     "lookup": Interpolation(float).lookup,
     "lookup2": Interpolation(float).lookup2,
 }
 """In double: exact or rounded once, so that rounding once more gives the result of float32."""
-EXACT: Mapping[NumberType, Elementary] = {
+ELEMENTARY_BY_TYPE: Mapping[NumberType, FunctionMap] = {
     "float64": ELEMENTARY,
     "float32": {
         **ELEMENTARY,
-        "pow2": power_of_two_single,
-        "lookup": Interpolation(single).lookup,
-        "lookup2": Interpolation(single).lookup2,
+        "pow2": power_of_two_float32,
+        "lookup": Interpolation(round_to_float32).lookup,
+        "lookup2": Interpolation(round_to_float32).lookup2,
     },
 }
 """By number type, before the rounding to it."""
-OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
+BINARY_OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     **ARITHMETIC,
     "/": divide,
     "and": lambda a, b: bool(a) and bool(b),
@@ -124,18 +124,20 @@ OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
 }
 
 
-def evaluate(expr: Expr, values: Mapping[str, Scalar], number: NumberType = "float64") -> Scalar:
+def evaluate(
+    expr: Expr, values: Mapping[str, Scalar], number_type: NumberType = "float64"
+) -> Scalar:
     """Return the value of an expression of scalars, each operation rounded to the number type.
 
     Slow and plain: for check time only.
     """
 
     def value(part: Expr) -> Scalar:
-        return evaluate(part, values, number)
+        return evaluate(part, values, number_type)
 
     match expr:
         case Value():
-            return expr.rounded(number).value
+            return expr.round_to_type(number_type).value
         case Ref(name):
             return values[name]
         case Unary("-", operand):
@@ -143,37 +145,45 @@ def evaluate(expr: Expr, values: Mapping[str, Scalar], number: NumberType = "flo
         case Unary("not", operand):
             return not value(operand)
         case Binary(operator, left, right) | Compare(operator, left, right):
-            return in_type(OPERATIONS[operator](value(left), value(right)), number)
+            return round_if_real(
+                BINARY_OPERATIONS[operator](value(left), value(right)), number_type
+            )
         case Select(condition, then, other):
             return value(then if value(condition) else other)
         case Call(function, arguments):
-            return apply(function, [value(argument) for argument in arguments], number)
+            return apply_function(
+                function, [value(argument) for argument in arguments], number_type
+            )
         case Item() | _:
             raise TypeError(f"not a constant expression: {expr}")
 
 
-def apply(function: str, arguments: list[Scalar], number: NumberType = "float64") -> Scalar:
+def apply_function(
+    function: str, arguments: list[Scalar], number_type: NumberType = "float64"
+) -> Scalar:
     """Return the value of an elementary operation or function."""
     if function in ELEMENTARY:
-        return in_type(EXACT[number][function](*arguments), number)
-    found = tuple(arguments)
-    if 0.0 in found:  # a cache takes -0.0 for 0.0
-        return _function.__wrapped__(function, found, number)
-    return _function(function, found, number)
+        return round_if_real(ELEMENTARY_BY_TYPE[number_type][function](*arguments), number_type)
+    values = tuple(arguments)
+    if 0.0 in values:  # a cache takes -0.0 for 0.0
+        return _evaluate_function.__wrapped__(function, values, number_type)
+    return _evaluate_function(function, values, number_type)
 
 
 @lru_cache(maxsize=4096)
-def _function(function: str, arguments: tuple[Scalar, ...], number: NumberType) -> Scalar:
+def _evaluate_function(
+    function: str, arguments: tuple[Scalar, ...], number_type: NumberType
+) -> Scalar:
     """Return the value of a function that is an operation list; samples come again and again."""
-    known = FUNCTIONS_OF[number][function]
-    names = [f"work.{name}" for name in known.parameters]
+    definition = FUNCTIONS_BY_TYPE[number_type][function]
+    names = [f"work.{name}" for name in definition.parameters]
     values: dict[str, Scalar] = dict(zip(names, arguments, strict=True))
-    for op in known.body:
+    for op in definition.body:
         assert isinstance(op, Assign)
-        values[op.target] = evaluate(op.value, values, number)
+        values[op.target] = evaluate(op.value, values, number_type)
     return values["work.y"]
 
 
-def in_type(result: Scalar, number: NumberType) -> Scalar:
+def round_if_real(value: Scalar, number_type: NumberType) -> Scalar:
     """Return a result rounded to the type if it is a real; truth and whole numbers are exact."""
-    return ROUNDING[number](result) if isinstance(result, float) else result
+    return ROUNDING_FUNCTIONS[number_type](value) if isinstance(value, float) else value

@@ -13,8 +13,8 @@ from fractions import Fraction
 
 from language.chart import Chart
 from language.declaration import Input
-from language.document import Node, Table
-from language.limit import MICRO_STEP_LIMIT
+from language.document import MappingNode, YamlNode
+from language.limit import MICRO_STEP_LIMIT_FAULT
 from language.model import Transition
 from language.operation import (
     Assign,
@@ -29,24 +29,24 @@ from language.operation import (
     Ref,
     Store,
     add,
-    whole,
+    integer,
 )
 from language.program import Variable
 from language.units import NO_UNIT
 
 QUEUE = "work.queue"
-HEAD = Ref("work.head")
-TAIL = Ref("work.tail")
-EVENT = Ref("work.event")
-WAITING = Compare("<", HEAD, TAIL)
+QUEUE_HEAD = Ref("work.head")
+QUEUE_TAIL = Ref("work.tail")
+CURRENT_EVENT = Ref("work.event")
+HAS_WAITING_EVENT = Compare("<", QUEUE_HEAD, QUEUE_TAIL)
 """Whether an event waits in the queue."""
 
 
-def event_inputs(chart: Chart, section: Node | None) -> dict[str, Input]:
+def event_inputs(chart: Chart, section: YamlNode | None) -> dict[str, Input]:
     """Return the events that come from outside as inputs: there in a tick where they are true."""
     found = {}
-    for signal in chart.signals.values():
-        if signal.is_input and isinstance(section, Table):
+    for signal in chart.events.values():
+        if signal.is_input and isinstance(section, MappingNode):
             entry = section.entries[signal.name]
             key = f"events.{signal.name}"
             place = (signal.name, NO_UNIT, "bool", Fraction(0), None, key, entry.span)
@@ -54,54 +54,69 @@ def event_inputs(chart: Chart, section: Node | None) -> dict[str, Input]:
     return found
 
 
-def capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
+def queue_capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
     """Return how many events the queue of a tick holds: more could not be taken anyway."""
     raised = any(way.raises for way in transitions)
-    inputs = sum(signal.is_input for signal in chart.signals.values())
+    inputs = sum(signal.is_input for signal in chart.events.values())
     return inputs + (chart.micro_steps if raised else 0)
 
 
-def arrived(chart: Chart) -> Block:
+def enqueue_input_events(chart: Chart) -> Block:
     """Return what puts the events of a tick into the queue, and takes the first."""
-    ops: list[Op] = [Assign(HEAD.name, whole(0)), Assign(TAIL.name, whole(0))]
-    for signal in chart.signals.values():
+    ops: list[Op] = [Assign(QUEUE_HEAD.name, integer(0)), Assign(QUEUE_TAIL.name, integer(0))]
+    for signal in chart.events.values():
         if signal.is_input:
-            ops.append(Branch(Ref(f"input.{signal.name}"), _queued(signal.number)))
-    return (*ops, Assign(EVENT.name, whole(0)), Branch(WAITING, taken()))
-
-
-def put(chart: Chart, name: str, size: int) -> Block:
-    """Return what appends an event to the queue; where that is full it is lost, with a fault."""
-    fits = Compare("<", TAIL, whole(size))
-    return (Branch(fits, _queued(chart.signals[name].number), (FaultBit(MICRO_STEP_LIMIT),)),)
-
-
-def _queued(number: int) -> Block:
-    return (Store(QUEUE, TAIL, whole(number)), Assign(TAIL.name, add(TAIL, whole(1))))
-
-
-def taken() -> Block:
-    """Return what takes the first event of the queue."""
+            ops.append(Branch(Ref(f"input.{signal.name}"), _append_event(signal.number)))
     return (
-        Assign(EVENT.name, Item(QUEUE, HEAD, True)),
-        Assign(HEAD.name, add(HEAD, whole(1))),
+        *ops,
+        Assign(CURRENT_EVENT.name, integer(0)),
+        Branch(HAS_WAITING_EVENT, dequeue_event()),
     )
 
 
-def happens(chart: Chart, transition: Transition) -> Expr | None:
+def enqueue_event(chart: Chart, name: str, capacity: int) -> Block:
+    """Return what appends an event to the queue; where that is full it is lost, with a fault."""
+    fits = Compare("<", QUEUE_TAIL, integer(capacity))
+    return (
+        Branch(fits, _append_event(chart.events[name].number), (FaultBit(MICRO_STEP_LIMIT_FAULT),)),
+    )
+
+
+def _append_event(number: int) -> Block:
+    return (
+        Store(QUEUE, QUEUE_TAIL, integer(number)),
+        Assign(QUEUE_TAIL.name, add(QUEUE_TAIL, integer(1))),
+    )
+
+
+def dequeue_event() -> Block:
+    """Return what takes the first event of the queue."""
+    return (
+        Assign(CURRENT_EVENT.name, Item(QUEUE, QUEUE_HEAD, True)),
+        Assign(QUEUE_HEAD.name, add(QUEUE_HEAD, integer(1))),
+    )
+
+
+def event_condition(chart: Chart, transition: Transition) -> Expr | None:
     """Return whether the event of this micro-step is one of a transition's; None if it has none."""
     found: Expr | None = None
     for name in transition.events:
-        here = Compare("==", EVENT, whole(chart.signals[name].number))
+        here = Compare("==", CURRENT_EVENT, integer(chart.events[name].number))
         found = here if found is None else Binary("or", found, here)
     return found
 
 
-def event_variables(size: int) -> list[Variable]:
+def event_queue_variables(capacity: int) -> list[Variable]:
     """Return the queue of a tick."""
     found = [
-        Variable(HEAD.name, "whole", about="place in the queue of the event that is heard next"),
-        Variable(TAIL.name, "whole", about="place in the queue of the event that is raised next"),
-        Variable(EVENT.name, "whole", about="event that is heard in this micro-step, 0: none"),
+        Variable(
+            QUEUE_HEAD.name, "whole", about="place in the queue of the event that is heard next"
+        ),
+        Variable(
+            QUEUE_TAIL.name, "whole", about="place in the queue of the event that is raised next"
+        ),
+        Variable(
+            CURRENT_EVENT.name, "whole", about="event that is heard in this micro-step, 0: none"
+        ),
     ]
-    return [*found, Variable(QUEUE, "whole", size=max(size, 1), about="events that wait")]
+    return [*found, Variable(QUEUE, "whole", size=max(capacity, 1), about="events that wait")]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.document import Scalar
+from language.document import ScalarNode
 from language.experiment import System
 from language.model import CHART
-from language.problem import Problems, nearest
+from language.problem import Problems, suggest_name
 
 
 @dataclass(frozen=True)
-class EventName:
+class ModeEntryEvent:
     """The entry of a mode of an instance, from any mode or from `source` alone."""
 
     instance: str
@@ -20,26 +20,26 @@ class EventName:
     source: str = ""
 
 
-def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName | None:
+def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEntryEvent | None:
     """Return the event of `plant.no_contact`, `gap.upper`, `plant.drive -> plant.coast`.
 
     None with the problem reported where there is no such mode or transition.
     """
     head, arrow, tail = (part.strip() for part in scalar.text.partition("->"))
-    known = modes_of(system)
+    known = modes_by_name(system)
     place = known.get(head)
     if place is None:
         label = f"`{head}` is not a mode of an instance of `{system.name}`"
-        problems.error("name", scalar.span, label, nearest(head, known))
+        problems.error("name", scalar.span, label, suggest_name(head, known))
         return None
     instance, region, mode = place
     automaton = system.instances[instance].automaton
     source = ""
-    if arrow and automaton.tree is not None:
+    if arrow and automaton.statechart is not None:
         source, other = mode, known.get(tail) or known.get(f"{instance}.{tail}")
         if other is None or other[:2] != (instance, region):
             label = f"`{tail}` is not a mode beside `{source}`"
-            problems.error("name", scalar.span, label, nearest(tail, known))
+            problems.error("name", scalar.span, label, suggest_name(tail, known))
             return None
         mode = other[2]
     elif arrow:
@@ -47,11 +47,11 @@ def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName 
         if mode not in automaton.region(region).modes:
             label = f"`{tail}` is not a mode beside `{source}`"
             problems.error(
-                "name", scalar.span, label, nearest(mode, automaton.region(region).modes)
+                "name", scalar.span, label, suggest_name(mode, automaton.region(region).modes)
             )
             return None
-    if automaton.tree is not None:
-        return EventName(instance, region, mode, source)
+    if automaton.statechart is not None:
+        return ModeEntryEvent(instance, region, mode, source)
     taken = [
         (transition.source, transition.target)
         for each in automaton.region(region).modes.values()
@@ -62,10 +62,10 @@ def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName 
         label = f"no transition enters `{mode}`" + (f" from `{source}`" if source else "")
         problems.error("event", scalar.span, label, "an event is the entry of a mode")
         return None
-    return EventName(instance, region, mode, source)
+    return ModeEntryEvent(instance, region, mode, source)
 
 
-def modes_of(system: System) -> dict[str, tuple[str, str, str]]:
+def modes_by_name(system: System) -> dict[str, tuple[str, str, str]]:
     """Return instance, region and mode by name: `instance.mode`, `instance.region.mode`."""
     found = {}
     for name, instance in system.instances.items():
@@ -74,13 +74,13 @@ def modes_of(system: System) -> dict[str, tuple[str, str, str]]:
                 place = (name, region.name, mode)
                 inner = mode if region.name == CHART else f"{region.name}.{mode}"
                 found[f"{name}.{inner}"] = place
-                if system.alone:
+                if system.sole_instance:
                     found[inner] = place
         for outer in instance.automaton.superstates:
             if outer.key.split(".")[-2:-1] == ["modes"]:
                 path = outer.name if outer.region == CHART else f"{outer.region}.{outer.name}"
                 place = (name, outer.region, outer.name)
                 found[f"{name}.{path}"] = place
-                if system.alone:
+                if system.sole_instance:
                     found[path] = place
     return found

@@ -8,25 +8,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.exponential import Solved, closing, linear_motion, opening
-from language.field import Field
-from language.motion import Method
+from language.exponential import (
+    ExponentialContext,
+    build_exponential_method,
+    lower_step_end,
+    lower_step_start,
+)
+from language.field import VectorField
+from language.motion import IntegrationMethod
 from language.operation import Block
 from language.problem import Problems, Span
-from language.terms import other_terms
+from language.terms import non_affine_terms
 
 
-def exact(field: Field, solved: Solved, span: Span, problems: Problems) -> Method:
+def exact_method(
+    field: VectorField, context: ExponentialContext, span: Span, problems: Problems
+) -> IntegrationMethod:
     """Return the method for a field, with a problem for each mode that is not affine."""
     for mode in field.automaton.modes.values():
-        others = other_terms(field.automaton, mode, solved.point)
+        others = non_affine_terms(field.automaton, mode, context.point)
         if others:
             label = f"the flow of mode `{mode.name}` is not linear in the states with constant "
             label += f"coefficients: {', '.join(f'`{term}`' for term in others)}"
             help = "`linearise: {at: ...}` takes the tangent, `method: exponential` the middle"
             problems.error("method", span, label, help)
-    return linear_motion(field, solved, _step, span, problems)
+    return build_exponential_method(field, context, _step_blocks, span, problems)
 
 
-def _step(field: Field, mode: str, solved: Solved) -> Mapping[str, Block]:
-    return {f"step_{mode}": (*opening(field, mode), *closing(field, mode, solved))}
+def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> Mapping[str, Block]:
+    return {f"step_{mode}": (*lower_step_start(field, mode), *lower_step_end(field, mode, context))}

@@ -10,13 +10,13 @@ from typing import Literal
 from language.declaration import (
     Formula,
 )
-from language.document import Scalar
-from language.kind import Type
+from language.document import ScalarNode
+from language.kind import TypeName
 from language.model import (
     Automaton,
 )
 from language.problem import Span
-from language.signal import Line, RecordingUse, Sensor, Stimulus
+from language.signal import DelayedSignal, RecordingSource, Sensor, Stimulus
 from language.syntax import names
 from language.units import Dimension, Unit
 
@@ -40,11 +40,11 @@ class SystemInput:
     unit: Unit
     default: Fraction | None
     span: Span
-    type: Type = "real"
+    type: TypeName = "real"
     values: tuple[str, ...] = ()
 
     @property
-    def truth(self) -> bool:
+    def is_bool(self) -> bool:
         """Tell whether it is true or false."""
         return self.type == "bool"
 
@@ -85,9 +85,9 @@ class System:
     order: tuple[str, ...]
     span: Span
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
-    lines: Mapping[str, Line] = field(default_factory=dict)
+    delayed_signals: Mapping[str, DelayedSignal] = field(default_factory=dict)
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
-    alone: str | None = None
+    sole_instance: str | None = None
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Page:
+class ScheduledCalibration:
     """A calibration from a time on: values [SI] of tunable parameters by instance and name."""
 
     time: Fraction
@@ -123,12 +123,12 @@ class Scenario:
     span: Span
     seed: int = 0
     signals: tuple[str, ...] = ()
-    recording: RecordingUse | None = None
-    pages: tuple[Page, ...] = ()
+    recording: RecordingSource | None = None
+    calibrations: tuple[ScheduledCalibration, ...] = ()
 
 
 @dataclass(frozen=True)
-class Column:
+class ColumnMapping:
     """One signal of a recording: its columns (mean of them), target, unit and form."""
 
     name: str
@@ -147,7 +147,7 @@ class Column:
 
 Window = tuple[Fraction, Fraction]
 """From and to, both included [s], in the time of the recording."""
-EVERY_FILE = ""
+ALL_FILES = ""
 """The key of windows that are not those of one file."""
 
 
@@ -162,12 +162,12 @@ class RecordingMap:
     name: str
     time: str
     time_unit: Unit
-    columns: Mapping[str, Column]
+    columns: Mapping[str, ColumnMapping]
     constants: Mapping[str, tuple[Fraction, Dimension]]
     span: Span
     windows: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
-    databases: tuple[Scalar, ...] = ()
+    databases: tuple[ScalarNode, ...] = ()
 
     def windows_of(self, file: str) -> tuple[Window, ...]:
         """Return the windows of a file; none where all of it is used."""
-        return self.windows.get(file, self.windows.get(EVERY_FILE, ()))
+        return self.windows.get(file, self.windows.get(ALL_FILES, ()))

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.elementary import ROUND, Body, X, nearest, pieced, within
+from language.elementary import (
+    ROUNDING_CONSTANT,
+    FunctionBuilder,
+    X,
+    clamp,
+    horner_in_pieces,
+    round_to_nearest,
+)
 from language.operation import (
     Call,
     Compare,
@@ -44,7 +51,7 @@ fixed, the rest fitted anew, and so on upwards; the error is that of the rounded
 
 
 @dataclass(frozen=True)
-class Powers:
+class ExpConstants:
     """The numbers of exp in one type: within `lowest` and `highest` its value is normal.
 
     `least` is the exponent of 2 at the lowest; `rounding` rounds to whole numbers.
@@ -52,41 +59,45 @@ class Powers:
 
     lowest: Value
     highest: Value
-    least: Value
+    lowest_exponent: Value
     per_ln_2: Value
     ln_2: tuple[Value, Value]
     series: tuple[float, ...]
-    rounding: Value
+    rounding_constant: Value
 
 
-POWERS = Powers(EXP_LOWEST, EXP_HIGHEST, real(-1021.0), PER_LN_2, LN_2, EXP_SERIES, ROUND)
+EXP_FLOAT64 = ExpConstants(
+    EXP_LOWEST, EXP_HIGHEST, real(-1021.0), PER_LN_2, LN_2, EXP_SERIES, ROUNDING_CONSTANT
+)
 
 
-def exponential(of: Powers = POWERS) -> Function:
+def build_exp(constants: ExpConstants = EXP_FLOAT64) -> Function:
     """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2 (Cody & Waite 1980, Software Manual).
 
     ln 2 has two parts; head = x - k ln2_1 is exact, r = head - tail, and the sum
     1 + (head + (r^2 p(r) - tail)) adds the large terms last (Muller 2016, Elementary Functions).
     x is clamped to [-708, 709]: the result is never infinite, zero or subnormal.
     """
-    body = Body()
-    bounded = body.let("bounded", within(X, of.lowest, of.highest))
-    body.let("y", raised(body, bounded, None, of))
-    span = f"{of.lowest.value:g} <= x <= {of.highest.value:g}"
-    return body.function("exp", f"e^x; {span}, clamped; error < 0.95 ULP")
+    body = FunctionBuilder()
+    bounded = body.let("bounded", clamp(X, constants.lowest, constants.highest))
+    body.let("y", emit_exp(body, bounded, None, constants))
+    span = f"{constants.lowest.value:g} <= x <= {constants.highest.value:g}"
+    return body.build("exp", f"e^x; {span}, clamped; error < 0.95 ULP")
 
 
-def raised(body: Body, bounded: Ref, rest: Expr | None, of: Powers) -> Expr:
+def emit_exp(
+    body: FunctionBuilder, bounded: Ref, rest: Expr | None, constants: ExpConstants
+) -> Expr:
     """Return e^(bounded + rest), `bounded` within the bounds of exp and `rest` far smaller."""
-    power = nearest(multiply(bounded, of.per_ln_2), of.rounding)
+    power = round_to_nearest(multiply(bounded, constants.per_ln_2), constants.rounding_constant)
     # The comparison is for NaN: pow2 gets a whole number always.
-    is_known = Compare(">", bounded, of.lowest)
-    exponent = body.let("exponent", Select(is_known, power, of.least))
-    head = body.let("head", subtract(bounded, multiply(exponent, of.ln_2[0])))
-    low = multiply(exponent, of.ln_2[1])
+    is_known = Compare(">", bounded, constants.lowest)
+    exponent = body.let("exponent", Select(is_known, power, constants.lowest_exponent))
+    head = body.let("head", subtract(bounded, multiply(exponent, constants.ln_2[0])))
+    low = multiply(exponent, constants.ln_2[1])
     tail = body.let("tail", low if rest is None else subtract(low, rest))
     r = body.let("r", subtract(head, tail))
-    series = pieced(body, of.series, r)
+    series = horner_in_pieces(body, constants.series, r)
     curved = subtract(multiply(multiply(r, r), series), tail)
     scaled = body.let("scaled", add(real(1.0), add(head, curved)))
     return multiply(Call("pow2", (exponent,)), scaled)

@@ -10,12 +10,12 @@ from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
 
-from language.document import Document, Scalar, Table, lines_of, read_text
-from language.inside import exists, require_inside
-from language.problem import Problems, Source, Span, SpecError, nearest
-from language.yaml_tree import parse
+from language.document import Document, MappingNode, ScalarNode, lines_of, read_text
+from language.inside import path_exists, require_inside_project
+from language.problem import Problems, Source, Span, SpecError, suggest_name
+from language.yaml_tree import parse_yaml
 
-KINDS = (
+DOCUMENT_KINDS = (
     "automaton",
     "system",
     "scenario",
@@ -26,11 +26,11 @@ KINDS = (
     "study",
     "test",
 )
-HEAD = re.compile(rf"^({'|'.join(KINDS)}):\s*([^\s#]+)", re.MULTILINE)
-INSIDE = {"test": ("scenario",)}
+HEAD_PATTERN = re.compile(rf"^({'|'.join(DOCUMENT_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+NON_HEAD_KEYS = {"test": ("scenario",)}
 """Kinds that are keys, too, of a file of another kind."""
-VERSION = "1"
-Head = tuple[Path, str, str]
+LANGUAGE_VERSION = "1"
+DocumentHead = tuple[Path, str, str]
 """A file, the kind of what it holds, and its name."""
 
 
@@ -50,51 +50,51 @@ class Project:
 
         An effect is called like physics; what else has its name goes before it.
         """
-        return {**self.effects, **self._named(lambda kind: kind != "effect")}
+        return {**self.effect_index, **self._index_by_name(lambda kind: kind != "effect")}
 
     @cached_property
-    def effects(self) -> dict[str, list[Path]]:
+    def effect_index(self) -> dict[str, list[Path]]:
         """Files of effects by name, those of the project first."""
-        return self._named(lambda kind: kind == "effect")
+        return self._index_by_name(lambda kind: kind == "effect")
 
-    def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
+    def _index_by_name(self, is_wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
         own: dict[str, list[Path]] = {}
         for path, kind, name in self._heads:
-            if wanted(kind):
+            if is_wanted(kind):
                 own.setdefault(name, []).append(path)
         shipped = Path(str(resources.files("spec")))
         if shipped.resolve() != (self.root / "spec").resolve():
             for path, kind, name in _shipped_heads(shipped):
-                if wanted(kind):
+                if is_wanted(kind):
                     own.setdefault(name, [path])
         return own
 
     @cached_property
-    def _heads(self) -> tuple[Head, ...]:
+    def _heads(self) -> tuple[DocumentHead, ...]:
         return tuple(_heads_below(self.root / "spec", self.texts))
 
     def read(self, path: Path) -> Document:
         """Return the document of a file, in an editor's text where it is open. Raises SpecError."""
         text = self.texts.get(path.resolve()) if self.texts else None
-        return read_document(path) if text is None else document_of(source_of(path, text), text)
+        return read_document(path) if text is None else parse_document(source_of(path, text), text)
 
-    def effect(self, name: str, span: Span) -> Document:
+    def read_effect_document(self, name: str, span: Span) -> Document:
         """Return the document of an effect. Raises SpecError."""
-        return self.read(self._one_of(self.effects, name, span, "effect"))
+        return self.read(self._unique_path(self.effect_index, name, span, "effect"))
 
     def path_of(self, reference: str, span: Span | None = None) -> Path:
         """Return the file of a name or path. Raises SpecError for none or several."""
         if reference.endswith((".yaml", ".yml")) or os.sep in reference:
             base = Path(span.source.name).parent if span else Path()
             beside = base / reference
-            found = beside if exists(beside) else Path(reference)
+            found = beside if path_exists(beside) else Path(reference)
             if span:
-                require_inside(found, span, self.root)
+                require_inside_project(found, span, self.root)
             return found
         place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
-        return self._one_of(self.index, reference, place, "spec")
+        return self._unique_path(self.index, reference, place, "spec")
 
-    def _one_of(
+    def _unique_path(
         self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
     ) -> Path:
         found = index.get(reference, [])
@@ -102,17 +102,17 @@ class Project:
             return found[0]
         problems = Problems()
         if found:
-            files = ", ".join(shown(path) for path in found)
+            files = ", ".join(display_path(path) for path in found)
             problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
         else:
-            hint = nearest(reference, index)
+            hint = suggest_name(reference, index)
             if what == "spec":
-                hint = nearest(reference, index) or "a name of a spec below spec/, or a path"
+                hint = suggest_name(reference, index) or "a name of a spec below spec/, or a path"
             problems.error("name", place, f"there is no {what} named `{reference}`", hint)
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
 
 
-def shown(path: Path) -> str:
+def display_path(path: Path) -> str:
     """Return a path as it is shown: relative to the working directory where that is shorter."""
     try:
         relative = os.path.relpath(path)
@@ -123,39 +123,41 @@ def shown(path: Path) -> str:
 
 def read_document(path: Path) -> Document:
     """Read one file and its head. Raises SpecError."""
-    source, text = read_text(path, shown(path))
-    return document_of(source, text)
+    source, text = read_text(path, display_path(path))
+    return parse_document(source, text)
 
 
 def source_of(path: Path, text: str) -> Source:
     """Return the source of a text that an editor shows of a file."""
-    return Source(shown(path), lines_of(text))
+    return Source(display_path(path), lines_of(text))
 
 
-def document_of(source: Source, text: str) -> Document:
+def parse_document(source: Source, text: str) -> Document:
     """Return the document of a text: `language: 1`, then one kind and its name."""
-    root = parse(source, text)
+    root = parse_yaml(source, text)
     problems = Problems()
     _check_version(root, problems)
-    inside = [key for kind, keys in INSIDE.items() if kind in root.entries for key in keys]
-    heads = [entry for entry in root if entry.key in KINDS and entry.key not in inside]
+    inside = [key for kind, keys in NON_HEAD_KEYS.items() if kind in root.entries for key in keys]
+    heads = [entry for entry in root if entry.key in DOCUMENT_KINDS and entry.key not in inside]
     if not heads:
         first = next(iter(root), None)
         span = first.span if first else root.span
         label = "the file does not say what it holds"
-        problems.error("form", span, label, f"one of the keys {', '.join(KINDS)} with a name")
+        problems.error(
+            "form", span, label, f"one of the keys {', '.join(DOCUMENT_KINDS)} with a name"
+        )
     elif len(heads) > 1:
         label = f"one file holds one thing: `{heads[0].key}` is given too"
         problems.error("form", heads[1].span, label)
-    elif not isinstance(heads[0].node, Scalar):
+    elif not isinstance(heads[0].node, ScalarNode):
         problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
-    problems.stop_if_any()
+    problems.raise_if_errors()
     head = heads[0]
-    assert isinstance(head.node, Scalar)
+    assert isinstance(head.node, ScalarNode)
     return Document(head.key, head.node.text, head.node.text_span, root, source)
 
 
-def _check_version(root: Table, problems: Problems) -> None:
+def _check_version(root: MappingNode, problems: Problems) -> None:
     first = next(iter(root), None)
     node = root.get("language")
     if node is None:
@@ -163,17 +165,17 @@ def _check_version(root: Table, problems: Problems) -> None:
         problems.error(
             "version", span, "`language: 1` is missing", "it is the first line of a spec"
         )
-    elif not isinstance(node, Scalar) or node.text != VERSION:
+    elif not isinstance(node, ScalarNode) or node.text != LANGUAGE_VERSION:
         problems.error("version", node.span, "this version of the language is not known: use 1")
 
 
-def _heads_below(folder: Path, texts: Mapping[Path, str]) -> Iterator[Head]:
+def _heads_below(folder: Path, texts: Mapping[Path, str]) -> Iterator[DocumentHead]:
     for path in _yaml_files(folder):
         yield from ((path, kind, name) for kind, name in _heads_in(path, texts))
 
 
 @cache
-def _shipped_heads(folder: Path) -> tuple[Head, ...]:
+def _shipped_heads(folder: Path) -> tuple[DocumentHead, ...]:
     """The heads of what is shipped, which nobody changes: they are read once in a process."""
     return tuple(_heads_below(folder, {}))
 
@@ -189,7 +191,7 @@ def _heads_in(path: Path, texts: Mapping[Path, str]) -> list[tuple[str, str]]:
         text = path.read_text("utf-8", errors="replace") if text is None else text
     except OSError:
         return []
-    heads = HEAD.finditer(text[:65536])
+    heads = HEAD_PATTERN.finditer(text[:65536])
     found = [(match.group(1), match.group(2).strip("'\"")) for match in heads]
-    inside = [key for kind, _ in found for key in INSIDE.get(kind, ())]
+    inside = [key for kind, _ in found for key in NON_HEAD_KEYS.get(kind, ())]
     return [(kind, name) for kind, name in found if kind not in inside]

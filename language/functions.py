@@ -5,37 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from language import elementary_single as of_single
-from language.elementary import cosine, hyperbolic_tangent, sine
-from language.exponent import exponential
-from language.logarithm import logarithm
+from language.elementary import build_cos, build_sin, build_tanh
+from language.exponent import build_exp
+from language.logarithm import build_log
 from language.number import NumberType
-from language.power import power_of
+from language.power import build_pow
 from language.program import Function
-from language.tangent import angle_of, tangent
+from language.tangent import build_atan2, build_tan
 
-MADE = (
-    sine(),
-    cosine(),
-    exponential(),
-    hyperbolic_tangent(),
-    tangent(),
-    angle_of(),
-    logarithm(),
-    power_of(),
+FLOAT64_FUNCTIONS = (
+    build_sin(),
+    build_cos(),
+    build_exp(),
+    build_tanh(),
+    build_tan(),
+    build_atan2(),
+    build_log(),
+    build_pow(),
 )
-MADE_SINGLE = (
-    sine(of_single.CIRCLE),
-    cosine(of_single.CIRCLE),
-    exponential(of_single.POWERS),
-    hyperbolic_tangent(of_single.LAMBERT),
-    tangent(of_single.CIRCLE),
-    angle_of(of_single.ARC),
-    logarithm(of_single.BINADES),
-    power_of(of_single.POWER),
+FLOAT32_FUNCTIONS = (
+    build_sin(of_single.TRIG_FLOAT32),
+    build_cos(of_single.TRIG_FLOAT32),
+    build_exp(of_single.EXP_FLOAT32),
+    build_tanh(of_single.TANH_FLOAT32),
+    build_tan(of_single.TRIG_FLOAT32),
+    build_atan2(of_single.ATAN2_FLOAT32),
+    build_log(of_single.LOG_FLOAT32),
+    build_pow(of_single.POW_FLOAT32),
 )
-FUNCTIONS: Mapping[str, Function] = {function.name: function for function in MADE}
+FUNCTIONS: Mapping[str, Function] = {function.name: function for function in FLOAT64_FUNCTIONS}
 """In float64; a function that calls another one (tanh calls exp) comes after it."""
-FUNCTIONS_OF: Mapping[NumberType, Mapping[str, Function]] = {
+FUNCTIONS_BY_TYPE: Mapping[NumberType, Mapping[str, Function]] = {
     "float64": FUNCTIONS,
-    "float32": {function.name: function for function in MADE_SINGLE},
+    "float32": {function.name: function for function in FLOAT32_FUNCTIONS},
 }

@@ -14,10 +14,10 @@ from importlib import resources
 
 import lark
 
-Shape = tuple[str, tuple["Shape | int", ...]]
+ParseShape = tuple[str, tuple["ParseShape | int", ...]]
 """A rule of the grammar with its parts: other rules, or the numbers of tokens."""
 
-TOKEN = re.compile(
+TOKEN_PATTERN = re.compile(
     r" *(?:(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
     r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*)"
     r"|(?P<number>\d(?:[eE][-+]\d|[0-9A-Za-z_.])*)"
@@ -30,33 +30,33 @@ TOKEN = re.compile(
 
 An exponent is one with its `^`, for a digit elsewhere is a number.
 """
-ALIKE = {"quantity": "1 m", "number": "1", "name": "x"}
+REPRESENTATIVE_TOKENS = {"quantity": "1 m", "number": "1", "name": "x"}
 """What stands for all tokens of a kind; words and signs stand for themselves."""
-EXPONENT = "^ 2"
-APART = "  "
+REPRESENTATIVE_EXPONENT = "^ 2"
+TOKEN_SEPARATOR = "  "
 """Two blanks: after one, a name behind a number is its unit."""
-STARTS = ("expression", "balance")
-ALIKE_SIGNS = {"/": "*", "<=": "<", ">=": "<", ">": "<", "==": "<", "!=": "<"}
+START_RULES = ("expression", "balance")
+REPRESENTATIVE_SIGNS = {"/": "*", "<=": "<", ">=": "<", ">": "<", "==": "<", "!=": "<"}
 """Signs that make the same part of a tree. `+` is not a `-`, which may be a sign of its own."""
 
 
 @dataclass(frozen=True)
-class Parsed:
+class ParsedShape:
     """The shape of a text with the text and the start of each token; `depth` of the shape."""
 
-    shape: Shape
+    shape: ParseShape
     texts: tuple[str, ...]
-    starts: tuple[int, ...]
+    offsets: tuple[int, ...]
     depth: int
 
 
-def parsed(text: str, start: str) -> Parsed:
+def parse_shape(text: str, start_rule: str) -> ParsedShape:
     """Parse a text from a start of the grammar. Raises lark's UnexpectedInput."""
     kinds: list[str] = []
     texts: list[str] = []
     starts: list[int] = []
     end = 0
-    for match in TOKEN.finditer(text):
+    for match in TOKEN_PATTERN.finditer(text):
         if match.start() != end:
             break
         end = match.end()
@@ -65,56 +65,56 @@ def parsed(text: str, start: str) -> Parsed:
         texts.append(found)
         starts.append(match.start(kind))
         if kind == "exponent":
-            kinds.append(EXPONENT)
-        elif kind in ALIKE:
-            kinds.append(ALIKE[kind])
+            kinds.append(REPRESENTATIVE_EXPONENT)
+        elif kind in REPRESENTATIVE_TOKENS:
+            kinds.append(REPRESENTATIVE_TOKENS[kind])
         else:
-            kinds.append(ALIKE_SIGNS.get(found, found))
-    known = _shape_of(tuple(kinds), start) if not text[end:].strip(" ") else None
+            kinds.append(REPRESENTATIVE_SIGNS.get(found, found))
+    known = _cached_shape(tuple(kinds), start_rule) if not text[end:].strip(" ") else None
     if known:
-        return Parsed(known[0], tuple(texts), tuple(starts), known[1])
+        return ParsedShape(known[0], tuple(texts), tuple(starts), known[1])
     tokens: list[lark.Token] = []
 
     def number(token: lark.Token) -> int:
         tokens.append(token)
         return len(tokens) - 1
 
-    shape = _shape(_parser(start).parse(text), number)
+    shape = _shape_of_tree(_parser(start_rule).parse(text), number)
     places = tuple(token.start_pos or 0 for token in tokens)
-    return Parsed(shape, tuple(map(str, tokens)), places, _depth(shape))
+    return ParsedShape(shape, tuple(map(str, tokens)), places, _shape_depth(shape))
 
 
 @lru_cache(maxsize=4096)
-def _shape_of(kinds: tuple[str, ...], start: str) -> tuple[Shape, int] | None:
+def _cached_shape(kinds: tuple[str, ...], start_rule: str) -> tuple[ParseShape, int] | None:
     """Return the shape of a sequence of kinds and its depth, None where it is no expression."""
     places: dict[int, int] = {}
     at = 0
     for index, kind in enumerate(kinds):
-        places[at + kind.rindex(" ") + 1 if kind == EXPONENT else at] = index
-        at += len(kind) + len(APART)
+        places[at + kind.rindex(" ") + 1 if kind == REPRESENTATIVE_EXPONENT else at] = index
+        at += len(kind) + len(TOKEN_SEPARATOR)
     try:
-        tree = _parser(start).parse(APART.join(kinds))
+        tree = _parser(start_rule).parse(TOKEN_SEPARATOR.join(kinds))
     except lark.exceptions.UnexpectedInput:
         return None
-    shape = _shape(tree, lambda token: places[token.start_pos or 0])
-    return shape, _depth(shape)
+    shape = _shape_of_tree(tree, lambda token: places[token.start_pos or 0])
+    return shape, _shape_depth(shape)
 
 
-def _shape(tree: lark.Tree[lark.Token], number: Callable[[lark.Token], int]) -> Shape:
+def _shape_of_tree(tree: lark.Tree[lark.Token], number: Callable[[lark.Token], int]) -> ParseShape:
     parts = tuple(
-        number(part) if isinstance(part, lark.Token) else _shape(part, number)
+        number(part) if isinstance(part, lark.Token) else _shape_of_tree(part, number)
         for part in tree.children
     )
     return str(tree.data), parts
 
 
-def _depth(shape: Shape) -> int:
+def _shape_depth(shape: ParseShape) -> int:
     """Return a bound of the depth of the tree; a rule of a start is no part of it."""
-    deepest = max((_depth(part) for part in shape[1] if not isinstance(part, int)), default=0)
-    return deepest if shape[0] in STARTS else deepest + 1
+    deepest = max((_shape_depth(part) for part in shape[1] if not isinstance(part, int)), default=0)
+    return deepest if shape[0] in START_RULES else deepest + 1
 
 
 @cache
-def _parser(start: str) -> lark.Lark:
+def _parser(start_rule: str) -> lark.Lark:
     grammar = resources.files("language").joinpath("expression.lark").read_text("utf-8")
-    return lark.Lark(grammar, parser="lalr", start=start)
+    return lark.Lark(grammar, parser="lalr", start=start_rule)

@@ -9,7 +9,7 @@ Edges = Mapping[str, Iterable[str]]
 """From each name to the names that come after it, all of them keys."""
 
 
-def topological(edges: Edges) -> list[str] | None:
+def topological_sort(edges: Edges) -> list[str] | None:
     """Return the names so that each comes before those that it leads to, None in a circle.
 
     Of several that may come next, the first in the order of the keys does (Kahn 1962, with a heap).
@@ -22,15 +22,15 @@ def topological(edges: Edges) -> list[str] | None:
         for target in targets:
             waiting[target] += 1
     free = [place[name] for name in names if not waiting[name]]
-    found: list[str] = []
+    order: list[str] = []
     while free:
         name = names[heapq.heappop(free)]
-        found.append(name)
+        order.append(name)
         for target in after[name]:
             waiting[target] -= 1
             if not waiting[target]:
                 heapq.heappush(free, place[target])
-    return found if len(found) == len(names) else None
+    return order if len(order) == len(names) else None
 
 
 def post_order(reads: Edges) -> list[str]:
@@ -38,7 +38,7 @@ def post_order(reads: Edges) -> list[str]:
 
     In a circle, which is reported elsewhere, one member comes before what it reads.
     """
-    found: dict[str, None] = {}
+    order: dict[str, None] = {}
     begun: set[str] = set()
     for start in reads:
         stack = [] if start in begun else [(start, iter(list(reads[start])))]
@@ -47,15 +47,15 @@ def post_order(reads: Edges) -> list[str]:
             name, waiting = stack[-1]
             needed = next((read for read in waiting if read in reads and read not in begun), None)
             if needed is None:
-                found[name] = None
+                order[name] = None
                 stack.pop()
             else:
                 begun.add(needed)
                 stack.append((needed, iter(list(reads[needed]))))
-    return list(found)
+    return list(order)
 
 
-def circle(edges: Edges) -> list[str]:
+def find_cycle(edges: Edges) -> list[str]:
     """Return the members of a circle, each leading to the next; an empty list if there is none."""
     done: set[str] = set()
     for start in edges:
@@ -78,7 +78,7 @@ def circle(edges: Edges) -> list[str]:
     return []
 
 
-def components(edges: Edges) -> list[list[str]]:
+def strongly_connected_components(edges: Edges) -> list[list[str]]:
     """Return the groups of names that lead to each other, each in the order of the keys.
 
     Tarjan 1972, with a stack of its own.
@@ -86,7 +86,7 @@ def components(edges: Edges) -> list[list[str]]:
     numbers: dict[str, int] = {}
     lowest: dict[str, int] = {}
     waiting: dict[str, None] = {}
-    found: list[list[str]] = []
+    result: list[list[str]] = []
     place = {name: position for position, name in enumerate(edges)}
     for start in edges:
         stack = [(start, iter(list(edges[start])))] if start not in numbers else []
@@ -102,15 +102,15 @@ def components(edges: Edges) -> list[list[str]]:
                     above = stack[-1][0]
                     lowest[above] = min(lowest[above], lowest[name])
                 if lowest[name] == numbers[name]:
-                    found.append(_closed(waiting, name, place))
+                    result.append(_pop_component(waiting, name, place))
             elif target not in numbers:
                 stack.append((target, iter(list(edges[target]))))
             elif target in waiting:
                 lowest[name] = min(lowest[name], numbers[target])
-    return found
+    return result
 
 
-def _closed(waiting: dict[str, None], first: str, place: Mapping[str, int]) -> list[str]:
+def _pop_component(waiting: dict[str, None], first: str, place: Mapping[str, int]) -> list[str]:
     """Take the names from `first` on off what waits: one group."""
     group: list[str] = []
     while not group or group[-1] != first:
@@ -120,25 +120,25 @@ def _closed(waiting: dict[str, None], first: str, place: Mapping[str, int]) -> l
 
 def reachable(edges: Edges, start: str) -> set[str]:
     """Return what can be reached from a name, the name included."""
-    found, stack = {start}, [start]
+    result, stack = {start}, [start]
     while stack:
         for target in edges.get(stack.pop(), ()):
-            if target not in found:
-                found.add(target)
+            if target not in result:
+                result.add(target)
                 stack.append(target)
-    return found
+    return result
 
 
-def turned(edges: Edges) -> dict[str, list[str]]:
+def reversed_edges(edges: Edges) -> dict[str, list[str]]:
     """Return the edges in the other direction; what is no key is left out."""
-    found: dict[str, list[str]] = {name: [] for name in edges}
+    result: dict[str, list[str]] = {name: [] for name in edges}
     for name, targets in edges.items():
         for target in targets:
-            if target in found:
-                found[target].append(name)
-    return found
+            if target in result:
+                result[target].append(name)
+    return result
 
 
-def chain(loop: Sequence[str]) -> str:
+def format_cycle(cycle: Sequence[str]) -> str:
     """Return a circle as text, back to its first member."""
-    return " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
+    return " -> ".join(f"`{name}`" for name in [*cycle, cycle[0]])

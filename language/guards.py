@@ -4,63 +4,71 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from language.inquiry import Inquiry, Witness
+from language.inquiry import QueryEngine, Witness
 from language.model import Automaton, Mode, Transition
-from language.moment import Moment
+from language.moment import GuardSnapshot
 from language.problem import Problems, SpecError
-from language.question import Question
-from language.syntax import Not, Relation, Tree, alike
+from language.question import SolverQuery
+from language.syntax import Not, Relation, SyntaxTree, is_same_expression
 
-DISJOINT = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
+EXCLUSIVE_RELATIONS = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
 """Relations that exclude each other between the same two sides."""
 
 
-MOST_OVERLAPS = 1000
+MAX_OVERLAPS = 1000
 """Pairs told of in one mode; who has so many gives priorities to all."""
 
 
-def report_overlaps(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
+def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
     """Report pairs of one priority that are not proven disjoint, with a witness if one is found."""
     for mode in automaton.all_modes:
-        told = 0
-        for earlier, later in _overlaps(mode):
-            told += _report(automaton, mode, earlier, later, inquiry, problems)
-            if told == MOST_OVERLAPS:
+        reported = 0
+        for earlier, later in _overlap_candidates(mode):
+            reported += _report_overlap(automaton, mode, earlier, later, query_engine, problems)
+            if reported == MAX_OVERLAPS:
                 break
 
 
-def _overlaps(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
+def _overlap_candidates(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
     for position, later in enumerate(mode.transitions):
         for earlier in mode.transitions[:position]:
             same = (later.priority or 0) == (earlier.priority or 0)
             apart = earlier.events and later.events and not {*earlier.events} & {*later.events}
-            if same and not apart and not excluded(earlier.when.tree, later.when.tree):
+            if (
+                same
+                and not apart
+                and not are_syntactically_exclusive(earlier.when.tree, later.when.tree)
+            ):
                 yield earlier, later
 
 
-def excluded(left: Tree, right: Tree) -> bool:
+def are_syntactically_exclusive(left: SyntaxTree, right: SyntaxTree) -> bool:
     """Tell whether two guards exclude each other by their form: `a < b` and `a >= b`, `not g`."""
-    if isinstance(right, Not) and alike(right.operand, left):
+    if isinstance(right, Not) and is_same_expression(right.operand, left):
         return True
-    if isinstance(left, Not) and alike(left.operand, right):
+    if isinstance(left, Not) and is_same_expression(left.operand, right):
         return True
     if isinstance(left, Relation) and isinstance(right, Relation):
-        opposed = right.operator in DISJOINT.get(left.operator, ())
-        return opposed and alike(left.left, right.left) and alike(left.right, right.right)
+        opposed = right.operator in EXCLUSIVE_RELATIONS.get(left.operator, ())
+        return (
+            opposed
+            and is_same_expression(left.left, right.left)
+            and is_same_expression(left.right, right.right)
+        )
     return False
 
 
-def _report(
+def _report_overlap(
     automaton: Automaton,
     mode: Mode,
     earlier: Transition,
     later: Transition,
-    inquiry: Inquiry,
+    query_engine: QueryEngine,
     problems: Problems,
 ) -> bool:
     """Report a pair unless it is proven disjoint; tell whether it was reported."""
-    question = _together(automaton, mode, earlier, later, inquiry)
-    found = inquiry.freely(question) if question else "open"
+    query = _overlap_query(automaton, mode, earlier, later, query_engine)
+    found = query_engine.answer_for_all_tunables(query) if query else "open"
     if found == "never":
         return False
     label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
@@ -72,13 +80,17 @@ def _report(
     return True
 
 
-def _together(
-    automaton: Automaton, mode: Mode, earlier: Transition, later: Transition, inquiry: Inquiry
-) -> Question | None:
+def _overlap_query(
+    automaton: Automaton,
+    mode: Mode,
+    earlier: Transition,
+    later: Transition,
+    query_engine: QueryEngine,
+) -> SolverQuery | None:
     """Return the question whether two guards can hold together; None where they have no form."""
-    moment = Moment(automaton, mode)
+    snapshot = GuardSnapshot(automaton, mode)
     try:
-        guards = [moment.guard(way) for way in (earlier, later)]
+        guards = [snapshot.lower_guard(way) for way in (earlier, later)]
     except (KeyError, SpecError):
         return None
-    return inquiry.question(moment.story, guards)
+    return query_engine.build_query(snapshot.path, guards)

@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.constants import exact_value
+from language.constants import evaluate_exactly
 from language.declaration import Formula
-from language.lower import Names, expression
-from language.memory import applications
+from language.lower import NameBindings, lower_expression
+from language.memory import memory_calls_by_key
 from language.model import Automaton, Mode
 from language.operation import (
     Assign,
@@ -33,59 +33,59 @@ from language.operation import (
     Unary,
     add,
     divide,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
-from language.parameter import constant_names
+from language.parameter import constant_bindings
 from language.program import Alarm, Variable
-from language.syntax import TIMES, Application, Name, Tree, memory_key, walk
+from language.syntax import TIME_FUNCTIONS, FunctionCall, Name, SyntaxTree, memory_key, walk
 
-AGE = Ref("memory.age")
+RECORD_AGE = Ref("memory.age")
 """Time since the last record [s]; an engine sets it."""
 
 
 @dataclass(frozen=True)
-class History:
+class ContinuousDelay:
     """One delayed quantity: `steps` is its delay in major steps, the longest if it is `tunable`.
 
     `tunable` is the parameter [s] that the delay is, at least one major step.
     """
 
     number: int
-    tree: Application
-    steps: Fraction
-    step: Fraction
-    tunable: Expr | None = None
+    call: FunctionCall
+    delay_steps: Fraction
+    major_step: Fraction
+    tunable_delay: Expr | None = None
 
     @property
     def whole_steps(self) -> int:
         """The delay in major steps, rounded up."""
-        return math.ceil(self.steps)
+        return math.ceil(self.delay_steps)
 
-    def name(self, part: str) -> str:
+    def variable_name(self, part: str) -> str:
         """Return the variable of a part: `values`, `newest`, `far`, `middle`, `near`."""
         return f"memory.{part}_{self.number}"
 
 
-def histories_of(automaton: Automaton) -> tuple[History, ...]:
+def continuous_delays_of(automaton: Automaton) -> tuple[ContinuousDelay, ...]:
     """Return what a continuous automaton delays, what is inside another delay first."""
-    found: list[History] = []
-    for tree in applications(automaton, ("delay",)).values():
+    found: list[ContinuousDelay] = []
+    for tree in memory_calls_by_key(automaton, ("delay",)).values():
         time, step = tree.arguments[1], automaton.step
-        tuned = tunable_time(automaton, time)
+        tuned = tunable_delay_of(automaton, time)
         if tuned is None:
-            steps = exact_value(Formula(time, ""), automaton) / step
-            found.append(History(len(found) + 1, tree, steps, step))
+            steps = evaluate_exactly(Formula(time, ""), automaton) / step
+            found.append(ContinuousDelay(len(found) + 1, tree, steps, step))
         else:
             steps = Fraction(max(1, math.ceil(tuned[1] / step)))
-            parameter = constant_names(automaton)[tuned[0]]
-            found.append(History(len(found) + 1, tree, steps, step, parameter))
+            parameter = constant_bindings(automaton)[tuned[0]]
+            found.append(ContinuousDelay(len(found) + 1, tree, steps, step, parameter))
     return tuple(found)
 
 
-def tunable_time(automaton: Automaton, time: Tree) -> tuple[str, Fraction] | None:
+def tunable_delay_of(automaton: Automaton, time: SyntaxTree) -> tuple[str, Fraction] | None:
     """Return the parameter that a time is if it is tunable, and the end of its range [s]."""
     if isinstance(time, Name):
         parameter = automaton.parameters.get(time.path)
@@ -94,124 +94,139 @@ def tunable_time(automaton: Automaton, time: Tree) -> tuple[str, Fraction] | Non
     return None
 
 
-def delayed(automaton: Automaton, histories: tuple[History, ...]) -> dict[str, Expr]:
+def delayed_value_bindings(
+    automaton: Automaton, delays: tuple[ContinuousDelay, ...]
+) -> dict[str, Expr]:
     """Return what each delayed quantity is at `work.s` after the start of a step.
 
     Counted in major steps back from the last record it is at q - (age + s) / step, q being the
     delay: between the values N and N - 1 back, N = ceil(q), or between those N - 1 and N - 2 back.
     """
     found: dict[str, Expr] = {}
-    for history in histories:
-        passed = divide(add(AGE, Ref("work.s")), real(automaton.step))
-        back = subtract(real(history.steps), passed)
+    for history in delays:
+        passed = divide(add(RECORD_AGE, Ref("work.s")), real(automaton.step))
+        back = subtract(real(history.delay_steps), passed)
         count = history.whole_steps
-        far, middle, near = (Ref(history.name(part)) for part in ("far", "middle", "near"))
-        if history.tunable is not None:
-            found[memory_key(history.tree)] = _tuned(history, passed)
+        far, middle, near = (Ref(history.variable_name(part)) for part in ("far", "middle", "near"))
+        if history.tunable_delay is not None:
+            found[memory_key(history.call)] = _tunable_delay_value(history, passed)
             continue
-        older = _between(middle, far, subtract(back, real(Fraction(count - 1))))
-        if history.steps == count:
-            found[memory_key(history.tree)] = older
+        older = _interpolate(middle, far, subtract(back, real(Fraction(count - 1))))
+        if history.delay_steps == count:
+            found[memory_key(history.call)] = older
             continue
-        newer = _between(near, middle, subtract(back, real(Fraction(count - 2))))
+        newer = _interpolate(near, middle, subtract(back, real(Fraction(count - 2))))
         is_older = Compare(">=", back, real(Fraction(count - 1)))
-        found[memory_key(history.tree)] = Select(is_older, older, newer)
+        found[memory_key(history.call)] = Select(is_older, older, newer)
     return found
 
 
-def _tuned(history: History, passed: Expr) -> Expr:
-    """What a delay of a tunable length is, `passed` major steps after the last record."""
-    far, middle, near = (Ref(history.name(part)) for part in ("far", "middle", "near"))
-    last = subtract(Call("real", (Ref(history.name("count"), whole=True),)), real(1.0))
-    over = subtract(subtract(Ref(history.name("delay")), passed), last)
-    newer = _between(near, middle, add(over, real(1.0)))
-    return Select(Compare(">=", over, real(0.0)), _between(middle, far, over), newer)
+def _tunable_delay_value(delay: ContinuousDelay, elapsed_steps: Expr) -> Expr:
+    """What a delay of a tunable length is, `elapsed_steps` major steps after the last record."""
+    far, middle, near = (Ref(delay.variable_name(part)) for part in ("far", "middle", "near"))
+    last = subtract(Call("real", (Ref(delay.variable_name("count"), is_integer=True),)), real(1.0))
+    over = subtract(subtract(Ref(delay.variable_name("delay")), elapsed_steps), last)
+    newer = _interpolate(near, middle, add(over, real(1.0)))
+    return Select(Compare(">=", over, real(0.0)), _interpolate(middle, far, over), newer)
 
 
-def record_block(histories: tuple[History, ...], known: Names) -> Block:
+def record_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
     """Return what a major step keeps: all read the values of before it."""
     ops: list[Op] = []
     commit: list[Op] = []
-    for history in histories:
+    for history in delays:
         kept = Ref(f"work.keep_{history.number}")
-        newest = Ref(history.name("newest"), whole=True)
-        ops.append(Assign(kept.name, expression(history.tree.arguments[0], known)))
-        commit.append(Assign(newest.name, _place(history, newest, 1)))
-        commit.append(Store(history.name("values"), newest, kept))
-        commit += _oldest(history)
+        newest = Ref(history.variable_name("newest"), is_integer=True)
+        ops.append(Assign(kept.name, lower_expression(history.call.arguments[0], known)))
+        commit.append(Assign(newest.name, _ring_index(history, newest, 1)))
+        commit.append(Store(history.variable_name("values"), newest, kept))
+        commit += _update_oldest(history)
     return (*ops, *commit)
 
 
-def fill_block(histories: tuple[History, ...], known: Names) -> Block:
+def fill_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
     """Return what fills each history with the value at the start."""
     ops: list[Op] = []
-    for history in histories:
+    for history in delays:
         kept, slot = Ref(f"work.keep_{history.number}"), Ref("work.slot")
-        ops.append(Assign(kept.name, expression(history.tree.arguments[0], known)))
-        store = Store(history.name("values"), slot, kept)
+        ops.append(Assign(kept.name, lower_expression(history.call.arguments[0], known)))
+        store = Store(history.variable_name("values"), slot, kept)
         ops.append(Loop(history.whole_steps + 1, slot.name, (store,)))
-        ops.append(Assign(history.name("newest"), whole(0)))
-        ops += _oldest(history)
+        ops.append(Assign(history.variable_name("newest"), integer(0)))
+        ops += _update_oldest(history)
     return tuple(ops)
 
 
-def _between(newer: Ref, older: Ref, part: Expr) -> Expr:
-    return add(newer, multiply(part, subtract(older, newer)))
+def _interpolate(newer: Ref, older: Ref, fraction: Expr) -> Expr:
+    return add(newer, multiply(fraction, subtract(older, newer)))
 
 
-def _place(history: History, newest: Ref, ahead: int) -> Expr:
-    """The place in the ring that comes `ahead` places after the newest value."""
-    size = history.whole_steps + 1
-    last = Compare(">=", newest, whole(size - ahead))
-    return Select(last, subtract(newest, whole(size - ahead)), add(newest, whole(ahead)))
+def _ring_index(delay: ContinuousDelay, newest: Ref, offset: int) -> Expr:
+    """The place in the ring that comes `offset` places after the newest value."""
+    size = delay.whole_steps + 1
+    last = Compare(">=", newest, integer(size - offset))
+    return Select(last, subtract(newest, integer(size - offset)), add(newest, integer(offset)))
 
 
-def _oldest(history: History) -> list[Op]:
-    newest = Ref(history.name("newest"), whole=True)
-    if history.tunable is not None:
-        return _oldest_tuned(history, newest)
-    parts = ("far", "middle") if history.steps == history.whole_steps else ("far", "middle", "near")
+def _update_oldest(delay: ContinuousDelay) -> list[Op]:
+    newest = Ref(delay.variable_name("newest"), is_integer=True)
+    if delay.tunable_delay is not None:
+        return _update_oldest_tunable(delay, newest)
+    parts = (
+        ("far", "middle") if delay.delay_steps == delay.whole_steps else ("far", "middle", "near")
+    )
     return [
-        Assign(history.name(part), Item(history.name("values"), _place(history, newest, ahead)))
+        Assign(
+            delay.variable_name(part),
+            Item(delay.variable_name("values"), _ring_index(delay, newest, ahead)),
+        )
         for ahead, part in enumerate(parts, start=1)
     ]
 
 
-def _oldest_tuned(history: History, newest: Ref) -> list[Op]:
+def _update_oldest_tunable(history: ContinuousDelay, newest: Ref) -> list[Op]:
     """The delay as it is now, and the values around its end."""
-    delay, count = history.name("delay"), history.name("count")
-    assert history.tunable is not None
-    steps = divide(history.tunable, real(history.step))
+    delay, count = history.variable_name("delay"), history.variable_name("count")
+    assert history.tunable_delay is not None
+    steps = divide(history.tunable_delay, real(history.major_step))
     size = history.whole_steps + 1
     rounded_up = Unary("-", Call("floor", (Unary("-", Ref(delay)),)))
     ops: list[Op] = [
-        Assign(delay, Call("clip", (steps, real(1.0), real(history.steps)))),
+        Assign(delay, Call("clip", (steps, real(1.0), real(history.delay_steps)))),
         Assign(count, Call("whole", (rounded_up,))),
     ]
     for less, part in enumerate(("far", "middle", "near")):
-        place = add(subtract(newest, Ref(count, whole=True)), whole(less))
-        inside = Select(Compare("<", place, whole(0)), add(place, whole(size)), place)
+        place = add(subtract(newest, Ref(count, is_integer=True)), integer(less))
+        inside = Select(Compare("<", place, integer(0)), add(place, integer(size)), place)
         if part == "near":
-            inside = Select(Compare(">", Ref(count, whole=True), whole(1)), inside, newest)
-        ops.append(Assign(history.name(part), Item(history.name("values"), inside)))
+            inside = Select(Compare(">", Ref(count, is_integer=True), integer(1)), inside, newest)
+        ops.append(
+            Assign(history.variable_name(part), Item(history.variable_name("values"), inside))
+        )
     return ops
 
 
-def history_variables(histories: tuple[History, ...]) -> list[Variable]:
+def continuous_delay_variables(delays: tuple[ContinuousDelay, ...]) -> list[Variable]:
     """Return the variables of histories; `finished` leaves out what is not used."""
     found = [
-        Variable(AGE.name, "real", "s", about="time since the last record"),
+        Variable(RECORD_AGE.name, "real", "s", about="time since the last record"),
         Variable("work.slot", "whole"),
         Variable("work.round", "whole"),
     ]
-    for history in histories:
+    for history in delays:
         size = history.whole_steps + 1
-        found.append(Variable(history.name("values"), "real", size=size, about="a major step each"))
-        found.append(Variable(history.name("newest"), "whole", about="which is the newest"))
-        found += [Variable(history.name(part), "real") for part in ("far", "middle", "near")]
+        found.append(
+            Variable(history.variable_name("values"), "real", size=size, about="a major step each")
+        )
+        found.append(
+            Variable(history.variable_name("newest"), "whole", about="which is the newest")
+        )
+        found += [
+            Variable(history.variable_name(part), "real") for part in ("far", "middle", "near")
+        ]
         found.append(Variable(f"work.keep_{history.number}", "real"))
-        found.append(Variable(history.name("delay"), "real", about="delay in major steps"))
-        found.append(Variable(history.name("count"), "whole", about="delay, rounded up"))
+        found.append(Variable(history.variable_name("delay"), "real", about="delay in major steps"))
+        found.append(Variable(history.variable_name("count"), "whole", about="delay, rounded up"))
     return found
 
 
@@ -219,24 +234,26 @@ def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
     """Return the times after which an `after` or `every` in a guard is true, by mode."""
     found: list[Alarm] = []
     for mode in automaton.all_modes:
-        for tree in _times(mode).values():
-            time = exact_value(Formula(tree.arguments[0], ""), automaton)
+        for tree in _timer_calls(mode).values():
+            time = evaluate_exactly(Formula(tree.arguments[0], ""), automaton)
             name = f"memory.{tree.function}_{len(found) + 1}"
             repeats = tree.function == "every"
             found.append(Alarm(name, mode.region, mode.number, time, repeats))
     return tuple(found)
 
 
-def alarm_names(automaton: Automaton) -> Mapping[str, Names]:
+def alarm_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
     """Return, by the key of a mode, what the times in its guards are."""
     alarms = iter(alarms_of(automaton))
     return {
-        mode.key: {key: Ref(next(alarms).variable) for key in _times(mode)}
+        mode.key: {key: Ref(next(alarms).variable) for key in _timer_calls(mode)}
         for mode in automaton.all_modes
     }
 
 
-def _times(mode: Mode) -> dict[str, Application]:
+def _timer_calls(mode: Mode) -> dict[str, FunctionCall]:
     parts = [part for t in mode.transitions for part in walk(t.when.tree)]
-    found = [part for part in parts if isinstance(part, Application) and part.function in TIMES]
+    found = [
+        part for part in parts if isinstance(part, FunctionCall) and part.function in TIME_FUNCTIONS
+    ]
     return {memory_key(part): part for part in found}

@@ -15,9 +15,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Literal
 
-from language.common import CHEAP, common_once
+from language.common import CHEAP_FUNCTIONS, eliminate_common_subexpressions
 from language.evaluate import Scalar, evaluate
-from language.formula_name import formula_name, formula_text
+from language.formula_name import format_formula, formula_name
 from language.lower import is_whole
 from language.number import NumberType
 from language.operation import (
@@ -33,69 +33,71 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.printing import expr_text
+from language.printing import format_expr
 from language.program import Constant, Program, Variable
-from language.substitution import parts, with_expressions, with_parts
+from language.substitution import map_expressions, map_operands, operands
 from language.traversal import block_names, block_writes, expr_names
 
 SMALLEST_NORMAL: Mapping[NumberType, float] = {"float64": 2.0**-1022, "float32": 2.0**-126}
 """A reciprocal below it has lost digits: then division stays division."""
-ONCE = ("derive", "init", "start", "compare_stamps", "latch")
+EXCLUDED_BLOCKS = ("derive", "init", "start", "compare_stamps", "latch")
 """Blocks that run once, or where what is hoisted is computed."""
-FIXED = "constant."
-TUNABLE = ("calibration.", "derived.")
-FROZEN = "before."
-LATCH = "latch"
+CONSTANT_PREFIX = "constant."
+TUNABLE_PREFIXES = ("calibration.", "derived.")
+LATCHED_PREFIX = "before."
+LATCH_BLOCK = "latch"
 
 
-def hoisted(program: Program) -> Program:
+def run_passes(program: Program) -> Program:
     """Return a Program that computes what does not change once."""
     for run in PASSES.values():
         program = run(program)
     return program
 
 
-def inputs_once(program: Program) -> Program:
+def hoist_inputs(program: Program) -> Program:
     """Return a continuous Program that computes with its inputs where they are latched.
 
     Nothing tunable is in it: a page turns between two latches.
     """
     if program.period is not None:
         return program
-    latched = set(block_writes(program.blocks[LATCH]))
-    found = _Found(program)
+    latched = set(block_writes(program.blocks[LATCH_BLOCK]))
+    found = _HoistedValues(program)
 
     def is_latched(name: str) -> bool | None:
-        return name in latched or (None if name.startswith(FIXED) else False)
+        return name in latched or (None if name.startswith(CONSTANT_PREFIX) else False)
 
     def change(expr: Expr) -> Expr:
-        return found.ref(FROZEN, expr)
+        return found.ref_to(LATCHED_PREFIX, expr)
 
-    blocks = _changed(program, is_latched, change)
-    ops = [Assign(name, expr, formula_text(expr)) for name, expr in found.made.items()]
-    looks, once = _if_changed(program, ops)
-    blocks[LATCH] = (*looks, *blocks[LATCH], *once)
+    blocks = _replace_hoistable(program, is_latched, change)
+    ops = [Assign(name, expr, format_formula(expr)) for name, expr in found.expressions.items()]
+    looks, once = _recompute_if_changed(program, ops)
+    blocks[LATCH_BLOCK] = (*looks, *blocks[LATCH_BLOCK], *once)
     variables = [Variable(op.target, "real", about=op.key) for op in ops]
     variables += [Variable(op.target, "truth") for op in looks]
-    return _with(program, blocks=blocks, variables=(*program.variables, *variables))
+    return _replace(program, blocks=blocks, variables=(*program.variables, *variables))
 
 
-def _if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list[Op]]:
+def _recompute_if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list[Op]]:
     """Return what looks whether inputs changed, before they are latched, and what follows from it.
 
     A function of inputs is computed anew if one of them is another number than before.
     """
-    whole = {v.name: v.type == "whole" for v in program.variables if v.name.startswith(FROZEN)}
+    whole = {
+        v.name: v.type == "whole" for v in program.variables if v.name.startswith(LATCHED_PREFIX)
+    }
     looks: dict[str, Assign] = {}
     found: list[Op] = []
     for op in ops:
         read = dict.fromkeys(expr_names(op.value))
-        if not any(name.startswith("call ") and name[5:] not in CHEAP for name in read):
+        if not any(name.startswith("call ") and name[5:] not in CHEAP_FUNCTIONS for name in read):
             found.append(op)
             continue
         is_due: Expr = Unary("not", Ref("memory.started"))
         for before in (name for name in read if name in whole):
-            name = before.removeprefix(FROZEN)
+            name = before.removeprefix(LATCHED_PREFIX)
             now = Ref(f"input.{name}", whole[before])
             is_other = Compare("!=", now, Ref(before, whole[before]))
             looks[name] = Assign(f"work.changed_{name}", is_other)
@@ -104,22 +106,22 @@ def _if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list
     return list(looks.values()), found
 
 
-def parameters_once(program: Program) -> Program:
+def fold_parameters(program: Program) -> Program:
     """Return a Program in which what follows from parameters is a constant or derived."""
-    number = program.number
+    number = program.number_type
     values: dict[str, Scalar] = {c.name: c.value for c in program.constants if not c.items}
     real = {c.name for c in program.constants if c.type == "real" and not c.items}
-    found = _Found(program)
+    found = _HoistedValues(program)
 
     def is_parameter(name: str) -> bool | None:
-        return name in real and name.startswith((FIXED, *TUNABLE))
+        return name in real and name.startswith((CONSTANT_PREFIX, *TUNABLE_PREFIXES))
 
     def change(expr: Expr) -> Expr:
         value = float(evaluate(expr, values, number))
         if not math.isfinite(value):
             return expr
-        is_fixed = all(name.startswith((FIXED, "call ")) for name in expr_names(expr))
-        ref = found.ref(FIXED if is_fixed else "derived.", expr)
+        is_fixed = all(name.startswith((CONSTANT_PREFIX, "call ")) for name in expr_names(expr))
+        ref = found.ref_to(CONSTANT_PREFIX if is_fixed else "derived.", expr)
         values[ref.name] = value
         return ref
 
@@ -129,65 +131,67 @@ def parameters_once(program: Program) -> Program:
         is_normal = SMALLEST_NORMAL[number] <= size < math.inf
         return change(inverse) if is_normal else None
 
-    blocks = _changed(program, is_parameter, change, reciprocal)
+    blocks = _replace_hoistable(program, is_parameter, change, reciprocal)
     constants, derived = [], []
-    for name, expr in found.made.items():
-        is_fixed, text = name.startswith(FIXED), formula_text(expr)
+    for name, expr in found.expressions.items():
+        is_fixed, text = name.startswith(CONSTANT_PREFIX), format_formula(expr)
         kind: Literal["fixed", "derived"] = "fixed" if is_fixed else "derived"
         constants.append(Constant(name, kind, float(values[name]), unit="", about=text))
         if not is_fixed:
             derived.append(Assign(name, expr, text))
     if derived:
         blocks["derive"] = (*blocks.get("derive", ()), *derived)
-    return _with(program, blocks=blocks, constants=(*program.constants, *constants))
+    return _replace(program, blocks=blocks, constants=(*program.constants, *constants))
 
 
-def finally_common(program: Program) -> Program:
+def eliminate_redundancy(program: Program) -> Program:
     """Return a Program whose blocks compute nothing twice, without constants that nothing reads."""
-    return _without_idle(common_once(program))
+    return _remove_unused_constants(eliminate_common_subexpressions(program))
 
 
-def _without_idle(program: Program) -> Program:
+def _remove_unused_constants(program: Program) -> Program:
     """Leave out the fixed parameters that are read no more: the comment of a value has them."""
     used = {name for block in program.blocks.values() for name in block_names(block)}
-    kept = tuple(c for c in program.constants if c.name in used or not c.name.startswith(FIXED))
-    return _with(program, constants=kept)
+    kept = tuple(
+        c for c in program.constants if c.name in used or not c.name.startswith(CONSTANT_PREFIX)
+    )
+    return _replace(program, constants=kept)
 
 
-class _Found:
+class _HoistedValues:
     """What was hoisted: the expression of each new name."""
 
     def __init__(self, program: Program) -> None:
         names = [v.name for v in program.variables] + [c.name for c in program.constants]
         names += [f"block.{name}" for name in program.blocks]
-        self._taken = {name.partition(".")[2].lower() for name in names}
+        self._used_names = {name.partition(".")[2].lower() for name in names}
         self._names: dict[str, str] = {}
-        self.made: dict[str, Expr] = {}
+        self.expressions: dict[str, Expr] = {}
 
-    def ref(self, group: str, expr: Expr) -> Ref:
+    def ref_to(self, group: str, expr: Expr) -> Ref:
         """Return what reads the value of an expression, by a name that no other has."""
-        text = expr_text(expr)
+        text = format_expr(expr)
         if text not in self._names:
             base = formula_name(expr)
             name, number = base, 1
-            while name.lower() in self._taken:
+            while name.lower() in self._used_names:
                 number += 1
                 name = f"{base}_{number}"
-            self._taken.add(name.lower())
+            self._used_names.add(name.lower())
             self._names[text] = group + name
-            self.made[group + name] = expr
+            self.expressions[group + name] = expr
         return Ref(self._names[text])
 
 
-def _changed(
+def _replace_hoistable(
     program: Program,
-    reads: Callable[[str], bool | None],
-    change: Callable[[Expr], Expr],
+    is_hoistable_name: Callable[[str], bool | None],
+    hoist: Callable[[Expr], Expr],
     reciprocal: Callable[[Expr], Expr | None] = lambda divisor: None,
 ) -> dict[str, Block]:
     """Return the blocks of a Program with the largest hoistable expressions changed.
 
-    `reads` tells of a name whether a value that reads it can be hoisted, None if that alone is no
+    `is_hoistable_name` tells of a name whether a value that reads it can be hoisted, None if that alone is no
     reason to; `reciprocal` gives the inverse of a divisor that can be.
     """
 
@@ -197,18 +201,18 @@ def _changed(
             case Value():
                 return expr, None
             case Ref(name):
-                return expr, reads(name)
+                return expr, is_hoistable_name(name)
             case Unary("-") | Binary() | Call():
-                inner = [visit(part) for part in parts(expr)]
+                inner = [visit(part) for part in operands(expr)]
                 kinds = [kind for _, kind in inner]
                 if False not in kinds:
                     return expr, True if True in kinds else None
                 return _with_changed(expr, inner), False
             case _:
-                return with_parts(expr, lambda part: settled(*visit(part))), False
+                return map_operands(expr, lambda part: settled(*visit(part))), False
 
     def settled(expr: Expr, kind: bool | None) -> Expr:
-        return change(expr) if kind and _is_real_operation(expr) else expr
+        return hoist(expr) if kind and _is_real_operation(expr) else expr
 
     def _with_changed(expr: Expr, inner: list[tuple[Expr, bool | None]]) -> Expr:
         if isinstance(expr, Binary) and expr.operator == "/" and inner[1][1]:
@@ -216,10 +220,12 @@ def _changed(
             if inverse is not None:
                 return Binary("*", settled(*inner[0]), inverse)
         pending = iter(inner)
-        return with_parts(expr, lambda _: settled(*next(pending)))
+        return map_operands(expr, lambda _: settled(*next(pending)))
 
     return {
-        name: block if name in ONCE else with_expressions(block, lambda e: settled(*visit(e)))
+        name: block
+        if name in EXCLUDED_BLOCKS
+        else map_expressions(block, lambda e: settled(*visit(e)))
         for name, block in program.blocks.items()
     }
 
@@ -233,13 +239,13 @@ def _is_real_operation(expr: Expr) -> bool:
     return isinstance(expr, Call) and expr.function != "whole"
 
 
-def _with(program: Program, **changes: object) -> Program:
+def _replace(program: Program, **changes: object) -> Program:
     return dataclasses.replace(program, **changes)  # type: ignore[arg-type]
 
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
-    "parameters": parameters_once,
-    "inputs": inputs_once,
-    "program": finally_common,
+    "parameters": fold_parameters,
+    "inputs": hoist_inputs,
+    "program": eliminate_redundancy,
 }
 """The passes in their order, as `modewright explain --pass` names them."""

@@ -11,25 +11,31 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, lru_cache
 
-from language.action import place_of
-from language.constants import derive_block, parameter_constants, values_of
+from language.action import storage_of
+from language.constants import constant_values, derive_block, parameter_constants
 from language.declaration import Input, Parameter, State
 from language.evaluate import Scalar
-from language.halfspace import narrowed
+from language.halfspace import narrow_domains
 from language.model import Automaton
-from language.moment import Story
-from language.number import NumberType, rounded
+from language.moment import SymbolicPath
+from language.number import NumberType, round_to_type
 from language.operation import Assign, Expr
 from language.parameter import parameter_kinds
 from language.problem import Problems
 from language.program import value_type
-from language.question import Extent, Point, Question, Step, shown
-from language.sample import few_points, many_points, near
-from language.solver import SMALL_EFFORT, Solver, Verdict
+from language.question import (
+    SolverQuery,
+    SymbolicAssignment,
+    Valuation,
+    VariableDomain,
+    format_valuation,
+)
+from language.sample import all_sample_points, first_sample_points, neighbouring_points
+from language.solver import SMALL_RESOURCE_LIMIT, Solver, Verdict
 
-MOST_TRIED = 20_000
+MAX_SEARCHED_POINTS = 20_000
 """Points tried of all questions that z3 leaves open: a second or two."""
-MOST_ASKED = 4000
+MAX_SOLVER_QUERIES = 4000
 """Questions for z3 of one check; beyond they stay open."""
 
 
@@ -37,158 +43,166 @@ MOST_ASKED = 4000
 class Witness:
     """Values at which all conditions of a question hold, as our own arithmetic says."""
 
-    point: Point
+    valuation: Valuation
     text: str
 
     @property
-    def place(self) -> str:
+    def hint_prefix(self) -> str:
         """How a help begins: `at x = 0.5; `, empty where no value that is told matters."""
         return f"at {self.text}; " if self.text else ""
 
 
-class Inquiry:
+class QueryEngine:
     """Asks about one automaton; parameters have their present values unless they are free."""
 
     def __init__(self, automaton: Automaton) -> None:
         """Find what every variable can be."""
         self.automaton = automaton
-        self.asked = self.tried = 0
-        self.values = values_of(parameter_constants(automaton, Problems()))
-        self.extents = dict(_extents(automaton))
-        self.tunables = {
-            f"calibration.{name}": _bounded(automaton.parameters[name], automaton.numbers)
+        self.query_count = self.point_count = 0
+        self.parameter_values = constant_values(parameter_constants(automaton, Problems()))
+        self.domains = dict(_declared_domains(automaton))
+        self.tunable_domains = {
+            f"calibration.{name}": _declared_domain(automaton.parameters[name], automaton.numbers)
             for name, kind in parameter_kinds(automaton).items()
             if kind == "tunable" and not automaton.parameters[name].table
         }
-        self.derived: list[Step] = [
+        self.derived_assignments: list[SymbolicAssignment] = [
             (op.target, op.value) for op in derive_block(automaton) if isinstance(op, Assign)
         ]
 
-    def question(self, story: Story, conditions: Iterable[Expr]) -> Question:
+    def build_query(self, path: SymbolicPath, conditions: Iterable[Expr]) -> SolverQuery:
         """Return the question whether some conditions can hold together in a story."""
-        extents = {**self.extents, **story.extents}
-        together = (*conditions, *story.facts)
-        return Question(together, tuple(story.steps), extents, self.values)
+        extents = {**self.domains, **path.domains}
+        together = (*conditions, *path.assumptions)
+        return SolverQuery(together, tuple(path.assignments), extents, self.parameter_values)
 
-    def freed(self, question: Question) -> Question | None:
+    def free_tunables(self, query: SolverQuery) -> SolverQuery | None:
         """Return the question with all values that tunables can have, None if it reads none."""
         wider = replace(
-            question,
-            steps=(*self.derived, *question.steps),
-            extents={**question.extents, **self.tunables},
+            query,
+            assignments=(*self.derived_assignments, *query.assignments),
+            domains={**query.domains, **self.tunable_domains},
         )
-        return wider if any(name in wider.read for name in self.tunables) else None
+        return wider if any(name in wider.names_read for name in self.tunable_domains) else None
 
-    def answer(self, question: Question) -> Witness | Verdict:
+    def answer(self, query: SolverQuery) -> Witness | Verdict:
         """Return a witness, "never", or "open"."""
-        narrower = narrowed(question)
+        narrower = narrow_domains(query)
         if narrower is None:
             return "never"
-        found = next(filter(question.holds_at, few_points(question, narrower)), None)
+        found = next(filter(query.holds_at, first_sample_points(query, narrower)), None)
         if found is None:
-            decided = self._decided(question)
+            decided = self._solve(query)
             if isinstance(decided, str) and decided == "never":
                 return decided
-            found = self._searched(question) if isinstance(decided, str) else decided
-        return _witness(question, found) if found else "open"
+            found = self._search_points(query) if isinstance(decided, str) else decided
+        return _build_witness(query, found) if found else "open"
 
-    def freely(self, question: Question) -> Witness | Verdict:
+    def answer_for_all_tunables(self, query: SolverQuery) -> Witness | Verdict:
         """Return the answer for all values that tunables can have, the present ones first."""
-        found = self.answer(question)
-        wider = self.freed(question) if found == "never" else None
+        found = self.answer(query)
+        wider = self.free_tunables(query) if found == "never" else None
         return self.answer(wider) if wider else found
 
-    def never(self, question: Question) -> bool:
+    def is_unsatisfiable(self, query: SolverQuery) -> bool:
         """Tell whether it is proven that conditions never hold together, tunables being any."""
-        self.asked += 1
-        if self.asked > MOST_ASKED or not _proven(Asked(question.key, question)):
+        self.query_count += 1
+        if self.query_count > MAX_SOLVER_QUERIES or not _is_proven_unsatisfiable(
+            QueryKey(query.key, query)
+        ):
             return False
-        wider = self.freed(question)
-        return wider is None or _proven(Asked(wider.key, wider))
+        wider = self.free_tunables(query)
+        return wider is None or _is_proven_unsatisfiable(QueryKey(wider.key, wider))
 
-    def confirmed(self, exact: Question, near: Question) -> Witness | None:
+    def find_confirmed_witness(self, exact: SolverQuery, near: SolverQuery) -> Witness | None:
         """Return a witness that z3 finds for a question, and that holds for one near to it."""
-        self.asked += 1
-        if self.asked > MOST_ASKED or narrowed(exact) is None:
+        self.query_count += 1
+        if self.query_count > MAX_SOLVER_QUERIES or narrow_domains(exact) is None:
             return None
-        found = solver().ask(exact, SMALL_EFFORT)
+        found = shared_solver().solve(exact, SMALL_RESOURCE_LIMIT)
         return (
-            _witness(near, found) if not isinstance(found, str) and near.holds_at(found) else None
+            _build_witness(near, found)
+            if not isinstance(found, str) and near.holds_at(found)
+            else None
         )
 
-    def _decided(self, question: Question) -> Point | Verdict:
+    def _solve(self, query: SolverQuery) -> Valuation | Verdict:
         """Return a witness that z3 finds and our own arithmetic confirms, or what z3 says."""
-        self.asked += 1
-        found = solver().ask(question) if self.asked <= MOST_ASKED else "open"
+        self.query_count += 1
+        found = shared_solver().solve(query) if self.query_count <= MAX_SOLVER_QUERIES else "open"
         if isinstance(found, str):
             return found
-        return next((point for point in near(found, question) if question.holds_at(point)), "open")
+        return next(
+            (point for point in neighbouring_points(found, query) if query.holds_at(point)), "open"
+        )
 
-    def _searched(self, question: Question) -> Point | None:
+    def _search_points(self, query: SolverQuery) -> Valuation | None:
         """Return a witness among many points, as long as not too many were tried in all."""
-        for point in many_points(question):
-            self.tried += 1
-            if self.tried > MOST_TRIED:
+        for point in all_sample_points(query):
+            self.point_count += 1
+            if self.point_count > MAX_SEARCHED_POINTS:
                 return None
-            if question.holds_at(point):
+            if query.holds_at(point):
                 return point
         return None
 
 
 @dataclass(frozen=True)
-class Asked:
+class QueryKey:
     """A question by what it says: the same one, asked again, has its answer already."""
 
     key: object
-    question: Question = field(compare=False)
+    query: SolverQuery = field(compare=False)
 
 
 @lru_cache(maxsize=2048)
-def _proven(asked: Asked) -> bool:
+def _is_proven_unsatisfiable(query_key: QueryKey) -> bool:
     """Tell whether conditions are proven never to hold together."""
-    question = asked.question
-    narrower = narrowed(question)
+    question = query_key.query
+    narrower = narrow_domains(question)
     if narrower is None:
         return True
-    if any(question.holds_at(point) for point in few_points(question, narrower)):
+    if any(question.holds_at(point) for point in first_sample_points(question, narrower)):
         return False
-    return solver().ask(question, SMALL_EFFORT) == "never"
+    return shared_solver().solve(question, SMALL_RESOURCE_LIMIT) == "never"
 
 
 @cache
-def solver() -> Solver:
+def shared_solver() -> Solver:
     """Return the one solver: what it has made of names and numbers is of use again."""
     return Solver()
 
 
-def _witness(question: Question, point: Point) -> Witness:
-    shorter = question.shortened(point)
-    told = {name: value for name, value in shorter.items() if not name.startswith("memory.")}
-    return Witness(shorter, shown(told, question.extents))
+def _build_witness(query: SolverQuery, valuation: Valuation) -> Witness:
+    shorter = query.shorten(valuation)
+    shown_values = {
+        name: value for name, value in shorter.items() if not name.startswith("memory.")
+    }
+    return Witness(shorter, format_valuation(shown_values, query.domains))
 
 
-def _extents(automaton: Automaton) -> Iterator[tuple[str, Extent]]:
+def _declared_domains(automaton: Automaton) -> Iterator[tuple[str, VariableDomain]]:
     for name, thing in automaton.inputs.items():
-        extent = _bounded(thing, automaton.numbers)
+        extent = _declared_domain(thing, automaton.numbers)
         if thing.default is not None:
-            default: Scalar = rounded(thing.default, automaton.numbers)
-            extent = replace(extent, default=_typed(default, extent))
+            default: Scalar = round_to_type(thing.default, automaton.numbers)
+            extent = replace(extent, default=_cast_to_domain(default, extent))
         yield f"input.{name}", extent
-    for name, variable in automaton.carried.items():
-        yield place_of(automaton, name), _bounded(variable, automaton.numbers)
+    for name, variable in automaton.state_variables.items():
+        yield storage_of(automaton, name), _declared_domain(variable, automaton.numbers)
 
 
-def _typed(value: Scalar, extent: Extent) -> Scalar:
-    if extent.type == "truth":
+def _cast_to_domain(value: Scalar, domain: VariableDomain) -> Scalar:
+    if domain.type == "truth":
         return bool(value)
-    return int(value) if extent.type == "whole" else value
+    return int(value) if domain.type == "whole" else value
 
 
-def _bounded(thing: Input | State | Parameter, numbers: NumberType) -> Extent:
+def _declared_domain(declaration: Input | State | Parameter, numbers: NumberType) -> VariableDomain:
     """Return what a declared thing can be, with its bounds as a program has them."""
-    if thing.type == "enum":
-        places = tuple(range(len(thing.values)))
-        return Extent("whole", numbers=places, names=thing.values)
-    bounds = [Fraction(rounded(bound, numbers)) for bound in thing.range or ()]
+    if declaration.type == "enum":
+        places = tuple(range(len(declaration.values)))
+        return VariableDomain("whole", numbers=places, names=declaration.values)
+    bounds = [Fraction(round_to_type(bound, numbers)) for bound in declaration.range or ()]
     low, high = bounds or (None, None)
-    return Extent(value_type(thing.type), low, high)
+    return VariableDomain(value_type(declaration.type), low, high)

@@ -15,12 +15,12 @@ Points = Sequence[float]
 class Interpolation:
     """Tables in one number type: linear between points, held outside, NaN at NaN."""
 
-    rounded: Callable[[float], float]
+    round_value: Callable[[float], float]
 
     def lookup(self, axis: Points, size: int, values: Points, x: float) -> float:
         """Return the value of a table at x."""
-        low, part = self._cell(axis, size, x)
-        return self._blend(values[low], values[low + 1], part)
+        low, part = self._find_cell(axis, size, x)
+        return self._interpolate(values[low], values[low + 1], part)
 
     def lookup2(
         self,
@@ -33,14 +33,14 @@ class Interpolation:
         y: float,
     ) -> float:
         """Return the value of a table at (x, y): linear in y along both rows, then in x."""
-        row, down = self._cell(rows, count, x)
-        column, along = self._cell(columns, width, y)
+        row, down = self._find_cell(rows, count, x)
+        column, along = self._find_cell(columns, width, y)
         first = row * width + column
-        upper = self._blend(values[first], values[first + 1], along)
-        lower = self._blend(values[first + width], values[first + width + 1], along)
-        return self._blend(upper, lower, down)
+        upper = self._interpolate(values[first], values[first + 1], along)
+        lower = self._interpolate(values[first + width], values[first + width + 1], along)
+        return self._interpolate(upper, lower, down)
 
-    def _cell(self, axis: Points, size: int, x: float) -> tuple[int, float]:
+    def _find_cell(self, axis: Points, size: int, x: float) -> tuple[int, float]:
         """Return the interval of an axis that x is in, by bisection, and the part of it before x.
 
         Outside, the part is 0 or 1; of NaN it is NaN.
@@ -56,11 +56,11 @@ class Interpolation:
                 high = middle
             else:
                 low = middle
-        before, whole = self.rounded(x - axis[low]), self.rounded(axis[high] - axis[low])
-        return low, self.rounded(before / whole)
+        before, whole = self.round_value(x - axis[low]), self.round_value(axis[high] - axis[low])
+        return low, self.round_value(before / whole)
 
-    def _blend(self, a: float, b: float, part: float) -> float:
+    def _interpolate(self, a: float, b: float, fraction: float) -> float:
         """Return a at 0, b at 1, linear between."""
-        if part >= 1.0:
+        if fraction >= 1.0:
             return b
-        return self.rounded(a + self.rounded(part * self.rounded(b - a)))
+        return self.round_value(a + self.round_value(fraction * self.round_value(b - a)))

@@ -17,43 +17,47 @@ class Interval:
 
     low: float = -math.inf
     high: float = math.inf
-    known: bool = False
-    broken: bool = False
+    is_certain: bool = False
+    excludes_zero: bool = False
 
     @property
-    def meets_zero(self) -> bool:
+    def contains_zero(self) -> bool:
         """Tell whether 0 is among the values."""
-        return self.low <= 0.0 <= self.high and not self.broken
+        return self.low <= 0.0 <= self.high and not self.excludes_zero
 
-    def within(self, other: Interval) -> Interval:
+    def intersect(self, other: Interval) -> Interval:
         """Return the part that lies in another one too."""
-        broken = self.broken or other.broken
-        return Interval(max(self.low, other.low), min(self.high, other.high), self.known, broken)
+        broken = self.excludes_zero or other.excludes_zero
+        return Interval(
+            max(self.low, other.low), min(self.high, other.high), self.is_certain, broken
+        )
 
-    def joined(self, other: Interval) -> Interval:
+    def hull(self, other: Interval) -> Interval:
         """Return what holds the values of both."""
-        known = self.known and other.known
-        broken = not (self.meets_zero or other.meets_zero)
+        known = self.is_certain and other.is_certain
+        broken = not (self.contains_zero or other.contains_zero)
         return Interval(min(self.low, other.low), max(self.high, other.high), known, broken)
 
 
-ANYTHING = Interval()
+UNBOUNDED = Interval()
 
 
-def corners(left: Interval, right: Interval, join: Callable[[float, float], float]) -> Interval:
-    """Return what `join` makes of two intervals, where it is monotonic in both."""
-    values = [join(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
+def image_of_corners(
+    left: Interval, right: Interval, operation: Callable[[float, float], float]
+) -> Interval:
+    """Return what `operation` makes of two intervals, where it is monotonic in both."""
+    values = [operation(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
     values = [0.0 if value != value else value for value in values]  # 0 times an infinity
-    return Interval(min(values), max(values), left.known and right.known)
+    return Interval(min(values), max(values), left.is_certain and right.is_certain)
 
 
-def even(base: Interval, exponent: int) -> Interval:
+def even_power(base: Interval, exponent: int) -> Interval:
     """Return an even power of an interval."""
-    ends = [raised(base.low, exponent), raised(base.high, exponent)]
-    return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.known)
+    ends = [power_or_inf(base.low, exponent), power_or_inf(base.high, exponent)]
+    return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.is_certain)
 
 
-def raised(value: float, exponent: int) -> float:
+def power_or_inf(value: float, exponent: int) -> float:
     """Return a whole power of a number, infinite where it is too large."""
     try:
         return float(value**exponent)
@@ -61,14 +65,14 @@ def raised(value: float, exponent: int) -> float:
         return math.inf if value > 0.0 or exponent % 2 == 0 else -math.inf
 
 
-def image(name: str, parts: list[Interval]) -> Interval:
+def function_image(name: str, parts: list[Interval]) -> Interval:
     """Return what a function makes of intervals; anything where that is not known."""
-    first, known = parts[0], all(part.known for part in parts)
+    first, known = parts[0], all(part.is_certain for part in parts)
     match name:
         case "abs":
             sizes = abs(first.low), abs(first.high)
             low = 0.0 if first.low <= 0.0 <= first.high else min(sizes)
-            return Interval(low, max(sizes), known, first.broken)
+            return Interval(low, max(sizes), known, first.excludes_zero)
         case "min" | "max":
             pick = min if name == "min" else max
             return Interval(pick(p.low for p in parts), pick(p.high for p in parts), known)
@@ -78,12 +82,12 @@ def image(name: str, parts: list[Interval]) -> Interval:
         case "sqrt":
             return Interval(math.sqrt(max(first.low, 0.0)), math.sqrt(max(first.high, 0.0)), known)
         case "exp":
-            return Interval(_exponential(first.low), _exponential(first.high), known)
+            return Interval(_clamped_exp(first.low), _clamped_exp(first.high), known)
         case "pow":
-            base = Interval(max(first.low, 0.0), max(first.high, 0.0), first.known)
-            return corners(base, parts[1], _to_power)
+            base = Interval(max(first.low, 0.0), max(first.high, 0.0), first.is_certain)
+            return image_of_corners(base, parts[1], _clamped_pow)
         case "log":
-            return Interval(_logarithm(first.low), _logarithm(first.high), known)
+            return Interval(_clamped_log(first.low), _clamped_log(first.high), known)
         case "sin" | "cos" | "tanh" | "sign":
             return Interval(-1.0, 1.0, True)
         case "atan2":
@@ -93,22 +97,22 @@ def image(name: str, parts: list[Interval]) -> Interval:
         case "previous" | "delay":
             return first
         case _:
-            return ANYTHING
+            return UNBOUNDED
 
 
-def _logarithm(value: float) -> float:
+def _clamped_log(value: float) -> float:
     return math.log(min(max(value, sys.float_info.min), sys.float_info.max))
 
 
-def _to_power(base: float, degree: float) -> float:
+def _clamped_pow(base: float, degree: float) -> float:
     if base <= 0.0 < degree:
         return 0.0
     try:
         power = math.pow(max(base, sys.float_info.min), degree)
     except OverflowError:
         power = math.inf
-    return min(max(power, _exponential(-math.inf)), _exponential(math.inf))
+    return min(max(power, _clamped_exp(-math.inf)), _clamped_exp(math.inf))
 
 
-def _exponential(value: float) -> float:
+def _clamped_exp(value: float) -> float:
     return math.exp(min(max(value, -708.0), 709.0))

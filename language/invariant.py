@@ -5,21 +5,25 @@ Block `invariants` sets `check.<mode>_<name>` for those of the active modes; not
 
 from __future__ import annotations
 
-from language.lower import Names, equation_names, expression
+from language.lower import NameBindings, equation_bindings, lower_expression
 from language.model import Automaton
-from language.operation import Assign, Block, Choose
+from language.operation import Assign, Block, Switch
 from language.program import InvariantInfo, Variable, mode_variable
 
 INVARIANTS = "invariants"
 """The block; generated code has it not."""
-GROUP = "check."
+INVARIANT_PREFIX = "check."
 
 
 def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
     """Return the invariants of all modes, in the order of the file."""
     return tuple(
         InvariantInfo(
-            name, mode.number, mode.region, f"{GROUP}{mode.label}_{name}", invariant.message
+            name,
+            mode.number,
+            mode.region,
+            f"{INVARIANT_PREFIX}{mode.label}_{name}",
+            invariant.message,
         )
         for mode in automaton.all_modes
         for name, invariant in mode.invariants.items()
@@ -33,25 +37,25 @@ def invariant_variables(automaton: Automaton) -> list[Variable]:
     ]
 
 
-def invariant_block(automaton: Automaton, known: Names) -> dict[str, Block]:
+def invariant_blocks(automaton: Automaton, known: NameBindings) -> dict[str, Block]:
     """Return the block that looks at the active modes; nothing where there are no invariants."""
     if not invariant_infos(automaton):
         return {}
-    here = {**known, **equation_names(automaton, "equation.")}
-    found: list[Choose] = []
+    here = {**known, **equation_bindings(automaton, "equation.")}
+    found: list[Switch] = []
     for region in automaton.all_regions:
         cases: list[tuple[int, Block]] = []
         for mode in region.modes.values():
             ops = tuple(
                 Assign(
-                    f"{GROUP}{mode.label}_{name}",
-                    expression(invariant.that.tree, here),
-                    f"{automaton.name} {invariant.that.key}",
+                    f"{INVARIANT_PREFIX}{mode.label}_{name}",
+                    lower_expression(invariant.condition.tree, here),
+                    f"{automaton.name} {invariant.condition.key}",
                 )
                 for name, invariant in mode.invariants.items()
             )
             if ops:
                 cases.append((mode.number, ops))
         if cases:
-            found.append(Choose(mode_variable("memory.mode", region.name), tuple(cases)))
+            found.append(Switch(mode_variable("memory.mode", region.name), tuple(cases)))
     return {INVARIANTS: tuple(found)}

@@ -7,68 +7,83 @@ from dataclasses import dataclass
 from functools import reduce
 
 from language.balance import coefficient_of
-from language.derivative import SMOOTH, At, derivative, refused, taken
+from language.derivative import (
+    SMOOTH_FUNCTIONS,
+    PointValue,
+    derivative_error,
+    differentiate,
+    select_branch,
+)
 from language.evaluate import Scalar, evaluate
-from language.lower import expression
+from language.lower import lower_expression
 from language.model import Automaton, Mode
 from language.order import equation_order
-from language.parameter import constant_names
+from language.parameter import constant_bindings
 from language.problem import Problems, SpecError
-from language.simplify import is_zero, minus, negative, number, over, plus, replaced, times
-from language.syntax import Application, Arithmetic, Name, Negative, Power, Tree, names, walk
+from language.simplify import (
+    add,
+    divide,
+    is_zero,
+    make_number,
+    multiply,
+    negate,
+    substitute_names,
+    subtract,
+)
+from language.syntax import Arithmetic, FunctionCall, Name, Negation, Power, SyntaxTree, names, walk
 
-MOST_PARTS = 20_000
+MAX_INLINED_NODES = 20_000
 """Names, numbers and operations of an equation with all others put in; those shipped have 100."""
-Rows = dict[str, dict[str, Tree]]
+SymbolicMatrix = dict[str, dict[str, SyntaxTree]]
 """A matrix by the names of its rows and columns, zeros left out."""
 
 
 @dataclass(frozen=True)
-class Point:
+class LinearisationPoint:
     """Where a flow is made linear: some names with their values, as expressions.
 
     `values` are those of the constants of `automaton`, whose parameters the values may read.
     """
 
     automaton: Automaton
-    values: Mapping[str, Scalar]
-    places: Mapping[str, Tree]
+    constant_values: Mapping[str, Scalar]
+    substitutions: Mapping[str, SyntaxTree]
 
     @property
-    def value(self) -> At:
+    def evaluator(self) -> PointValue:
         """The value of an expression at the point. Raises SpecError where a name has none."""
-        known = constant_names(self.automaton)
+        known = constant_bindings(self.automaton)
 
-        def at(tree: Tree) -> Scalar:
-            here = replaced(tree, self.places)
+        def at(tree: SyntaxTree) -> Scalar:
+            here = substitute_names(tree, self.substitutions)
             for read in names(here):
                 if read.path not in known:
                     label = f"`{read.path}` decides which branch is taken"
-                    raise refused(read.span, label, _give(read.path))
-            return evaluate(expression(here, known), self.values)
+                    raise derivative_error(read.span, label, _point_hint(read.path))
+            return evaluate(lower_expression(here, known), self.constant_values)
 
         return at
 
 
-def inlined(mode: Mode, given: Mapping[str, Tree]) -> dict[str, Tree]:
+def inline_equations(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
     """Return the equations of a mode in states, inputs and parameters; some names are given.
 
     Raises SpecError where they would be too large: each read of an equation copies it.
     """
-    if is_too_large(mode):
+    if exceeds_inlining_limit(mode):
         problems = Problems()
         label = f"the equations of mode `{mode.name}` are too large to be put into each other"
-        hint = f"they would have more than {MOST_PARTS} parts; write the matrices, or fewer steps"
+        hint = f"they would have more than {MAX_INLINED_NODES} parts; write the matrices, or fewer steps"
         problems.error("expression", mode.span, label, hint)
-        raise SpecError(problems.found)
-    known = dict(given)
+        raise SpecError(problems.reported)
+    known = dict(substitutions)
     own = [name for name in equation_order(mode) if name in mode.equations]
     for name in own:  # those of a region beside are not known: its mode chooses them
-        known[name] = replaced(mode.equations[name].tree, known)
+        known[name] = substitute_names(mode.equations[name].tree, known)
     return known
 
 
-def is_too_large(mode: Mode) -> bool:
+def exceeds_inlining_limit(mode: Mode) -> bool:
     """Tell whether the equations of a mode, put into each other, have more parts than are handled.
 
     An equation that is read twice by the next, and so on 50 times, would have 2^50 parts.
@@ -79,29 +94,35 @@ def is_too_large(mode: Mode) -> bool:
             formula = mode.equations[name]
             read = sum(sizes.get(path, 0) for path in formula.reads)
             sizes[name] = len(walk(formula.tree)) + read
-    return max(sizes.values(), default=0) > MOST_PARTS
+    return max(sizes.values(), default=0) > MAX_INLINED_NODES
 
 
-def rates(mode: Mode, known: Mapping[str, Tree]) -> dict[str, Tree]:
+def symbolic_rates(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
     """Return der(x) of every state of a mode, with what is known put in."""
     found = {}
     for name, balance in mode.flow.items():
         factor = coefficient_of(balance.left, name)
         if isinstance(factor, SpecError):
             raise factor
-        right = replaced(balance.right, known)
-        found[name] = right if factor is None else over(right, replaced(factor, known))
+        right = substitute_names(balance.right, substitutions)
+        found[name] = (
+            right if factor is None else divide(right, substitute_names(factor, substitutions))
+        )
     return found
 
 
-def matrix(trees: Mapping[str, Tree], columns: Iterable[str], point: Point) -> Rows:
+def symbolic_jacobian(
+    trees: Mapping[str, SyntaxTree], columns: Iterable[str], point: LinearisationPoint
+) -> SymbolicMatrix:
     """Return the derivatives of the trees (rows) by the columns at the point. Raises SpecError."""
-    found: Rows = {}
+    found: SymbolicMatrix = {}
     columns = tuple(columns)
     for row, tree in trees.items():
         entries = {}
         for column in columns:
-            entry = replaced(derivative(tree, column, point.value), point.places)
+            entry = substitute_names(
+                differentiate(tree, column, point.evaluator), point.substitutions
+            )
             if not is_zero(entry):
                 entries[column] = entry
         if entries:
@@ -109,60 +130,66 @@ def matrix(trees: Mapping[str, Tree], columns: Iterable[str], point: Point) -> R
     return found
 
 
-def remains(tree: Tree, columns: Collection[str], point: Point) -> Tree:
+def affine_offset(
+    tree: SyntaxTree, columns: Collection[str], point: LinearisationPoint
+) -> SyntaxTree:
     """Return what the tangent of a tree has besides slope * column: its value where these are 0.
 
     Sums are taken apart, so that only the terms that are not linear read the point.
     """
 
-    def inside(part: Tree) -> Tree:
-        return remains(part, columns, point)
+    def inside(part: SyntaxTree) -> SyntaxTree:
+        return affine_offset(part, columns, point)
 
-    if not _reads(tree, columns):
+    if not _reads_any(tree, columns):
         return tree
     match tree:
         case Name(_, span):
-            return number(0, span)
-        case Negative(operand, _):
-            return negative(inside(operand))
+            return make_number(0, span)
+        case Negation(operand, _):
+            return negate(inside(operand))
         case Arithmetic("+", left, right, _):
-            return plus(inside(left), inside(right))
+            return add(inside(left), inside(right))
         case Arithmetic("-", left, right, _):
-            return minus(inside(left), inside(right))
-        case Arithmetic("*", left, right, _) if not _reads(left, columns):
-            return times(left, inside(right))
-        case Arithmetic("*", left, right, _) if not _reads(right, columns):
-            return times(inside(left), right)
-        case Arithmetic("/", left, right, _) if not _reads(right, columns):
-            return over(inside(left), right)
+            return subtract(inside(left), inside(right))
+        case Arithmetic("*", left, right, _) if not _reads_any(left, columns):
+            return multiply(left, inside(right))
+        case Arithmetic("*", left, right, _) if not _reads_any(right, columns):
+            return multiply(inside(left), right)
+        case Arithmetic("/", left, right, _) if not _reads_any(right, columns):
+            return divide(inside(left), right)
         case Arithmetic() | Power():
-            return _curved(tree, columns, point)
-        case Application(function, _, _) if function in SMOOTH:
-            return _curved(tree, columns, point)
+            return _nonlinear_offset(tree, columns, point)
+        case FunctionCall(function, _, _) if function in SMOOTH_FUNCTIONS:
+            return _nonlinear_offset(tree, columns, point)
         case _:
-            return inside(taken(tree, point.value))
+            return inside(select_branch(tree, point.evaluator))
 
 
-def _reads(tree: Tree, columns: Collection[str]) -> bool:
+def _reads_any(tree: SyntaxTree, columns: Collection[str]) -> bool:
     return any(read.path in columns for read in names(tree))
 
 
-def _curved(tree: Tree, columns: Collection[str], point: Point) -> Tree:
+def _nonlinear_offset(
+    tree: SyntaxTree, columns: Collection[str], point: LinearisationPoint
+) -> SyntaxTree:
     """The value at the point less slope * column there."""
-    result = replaced(tree, point.places)
+    result = substitute_names(tree, point.substitutions)
     for column in dict.fromkeys(read.path for read in names(tree) if read.path in columns):
-        if column not in point.places:
-            raise refused(tree.span, f"`{column}` does not enter linearly here", _give(column))
-        slope = replaced(derivative(tree, column, point.value), point.places)
-        result = minus(result, times(slope, point.places[column]))
+        if column not in point.substitutions:
+            raise derivative_error(
+                tree.span, f"`{column}` does not enter linearly here", _point_hint(column)
+            )
+        slope = substitute_names(differentiate(tree, column, point.evaluator), point.substitutions)
+        result = subtract(result, multiply(slope, point.substitutions[column]))
     return result
 
 
-def _give(name: str) -> str:
+def _point_hint(name: str) -> str:
     return f"give its point: `at: {{{name}: ...}}`"
 
 
-def tangent(slopes: Mapping[str, Tree], rest: Tree) -> Tree:
+def affine_form(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxTree:
     """Return the sum of slope * column, plus the rest."""
-    parts = [times(slope, Name(column, rest.span)) for column, slope in slopes.items()]
-    return reduce(plus, [*parts, rest])
+    parts = [multiply(slope, Name(column, offset.span)) for column, slope in slopes.items()]
+    return reduce(add, [*parts, offset])

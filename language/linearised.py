@@ -4,30 +4,39 @@ from __future__ import annotations
 
 import dataclasses
 
-from language.linear import Point, inlined, matrix, rates, remains, tangent
-from language.model import Automaton, Balance, Mode, Run
+from language.linear import (
+    LinearisationPoint,
+    affine_form,
+    affine_offset,
+    inline_equations,
+    symbolic_jacobian,
+    symbolic_rates,
+)
+from language.model import Automaton, Balance, Mode, ModelRun
 from language.problem import Problems, SpecError
-from language.syntax import Application, Name, names
+from language.syntax import FunctionCall, Name, names
 
 
-def linearised(model: Automaton, run: Run, point: Point, problems: Problems) -> Automaton:
+def linearise_model(
+    model: Automaton, run: ModelRun, point: LinearisationPoint, problems: Problems
+) -> Automaton:
     """Return the model with affine flows: what is linear stays, what is curved has its tangent.
 
     Equations and guards stay as they are. `point` gives values and parameters, not yet places.
     """
     places = {name: formula.tree for name, formula in (run.linearise or {}).items()}
-    there = dataclasses.replace(point, places=places)
+    there = dataclasses.replace(point, substitutions=places)
     modes = {}
     for name, mode in model.modes.items():
         modes[name] = mode
-        with problems.collecting():
-            modes[name] = _linearised(mode, run, there)
+        with problems.collect_errors():
+            modes[name] = _linearise_mode(mode, run, there)
     return dataclasses.replace(model, modes=modes)
 
 
-def _linearised(mode: Mode, run: Run, point: Point) -> Mode:
-    flow = rates(mode, inlined(mode, {}))
-    slopes = matrix(flow, tuple(flow), point)
+def _linearise_mode(mode: Mode, run: ModelRun, point: LinearisationPoint) -> Mode:
+    flow = symbolic_rates(mode, inline_equations(mode, {}))
+    slopes = symbolic_jacobian(flow, tuple(flow), point)
     problems = Problems()
     balances = {}
     for state, tree in flow.items():
@@ -40,9 +49,9 @@ def _linearised(mode: Mode, run: Run, point: Point) -> Mode:
         if problems.has_errors:
             continue
         span = tree.span
-        left = Application("der", (Name(state, span),), span)
-        right = tangent(slopes.get(state, {}), remains(tree, tuple(flow), point))
+        left = FunctionCall("der", (Name(state, span),), span)
+        right = affine_form(slopes.get(state, {}), affine_offset(tree, tuple(flow), point))
         balances[state] = Balance(state, left, right, mode.flow[state].key)
     if problems.has_errors:
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     return dataclasses.replace(mode, flow=balances)

@@ -7,20 +7,20 @@ from collections.abc import Collection, Mapping
 from language.automaton import read_automaton
 from language.check import check_automaton
 from language.check_number import check_numbers
-from language.continuous import continuous_program
-from language.document import Document, Node, Scalar
-from language.hoist import hoisted
+from language.continuous import lower_continuous_automaton
+from language.document import Document, ScalarNode, YamlNode
+from language.hoist import run_passes
 from language.model import Automaton
 from language.problem import Problems, Source, Span
 from language.program import Program
 from language.project import Project
-from language.sampled import sampled_program
+from language.sampled import lower_sampled_automaton
 
 
 def automaton_of(
     document: Document,
     project: Project,
-    values: Mapping[str, Node] | None = None,
+    values: Mapping[str, YamlNode] | None = None,
     problems: Problems | None = None,
 ) -> Automaton:
     """Return the checked automaton of a document; warnings are left in `problems`.
@@ -32,7 +32,7 @@ def automaton_of(
 
 
 def load_automaton(
-    reference: str, project: Project, values: Mapping[str, Node] | None = None
+    reference: str, project: Project, values: Mapping[str, YamlNode] | None = None
 ) -> Automaton:
     """Return the checked automaton of a name or path. Raises SpecError with all problems."""
     return automaton_of(project.read(project.path_of(reference)), project, values)
@@ -43,20 +43,20 @@ def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
 
     Raises SpecError.
     """
-    return hoisted(lowered(automaton, varying))
+    return run_passes(lower_automaton(automaton, varying))
 
 
-def lowered(automaton: Automaton, varying: Collection[str] = ()) -> Program:
+def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Program:
     """Return the Program of a checked automaton before it is optimised. Raises SpecError."""
     problems = Problems()
     check_numbers(automaton, problems)
     if automaton.is_sampled:
-        return sampled_program(automaton, problems)
-    return continuous_program(automaton, problems, varying)
+        return lower_sampled_automaton(automaton, problems)
+    return lower_continuous_automaton(automaton, problems, varying)
 
 
-def command_line_value(text: str, option: str = "--set", name: str = "") -> Scalar:
+def command_line_value(text: str, option: str = "--set", name: str = "") -> ScalarNode:
     """Return a value given on the command line, as a scalar with a place in `name=value`."""
     shown = f"{name}={text}" if name else text
     place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
-    return Scalar(text, place)
+    return ScalarNode(text, place)

@@ -14,66 +14,66 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
     Item,
     Loop,
     Op,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
 )
 
 Blocks = Mapping[str, Block]
 
 
-def most_operations(blocks: Blocks, name: str) -> int:
+def max_operations(blocks: Blocks, name: str) -> int:
     """Return the most arithmetic, comparisons, calls, tests and stores of a block and its runs."""
-    known: dict[str, int] = {}
+    counts: dict[str, int] = {}
 
-    def of_block(name: str) -> int:
-        if name not in known:
-            known[name] = of(blocks[name])
-        return known[name]
+    def count_block(name: str) -> int:
+        if name not in counts:
+            counts[name] = count_ops(blocks[name])
+        return counts[name]
 
-    def of(block: Block) -> int:
-        return sum(map(of_op, block))
+    def count_ops(block: Block) -> int:
+        return sum(map(count_op, block))
 
-    def of_op(op: Op) -> int:
+    def count_op(op: Op) -> int:
         match op:
             case Branch(condition, then, other):
-                return 1 + of_expr(condition) + max(of(then), of(other))
-            case Choose(_, cases):
-                return 1 + max((of(case) for _, case in cases), default=0)
+                return 1 + count_expr(condition) + max(count_ops(then), count_ops(other))
+            case Switch(_, cases):
+                return 1 + max((count_ops(case) for _, case in cases), default=0)
             case Loop(count, _, body):
-                return count * (2 + of(body))
-            case Run(inner):
-                return of_block(inner)
+                return count * (2 + count_ops(body))
+            case RunBlock(inner):
+                return count_block(inner)
             case Assign(_, value, _):
-                return 1 + of_expr(value)
+                return 1 + count_expr(value)
             case Store(_, index, value):
-                return 1 + of_expr(index) + of_expr(value)
+                return 1 + count_expr(index) + count_expr(value)
             case Count(_, condition, _, _):
-                return 2 + of_expr(condition)
+                return 2 + count_expr(condition)
         return 1
 
-    return of_block(name)
+    return count_block(name)
 
 
-def of_expr(value: Expr) -> int:
+def count_expr(value: Expr) -> int:
     """Return the operations of an expression, both sides of a choice."""
     match value:
         case Unary(_, operand):
-            return 1 + of_expr(operand)
+            return 1 + count_expr(operand)
         case Binary(_, left, right) | Compare(_, left, right):
-            return 1 + of_expr(left) + of_expr(right)
+            return 1 + count_expr(left) + count_expr(right)
         case Select(condition, then, other):
-            return 1 + of_expr(condition) + max(of_expr(then), of_expr(other))
+            return 1 + count_expr(condition) + max(count_expr(then), count_expr(other))
         case Call(_, arguments):
-            return 1 + sum(map(of_expr, arguments))
+            return 1 + sum(map(count_expr, arguments))
         case Item(_, index, _):
-            return 1 + of_expr(index)
+            return 1 + count_expr(index)
     return 0

@@ -5,13 +5,29 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.document import Document, Entry, Items, Node, Scalar, Table, require_kind
-from language.experiment import EVERY_FILE, Column, RecordingMap, Window
-from language.literal import constant
+from language.document import (
+    Document,
+    Entry,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    YamlNode,
+    require_kind,
+)
+from language.experiment import ALL_FILES, ColumnMapping, RecordingMap, Window
+from language.literal import evaluate_literal
 from language.problem import Problems, Span
-from language.project import Project, expanded
+from language.project import Project, expand_document
 from language.reader import Reader
-from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, parse_unit, product
+from language.units import (
+    NO_UNIT,
+    PURE_NUMBER,
+    SECOND,
+    Dimension,
+    are_compatible,
+    dimension_product,
+    parse_unit,
+)
 
 MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc")
 COLUMN_KEYS = (
@@ -21,75 +37,77 @@ COLUMN_KEYS = (
 
 def read_map(document: Document, project: Project) -> RecordingMap:
     """Read a map. Raises SpecError with all problems."""
-    document = expanded(document, project)
+    document = expand_document(document, project)
     problems = Problems()
     require_kind(document, "map", problems)
-    problems.stop_if_any()
-    found = map_of(document.root, document.name, document.name_span, problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
+    found = read_map_table(document.root, document.name, document.name_span, problems)
+    problems.raise_if_errors()
     return found
 
 
-def map_of(root: Table, name: str, at: Span, problems: Problems) -> RecordingMap:
+def read_map_table(root: MappingNode, name: str, span: Span, problems: Problems) -> RecordingMap:
     """Return the map that a mapping of a file holds; what is wrong is reported."""
-    return _MapReader(problems).read(root, name, at)
+    return _MapReader(problems).read(root, name, span)
 
 
 class _MapReader(Reader):
     """The sections of a map."""
 
-    def read(self, root: Table, name: str, at: Span) -> RecordingMap:
-        tree = self.table(root, f"map {name}", MAP_KEYS)
-        time = self.table(tree.get("time"), "time", ("column", "unit"))
+    def read(self, root: MappingNode, name: str, span: Span) -> RecordingMap:
+        tree = self.read_mapping(root, f"map {name}", MAP_KEYS)
+        time = self.read_mapping(tree.get("time"), "time", ("column", "unit"))
         has_time = "time" in tree.entries
-        unit = self.unit(time.get("unit")) if has_time else parse_unit("s")
-        if not fits(unit.dimension, SECOND):
+        unit = self.read_unit(time.get("unit")) if has_time else parse_unit("s")
+        if not are_compatible(unit.dimension, SECOND):
             self.problems.error(
-                "unit", time.span if time.entries else at, "the unit of `time` is a time"
+                "unit", time.span if time.entries else span, "the unit of `time` is a time"
             )
         constants: dict[str, tuple[Fraction, Dimension]] = {}
-        for entry in self.named(tree.get("constants"), "constants"):
-            value, own = self.quantity(entry.node, entry.key, entry.span, None)
+        for entry in self.named_entries(tree.get("constants"), "constants"):
+            value, own = self.read_quantity(entry.node, entry.key, entry.span, None)
             constants[entry.key] = value, own.dimension
-        columns = [self._column(entry) for entry in self.table(tree.get("columns"), "columns")]
+        columns = [
+            self._read_column(entry) for entry in self.read_mapping(tree.get("columns"), "columns")
+        ]
         if not columns:
-            self.problems.error("missing", at, "a map has at least one column in `columns`")
+            self.problems.error("missing", span, "a map has at least one column in `columns`")
         return RecordingMap(
             name=name,
-            time=self.text(time.get("column"), "time.column", at) if has_time else "",
+            time=self.read_string(time.get("column"), "time.column", span) if has_time else "",
             time_unit=unit,
             columns={column.name: column for column in columns},
             constants=constants,
-            span=at,
-            windows=self._windows(tree.get("windows")),
-            databases=self._databases(tree.get("dbc")),
+            span=span,
+            windows=self._read_windows(tree.get("windows")),
+            databases=self._read_databases(tree.get("dbc")),
         )
 
-    def _databases(self, node: Node | None) -> tuple[Scalar, ...]:
+    def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
         """One DBC file or a list of them."""
-        return (node,) if isinstance(node, Scalar) else tuple(self.items(node, "dbc"))
+        return (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
 
-    def _windows(self, node: Node | None) -> dict[str, tuple[Window, ...]]:
+    def _read_windows(self, node: YamlNode | None) -> dict[str, tuple[Window, ...]]:
         """A list of windows for every file, or a mapping from file names to such lists."""
         if node is None:
             return {}
-        if not isinstance(node, Table):
-            return {EVERY_FILE: self._list_of_windows(node)}
-        return {entry.key: self._list_of_windows(entry.node) for entry in node}
+        if not isinstance(node, MappingNode):
+            return {ALL_FILES: self._read_window_list(node)}
+        return {entry.key: self._read_window_list(entry.node) for entry in node}
 
-    def _list_of_windows(self, node: Node) -> tuple[Window, ...]:
+    def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
         found: list[Window] = []
-        if not isinstance(node, Items) or not node.nodes:
+        if not isinstance(node, SequenceNode) or not node.nodes:
             label = "`windows` is a list like `[[1 s, 8 s]]`, or such a list for each file"
             self.problems.error("form", node.span, label)
             return ()
         for item in node.nodes:
-            if not isinstance(item, Items) or len(item.nodes) != 2:
+            if not isinstance(item, SequenceNode) or len(item.nodes) != 2:
                 self.problems.error(
                     "form", item.span, "a window is `[from, to]`, like `[1 s, 8 s]`"
                 )
                 continue
-            start, end = (self._time_of(part) for part in item.nodes)
+            start, end = (self._read_time(part) for part in item.nodes)
             if end <= start:
                 self.problems.error("range", item.span, "a window ends after it starts")
             elif found and start <= found[-1][1]:
@@ -98,62 +116,64 @@ class _MapReader(Reader):
             found.append((start, end))
         return tuple(found)
 
-    def _time_of(self, node: Node) -> Fraction:
-        value, unit = self.quantity(node, "a window", node.span, None)
-        if value and not fits(unit.dimension, SECOND):
+    def _read_time(self, node: YamlNode) -> Fraction:
+        value, unit = self.read_quantity(node, "a window", node.span, None)
+        if value and not are_compatible(unit.dimension, SECOND):
             self.problems.error("dimension", node.span, "a window is in time, like `[1 s, 8 s]`")
         return value
 
-    def _column(self, entry: Entry) -> Column:
+    def _read_column(self, entry: Entry) -> ColumnMapping:
         what = f"columns.{entry.key}"
-        table = self.table(entry.node, what, COLUMN_KEYS)
+        table = self.read_mapping(entry.node, what, COLUMN_KEYS)
         mean = table.get("mean")
-        names = [item.text for item in self.items(mean, f"{what}.mean")]
-        if isinstance(mean, Items) and not mean.nodes:
+        names = [item.text for item in self.read_list(mean, f"{what}.mean")]
+        if isinstance(mean, SequenceNode) and not mean.nodes:
             label = "`mean` is a list of at least one column"
             self.problems.error("missing", mean.span, label)
         column = table.get("column")
         if not names:
-            names = [self.text(column, "column", entry.span) if column else entry.key]
+            names = [self.read_string(column, "column", entry.span) if column else entry.key]
         elif column:
             self.problems.error("form", entry.span, "`column` and `mean` exclude each other")
         to, compare = table.get("to"), table.get("compare")
         if (to is None) == (compare is None):
             label = "a column has `to` (an input) or `compare` (an output)"
             self.problems.error("missing", entry.span, label)
-        hold = self.choice(table.get("hold"), "hold", ("previous", "linear"), "previous")
-        blank = self.choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
+        hold = self.read_choice(table.get("hold"), "hold", ("previous", "linear"), "previous")
+        blank = self.read_choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
         delay = table.get("delay")
         shift, unit = (
-            self.quantity(delay, "delay", delay.span, None) if delay else (Fraction(0), NO_UNIT)
+            self.read_quantity(delay, "delay", delay.span, None)
+            if delay
+            else (Fraction(0), NO_UNIT)
         )
-        if delay and ((shift and not fits(unit.dimension, SECOND)) or shift < 0):
+        if delay and ((shift and not are_compatible(unit.dimension, SECOND)) or shift < 0):
             self.problems.error("unit", delay.span, "`delay` is a time of at least 0 s")
         time = table.get("time")
-        return Column(
+        return ColumnMapping(
             name=entry.key,
             columns=tuple(names),
-            to=self.text(to, "to", entry.span) if to else None,
-            compare=self.text(compare, "compare", entry.span) if compare else None,
-            unit=self.unit(table.get("unit")),
-            scale=self._scale(table),
-            sign=int(self.choice(table.get("sign"), "sign", ("1", "-1"), "1")),
+            to=self.read_string(to, "to", entry.span) if to else None,
+            compare=self.read_string(compare, "compare", entry.span) if compare else None,
+            unit=self.read_unit(table.get("unit")),
+            scale=self._read_scale(table),
+            sign=int(self.read_choice(table.get("sign"), "sign", ("1", "-1"), "1")),
             delay=shift,
             blank=cast(Literal["refuse", "skip"], blank),
-            time=self.text(time, "time", entry.span) if time else None,
+            time=self.read_string(time, "time", entry.span) if time else None,
             span=entry.span,
             hold=cast(Literal["previous", "linear"], hold),
         )
 
-    def _scale(self, table: Table) -> tuple[Fraction, Dimension]:
+    def _read_scale(self, table: MappingNode) -> tuple[Fraction, Dimension]:
         node = table.get("scale")
-        formula = self.expression(node, "scale", node.span) if node else None
+        formula = self.read_expression(node, "scale", node.span) if node else None
         if formula:
-            with self.problems.collecting():
-                return constant(formula.tree)
-        return Fraction(1), NUMBER
+            with self.problems.collect_errors():
+                return evaluate_literal(formula.tree)
+        return Fraction(1), PURE_NUMBER
 
 
-def column_dimension(column: Column) -> Dimension:
+def column_dimension(column: ColumnMapping) -> Dimension:
     """Return the dimension of what a column gives: its unit times its scale."""
-    return product(column.unit.dimension, column.scale[1])
+    return dimension_product(column.unit.dimension, column.scale[1])

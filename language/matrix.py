@@ -13,28 +13,28 @@ from collections.abc import Iterable
 
 Matrix = tuple[tuple[float, ...], ...]
 
-TERMS = 19
+SERIES_TERMS = 19
 """Terms of a Taylor sum of (e^z - 1)/z, |z| <= 1: the rest is below 2^-60, under the rounding."""
-SWEEPS = 50
+MAX_SWEEPS = 50
 """Balancing settles in a few sweeps; the bound only makes its end certain. Any exponents serve."""
-MOST_SCALED = 256
+MAX_SCALE_EXPONENT = 256
 """Largest exponent of the scale of a state: beyond it a noise, scaled twice, would overflow."""
-WORTH = 0.95
+BALANCE_FACTOR = 0.95
 """A state is scaled if that shrinks its row plus column by 5 % (Parlett and Reinsch's gamma)."""
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
     """Return A B, (n, k) times (k, m) -> (n, m), summed left to right; ValueError if k differs."""
     if len(a[0]) != len(b):
-        raise ValueError(f"multiply: {shape(a)} times {shape(b)}")
+        raise ValueError(f"multiply: {format_shape(a)} times {format_shape(b)}")
     columns = transpose(b)
     return tuple(tuple(_dot(row, column) for column in columns) for row in a)
 
 
 def add(a: Matrix, b: Matrix) -> Matrix:
     """Return A + B, both (n, m); ValueError if the shapes differ."""
-    if shape(a) != shape(b):
-        raise ValueError(f"add: {shape(a)} and {shape(b)}")
+    if format_shape(a) != format_shape(b):
+        raise ValueError(f"add: {format_shape(a)} and {format_shape(b)}")
     return tuple(tuple(x + y for x, y in zip(p, q, strict=True)) for p, q in zip(a, b, strict=True))
 
 
@@ -73,7 +73,7 @@ def solve(a: Matrix, b: Matrix) -> Matrix:
     require_finite("solve: B", b)
     n = len(a)
     if len(a[0]) != n or len(b) != n:
-        raise ValueError(f"solve: A is {shape(a)}, B is {shape(b)}")
+        raise ValueError(f"solve: A is {format_shape(a)}, B is {format_shape(b)}")
     rows = [[*p, *q] for p, q in zip(a, b, strict=True)]
     for k in range(n):
         _eliminate(rows, k)
@@ -86,27 +86,27 @@ def solve(a: Matrix, b: Matrix) -> Matrix:
     return require_finite("solve: X", tuple(tuple(row[n:]) for row in rows))
 
 
-def exponential(a: Matrix, h: float) -> Matrix:
+def expm(a: Matrix, h: float) -> Matrix:
     """Return the transition matrix e^(A h), (n, n), of x' = A x over h [s]; h of any sign.
 
     A (n, n): entry i j in unit_i/(unit_j s). Scaling and squaring (Higham 2005, SIAM J. Matrix
     Anal. Appl. 26, section 2) of the balanced A h, with a Taylor sum for Pade's quotient.
     ValueError: A not square, a non-finite entry, overflow.
     """
-    return _transition("exponential", a, h)[0]
+    return _expm_and_integral("exponential", a, h)[0]
 
 
-def exponential_integral(a: Matrix, h: float) -> Matrix:
+def expm_integral(a: Matrix, h: float) -> Matrix:
     """Return the integral of e^(A s) over s from 0 to h [s], (n, n): h phi_1(A h).
 
     Times B it is the input matrix of an input that is held. The block H of Van Loan 1978 (IEEE
     Trans. Autom. Control 23, 395-404), doubled as there: F(2t) = F(t) + Phi(t) F(t).
     A and errors as for `exponential`.
     """
-    return _transition("exponential_integral", a, h)[1]
+    return _expm_and_integral("exponential_integral", a, h)[1]
 
 
-def short_step(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int, ...], int]:
+def balance_and_scale(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int, ...], int]:
     """Return X = D^-1 A D h / 2^halvings with row sums below 1/2, the exponents of D, halvings.
 
     A (n, n) in 1/s, h in s, X (n, n) a pure number; `name` opens the text of a ValueError: A not
@@ -114,15 +114,15 @@ def short_step(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int, ...],
     """
     require_finite(f"{name}: A", a)
     if len(a[0]) != len(a):
-        raise ValueError(f"{name}: A is {shape(a)}, not square")
+        raise ValueError(f"{name}: A is {format_shape(a)}, not square")
     step = require_finite(f"{name}: A h", scale(h, a))
-    exponents = balancing(step)
-    balanced = shift(step, tuple(-e for e in exponents), exponents)
-    halvings = max(0, math.frexp(max(sum_of_sizes(row) for row in balanced))[1] + 1)
-    return shift(balanced, (-halvings,) * len(a), (0,) * len(a)), exponents, halvings
+    exponents = balancing_exponents(step)
+    balanced = scale_by_powers(step, tuple(-e for e in exponents), exponents)
+    halvings = max(0, math.frexp(max(abs_sum(row) for row in balanced))[1] + 1)
+    return scale_by_powers(balanced, (-halvings,) * len(a), (0,) * len(a)), exponents, halvings
 
 
-def balancing(a: Matrix) -> tuple[int, ...]:
+def balancing_exponents(a: Matrix) -> tuple[int, ...]:
     """Return the exponents e of D = diag(2^e) for which D^-1 A D has rows as large as its columns.
 
     A (n, n), finite. Parlett and Reinsch 1969 (Numer. Math. 13, 293-304), radix 2, no permutation.
@@ -131,30 +131,34 @@ def balancing(a: Matrix) -> tuple[int, ...]:
     """
     work = [[abs(x) for x in row] for row in a]
     exponents = [0] * len(a)
-    for _ in range(SWEEPS):
+    for _ in range(MAX_SWEEPS):
         before = tuple(exponents)
         for i in range(len(a)):
-            wanted = exponents[i] + _balancing_step(work, i)
-            step = max(-MOST_SCALED, min(MOST_SCALED, wanted)) - exponents[i]
+            unbounded_exponent = exponents[i] + _balancing_exponent(work, i)
+            step = (
+                max(-MAX_SCALE_EXPONENT, min(MAX_SCALE_EXPONENT, unbounded_exponent)) - exponents[i]
+            )
             exponents[i] += step
             for j in range(len(a)):
                 if j != i:
-                    work[j][i] = ldexp(work[j][i], step)
-                    work[i][j] = ldexp(work[i][j], -step)
+                    work[j][i] = ldexp_or_inf(work[j][i], step)
+                    work[i][j] = ldexp_or_inf(work[i][j], -step)
         if tuple(exponents) == before:
             break
     return tuple(exponents)
 
 
-def shift(a: Matrix, rows: tuple[int, ...], columns: tuple[int, ...]) -> Matrix:
+def scale_by_powers(
+    a: Matrix, row_exponents: tuple[int, ...], column_exponents: tuple[int, ...]
+) -> Matrix:
     """Return diag(2^rows) A diag(2^columns), (n, m), exact unless it over- or underflows."""
     return tuple(
-        tuple(ldexp(x, r + c) for x, c in zip(row, columns, strict=True))
-        for row, r in zip(a, rows, strict=True)
+        tuple(ldexp_or_inf(x, r + c) for x, c in zip(row, column_exponents, strict=True))
+        for row, r in zip(a, row_exponents, strict=True)
     )
 
 
-def ldexp(x: float, exponent: int) -> float:
+def ldexp_or_inf(x: float, exponent: int) -> float:
     """Return x 2^exponent; infinite instead of OverflowError, to be refused with its place."""
     try:
         return math.ldexp(x, exponent)
@@ -173,7 +177,7 @@ def require_finite(name: str, a: Matrix) -> Matrix:
     return a
 
 
-def sum_of_sizes(values: Iterable[float]) -> float:
+def abs_sum(values: Iterable[float]) -> float:
     """Return |x_0| + |x_1| + ..., from left to right."""
     total = 0.0
     for x in values:
@@ -181,39 +185,39 @@ def sum_of_sizes(values: Iterable[float]) -> float:
     return total
 
 
-def shape(a: Matrix) -> str:
+def format_shape(a: Matrix) -> str:
     """Return the shape for messages: `(2, 3)`."""
     return f"({len(a)}, {len(a[0]) if a else 0})"
 
 
-def _transition(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
+def _expm_and_integral(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
     """Return e^(A h) and its integral: Horner's rule for phi_1, small terms first; doubling."""
-    x, exponents, halvings = short_step(name, a, h)
+    x, exponents, halvings = balance_and_scale(name, a, h)
     unit = identity(len(a))
     series = unit
-    for k in range(TERMS, 1, -1):
+    for k in range(SERIES_TERMS, 1, -1):
         series = add(unit, scale(1.0 / k, multiply(x, series)))
     phi = add(unit, multiply(x, series))
-    integral = scale(ldexp(h, -halvings), series)
+    integral = scale(ldexp_or_inf(h, -halvings), series)
     for _ in range(halvings):
         integral = add(integral, multiply(phi, integral))
         phi = multiply(phi, phi)
     down = tuple(-e for e in exponents)
     return (
-        require_finite(f"{name}: result", shift(phi, exponents, down)),
-        require_finite(f"{name}: result", shift(integral, exponents, down)),
+        require_finite(f"{name}: result", scale_by_powers(phi, exponents, down)),
+        require_finite(f"{name}: result", scale_by_powers(integral, exponents, down)),
     )
 
 
-def _balancing_step(work: list[list[float]], i: int) -> int:
+def _balancing_exponent(work: list[list[float]], i: int) -> int:
     """Return the power of two for state i: sizes in `work` (n, n), the diagonal does not count."""
-    row = sum_of_sizes(x for j, x in enumerate(work[i]) if j != i)
-    column = sum_of_sizes(other[i] for j, other in enumerate(work) if j != i)
+    row = abs_sum(x for j, x in enumerate(work[i]) if j != i)
+    column = abs_sum(other[i] for j, other in enumerate(work) if j != i)
     if row == 0.0 or column == 0.0:
         return max(0, math.frexp(row)[1]) - max(0, math.frexp(column)[1])
     step = (math.frexp(row)[1] - math.frexp(column)[1]) // 2
-    scaled = ldexp(column, step) + ldexp(row, -step)
-    return step if scaled < WORTH * (column + row) else 0
+    scaled = ldexp_or_inf(column, step) + ldexp_or_inf(row, -step)
+    return step if scaled < BALANCE_FACTOR * (column + row) else 0
 
 
 def _eliminate(rows: list[list[float]], k: int) -> None:

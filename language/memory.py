@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.constants import exact_value
+from language.constants import evaluate_exactly
 from language.declaration import Formula
-from language.dimension import DimensionCheck
-from language.kind import Enumeration, Whole
-from language.lower import Names, expression
+from language.dimension import TypeChecker
+from language.kind import EnumType, IntType
+from language.lower import NameBindings, lower_expression
 from language.model import Automaton, Mode
-from language.once import once
+from language.once import cache_on_owner
 from language.operation import (
     Assign,
     Block,
@@ -32,55 +32,55 @@ from language.operation import (
     Store,
     Value,
     add,
-    whole,
+    integer,
 )
 from language.problem import Problems
 from language.program import ValueType, Variable
-from language.scope import Scope
+from language.scope import NameEnvironment
 from language.syntax import (
-    KEPT,
-    MEMORY,
-    Application,
-    Tree,
+    DELAY_FUNCTIONS,
+    MEMORY_FUNCTIONS,
+    FunctionCall,
+    SyntaxTree,
     memory_key,
     walk,
 )
-from language.truth import decisions
+from language.truth import truth_table_formulas
 
 MAX_DELAY = 4096
 """Longest delay in values kept: 32 kB of an instance."""
 MAX_REWIND = 64
 """Longest rewind in ticks kept."""
-KEPT_ONCE = Ref("memory.kept")
+IS_DELAY_FILLED = Ref("memory.kept")
 
 
 @dataclass(frozen=True)
-class Delay:
+class SampledDelay:
     """A value as it was some ticks ago (`ticks` 1: `previous`)."""
 
     number: int
-    tree: Application
+    call: FunctionCall
     ticks: int
     type: ValueType
 
     @property
-    def name(self) -> str:
+    def variable_name(self) -> str:
         """The variable that holds the values: a scalar where there is one, else a ring."""
         return f"memory.delay_{self.number}"
 
     @property
-    def oldest(self) -> str:
+    def oldest_index(self) -> str:
         """The variable that says which value of the ring is the oldest."""
         return f"memory.oldest_{self.number}"
 
 
-def formulas(mode: Mode) -> Iterator[Formula]:
+def mode_formulas(mode: Mode) -> Iterator[Formula]:
     """Yield the equations, updates, entries, exits, noises, guards and resets of a mode."""
     yield from mode.equations.values()
-    yield from actions(mode)
+    yield from action_formulas(mode)
 
 
-def actions(mode: Mode) -> Iterator[Formula]:
+def action_formulas(mode: Mode) -> Iterator[Formula]:
     """Yield the formulas of a mode that are no equations."""
     for stage in (mode.update, mode.entry, mode.exit):
         yield from stage.values()
@@ -93,81 +93,89 @@ def actions(mode: Mode) -> Iterator[Formula]:
             yield transition.rewind.until
 
 
-def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, Application]:
+def memory_calls_by_key(
+    automaton: Automaton, functions: tuple[str, ...]
+) -> dict[str, FunctionCall]:
     """Return each different use of some functions, by key; what is inside comes first."""
-    found: dict[str, Application] = {}
-    for part in remembering(automaton):
+    found: dict[str, FunctionCall] = {}
+    for part in memory_calls(automaton):
         if part.function in functions:
             found.setdefault(memory_key(part), part)
     return found
 
 
-@once
-def remembering(automaton: Automaton) -> tuple[Application, ...]:
+@cache_on_owner
+def memory_calls(automaton: Automaton) -> tuple[FunctionCall, ...]:
     """Return every use of a function with memory; what is inside of one comes before it."""
-    found: list[Application] = []
-    for tree in _trees(automaton):
+    found: list[FunctionCall] = []
+    for tree in _evaluated_trees(automaton):
         found += reversed(
-            [p for p in walk(tree) if isinstance(p, Application) and p.function in MEMORY]
+            [
+                p
+                for p in walk(tree)
+                if isinstance(p, FunctionCall) and p.function in MEMORY_FUNCTIONS
+            ]
         )
     return tuple(found)
 
 
-def applies(automaton: Automaton, function: str) -> bool:
+def uses_function(automaton: Automaton, function: str) -> bool:
     """Tell whether a function is used anywhere, with memory or without."""
-    parts = (part for tree in _trees(automaton) for part in walk(tree))
-    return any(isinstance(part, Application) and part.function == function for part in parts)
+    parts = (part for tree in _evaluated_trees(automaton) for part in walk(tree))
+    return any(isinstance(part, FunctionCall) and part.function == function for part in parts)
 
 
-def _trees(automaton: Automaton) -> list[Tree]:
+def _evaluated_trees(automaton: Automaton) -> list[SyntaxTree]:
     """Return every expression that is evaluated in a mode or in a decision."""
-    trees = [formula.tree for formula in decisions(automaton.tables)]
+    trees = [formula.tree for formula in truth_table_formulas(automaton.tables)]
     for mode in automaton.all_modes:
-        trees += [formula.tree for formula in formulas(mode)]
+        trees += [formula.tree for formula in mode_formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]
     return trees
 
 
-def ticks_of(automaton: Automaton, time: Tree) -> int:
+def evaluate_ticks(automaton: Automaton, time: SyntaxTree) -> int:
     """Return a time of fixed values in ticks, rounded up, exactly (rule 4). Raises SpecError."""
     assert automaton.period is not None
-    return math.ceil(exact_value(Formula(time, ""), automaton) / automaton.period)
+    return math.ceil(evaluate_exactly(Formula(time, ""), automaton) / automaton.period)
 
 
-def delays_of(automaton: Automaton) -> tuple[Delay, ...]:
+def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
     """Return what a sampled automaton remembers of its values."""
-    found: list[Delay] = []
-    for tree in applications(automaton, KEPT).values():
-        ticks = ticks_of(automaton, tree.arguments[1]) if tree.function == "delay" else 1
-        kind = type_of(automaton, tree.arguments[0])
-        found.append(Delay(len(found) + 1, tree, ticks, kind))
+    found: list[SampledDelay] = []
+    for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
+        ticks = evaluate_ticks(automaton, tree.arguments[1]) if tree.function == "delay" else 1
+        kind = expression_type(automaton, tree.arguments[0])
+        found.append(SampledDelay(len(found) + 1, tree, ticks, kind))
     return tuple(found)
 
 
-def type_of(automaton: Automaton, tree: Tree) -> ValueType:
+def expression_type(automaton: Automaton, tree: SyntaxTree) -> ValueType:
     """Return the type of a checked expression: as the check of dimensions sees it."""
-    scope = Scope(automaton.kinds, memory=frozenset(MEMORY))
-    kind = DimensionCheck(scope, Problems()).kind(tree)
+    scope = NameEnvironment(automaton.name_types, memory_functions=frozenset(MEMORY_FUNCTIONS))
+    kind = TypeChecker(scope, Problems()).infer_type(tree)
     if kind == "truth":
         return "truth"
-    return "whole" if isinstance(kind, Whole | Enumeration) else "real"
+    return "whole" if isinstance(kind, IntType | EnumType) else "real"
 
 
-def with_delays(delays: tuple[Delay, ...], known: Names) -> dict[str, Expr]:
+def add_delay_bindings(delays: tuple[SampledDelay, ...], known: NameBindings) -> dict[str, Expr]:
     """Return what names are, and what each delayed value is."""
     found = dict(known)
     for delay in delays:
-        now = expression(delay.tree.arguments[0], found)
+        now = lower_expression(delay.call.arguments[0], found)
         whole = delay.type == "whole"
-        old: Expr = Ref(delay.name, whole)
+        old: Expr = Ref(delay.variable_name, whole)
         if delay.ticks > 1:
-            old = Item(delay.name, Ref(delay.oldest), whole)
-        key = memory_key(delay.tree)
-        found[key] = Select(KEPT_ONCE, old, now) if delay.ticks else now
+            old = Item(delay.variable_name, Ref(delay.oldest_index), whole)
+        key = memory_key(delay.call)
+        found[key] = Select(IS_DELAY_FILLED, old, now) if delay.ticks else now
     return found
 
 
-def keep_block(automaton: Automaton, delays: tuple[Delay, ...], known: Names) -> Block:
+def record_delays_block(
+    automaton: Automaton, delays: tuple[SampledDelay, ...], known: NameBindings
+) -> Block:
     """Return what a tick keeps, once its equations hold: all read the values of before it."""
     values: list[Op] = []
     fill: list[Op] = []
@@ -176,21 +184,23 @@ def keep_block(automaton: Automaton, delays: tuple[Delay, ...], known: Names) ->
     for delay in delays:
         kept = Ref(f"work.keep_{delay.number}")
         if delay.ticks:
-            values.append(Assign(kept.name, expression(delay.tree.arguments[0], known)))
+            values.append(Assign(kept.name, lower_expression(delay.call.arguments[0], known)))
         if delay.ticks == 1:
-            commit.append(Assign(delay.name, kept))
+            commit.append(Assign(delay.variable_name, kept))
         if delay.ticks > 1:
-            slot, oldest = Ref("work.slot"), Ref(delay.oldest)
-            fill.append(Loop(delay.ticks, slot.name, (Store(delay.name, slot, kept),)))
-            last = Compare("==", oldest, whole(delay.ticks - 1))
-            replace.append(Store(delay.name, oldest, kept))
-            replace.append(Assign(oldest.name, Select(last, whole(0), add(oldest, whole(1)))))
-    ring: Block = (Branch(KEPT_ONCE, tuple(replace), tuple(fill)),) if fill else ()
-    done: Block = (Assign(KEPT_ONCE.name, Value(True)),) if values else ()
+            slot, oldest = Ref("work.slot"), Ref(delay.oldest_index)
+            fill.append(Loop(delay.ticks, slot.name, (Store(delay.variable_name, slot, kept),)))
+            last = Compare("==", oldest, integer(delay.ticks - 1))
+            replace.append(Store(delay.variable_name, oldest, kept))
+            replace.append(Assign(oldest.name, Select(last, integer(0), add(oldest, integer(1)))))
+    ring: Block = (Branch(IS_DELAY_FILLED, tuple(replace), tuple(fill)),) if fill else ()
+    done: Block = (Assign(IS_DELAY_FILLED.name, Value(True)),) if values else ()
     return (*values, *ring, *commit, *done)
 
 
-def memory_variables(automaton: Automaton, delays: tuple[Delay, ...]) -> list[Variable]:
+def sampled_delay_variables(
+    automaton: Automaton, delays: tuple[SampledDelay, ...]
+) -> list[Variable]:
     """Return the variables of delays; `finished` leaves out what is not used."""
     found = [
         Variable("memory.kept", "truth", about="delayed values are kept"),
@@ -198,11 +208,13 @@ def memory_variables(automaton: Automaton, delays: tuple[Delay, ...]) -> list[Va
     ]
     for delay in delays:
         size = delay.ticks if delay.ticks > 1 else 0
-        found.append(Variable(delay.name, delay.type, size=size, about=_about(delay)))
-        found.append(Variable(delay.oldest, "whole", about="which of them is the oldest"))
+        found.append(
+            Variable(delay.variable_name, delay.type, size=size, about=_describe_delay(delay))
+        )
+        found.append(Variable(delay.oldest_index, "whole", about="which of them is the oldest"))
         found.append(Variable(f"work.keep_{delay.number}", delay.type))
     return found
 
 
-def _about(delay: Delay) -> str:
+def _describe_delay(delay: SampledDelay) -> str:
     return "value of the tick before" if delay.ticks == 1 else f"values of {delay.ticks} ticks"

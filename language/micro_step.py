@@ -9,89 +9,103 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from language.action import committing, entry, reading
-from language.chart import ROOT, Chart, Node
+from language.action import commit_stage, lower_entry, read_stage
+from language.chart import ROOT, Chart, ChartNode
 from language.charting import (
-    FIRST,
-    NOT_YET,
-    OVER,
-    Charting,
-    enters_flag,
-    kept,
-    leaves_flag,
-    taken,
-    wish,
+    IS_FIRST_STEP,
+    IS_STEP_LIMIT_REACHED,
+    NEVER_LEFT,
+    ChartContext,
+    entry_flag,
+    exit_flag,
+    history_ref,
+    request_variable,
+    selected_variable,
 )
 from language.declaration import Formula
-from language.entering import entering
-from language.event import EVENT, WAITING, arrived, event_variables, put, taken as take_event
-from language.leaving import leave, leaving_blocks
-from language.limit import MICRO_STEP_LIMIT
-from language.lower import reads_of
+from language.entering import lower_entry_set
+from language.event import (
+    CURRENT_EVENT,
+    HAS_WAITING_EVENT,
+    dequeue_event as take_event,
+    enqueue_event,
+    enqueue_input_events,
+    event_queue_variables,
+)
+from language.leaving import exit_blocks, run_exit_block
+from language.limit import MICRO_STEP_LIMIT_FAULT
+from language.lower import names_read
 from language.model import Automaton
 from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
-    Choose,
     Compare,
     Expr,
     FaultBit,
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Store,
+    Switch,
     Value,
     add,
-    whole,
+    integer,
 )
-from language.program import LOG, LOGGED, Variable, fired_variable
+from language.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Variable, fired_variable
 from language.selecting import selection_blocks, selection_variables
 
-BUSY = Ref("work.is_busy")
-STEPS = Ref("work.steps")
-TURN = "work.turn"
+HAS_NEXT_STEP = Ref("work.is_busy")
+STEP_COUNT = Ref("work.steps")
+LOOP_INDEX = "work.turn"
 
 
-def chart_blocks(charting: Charting, again: Op) -> dict[str, Block]:
-    """Return `jump` and what it runs; `again` evaluates the equations of the active modes."""
-    blocks = {**selection_blocks(charting), **leaving_blocks(charting)}
-    blocks["commit"] = _commit(charting, again)
-    if not charting.several:
-        return {**blocks, "jump": _one_step(charting)}
-    return {**blocks, "micro_step": _step(charting), "jump": _several(charting)}
+def chart_blocks(context: ChartContext, evaluate_equations: Op) -> dict[str, Block]:
+    """Return `jump` and what it runs; `evaluate_equations` evaluates the equations of the active modes."""
+    blocks = {**selection_blocks(context), **exit_blocks(context)}
+    blocks["commit"] = _commit_block(context, evaluate_equations)
+    if not context.has_several_micro_steps:
+        return {**blocks, "jump": _lower_single_micro_step(context)}
+    return {
+        **blocks,
+        "micro_step": _lower_micro_step(context),
+        "jump": _lower_micro_step_loop(context),
+    }
 
 
-def chart_variables(charting: Charting) -> list[Variable]:
+def chart_variables(context: ChartContext) -> list[Variable]:
     """Return the variables of all of it; `finished` leaves out what is not used."""
-    found = [*selection_variables(charting), *event_variables(charting.size)]
-    for node in charting.chart.nodes[ROOT + 1 :]:
+    found = [*selection_variables(context), *event_queue_variables(context.queue_capacity)]
+    for node in context.chart.nodes[ROOT + 1 :]:
         about = f"what `{node.path}` was left in"
-        found.append(Variable(kept(node).name, "whole", about=about))
-        for verb, flag in (("left", leaves_flag), ("entered", enters_flag)):
+        found.append(Variable(history_ref(node).name, "whole", about=about))
+        for verb, flag in (("left", exit_flag), ("entered", entry_flag)):
             about = f"`{node.path}` is {verb} in this micro-step"
             found.append(Variable(flag(node).name, "truth", about=about))
-    found.append(Variable(STEPS.name, "whole", about="micro-steps of this tick"))
-    found.append(Variable(TURN, "whole"))
-    found.append(Variable(BUSY.name, "truth", about="another micro-step follows"))
-    size = _log_size(charting)
+    found.append(Variable(STEP_COUNT.name, "whole", about="micro-steps of this tick"))
+    found.append(Variable(LOOP_INDEX, "whole"))
+    found.append(Variable(HAS_NEXT_STEP.name, "truth", about="another micro-step follows"))
+    size = _log_size(context)
     about = "transitions of this tick, 0 after those of a micro-step"
-    found.append(Variable(LOG, "whole", size=size, about=about))
-    found.append(Variable(LOGGED, "whole", about="how many entries of log"))
+    found.append(Variable(LOG_VARIABLE, "whole", size=size, about=about))
+    found.append(Variable(LOG_COUNT_VARIABLE, "whole", about="how many entries of log"))
     return found
 
 
-def nothing_left(charting: Charting) -> Block:
+def clear_histories(context: ChartContext) -> Block:
     """Return what forgets the histories of before."""
-    nodes = (charting.chart.nodes[index] for index in sorted(charting.remembered))
-    return tuple(Assign(kept(node).name, whole(NOT_YET)) for node in nodes)
+    nodes = (context.chart.nodes[index] for index in sorted(context.history_nodes))
+    return tuple(Assign(history_ref(node).name, integer(NEVER_LEFT)) for node in nodes)
 
 
-def first_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -> Block:
+def lower_initial_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -> Block:
     """Return the entries of all nodes that are active at the start, one stage for each depth."""
-    active = [(chart.depth(node), automaton.by_key.get(node.mode)) for node in chart.started()]
+    active = [
+        (chart.depth(node), automaton.modes_by_key.get(node.mode_key))
+        for node in chart.initial_configuration()
+    ]
     initial = automaton.modes[automaton.initial]
     ops: list[Op] = []
     for depth in sorted({depth for depth, _ in active}):
@@ -101,185 +115,202 @@ def first_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -
             if own == depth and mode
             for name, formula in mode.entry.items()
         }
-        ops += entry(automaton, initial, written, now)
+        ops += lower_entry(automaton, initial, written, now)
     return tuple(ops)
 
 
-def _one_step(charting: Charting) -> Block:
+def _lower_single_micro_step(context: ChartContext) -> Block:
     """The only micro-step of a tick; an event that it does not take is a fault if one waits."""
     ops: list[Op] = []
-    if charting.size:
-        ops += arrived(charting.chart)
+    if context.queue_capacity:
+        ops += enqueue_input_events(context.chart)
     ops += [
-        Run("select_transitions"),
-        *_heard(charting),
-        Branch(_any(charting, _chosen(charting)), (Run("commit"),)),
+        RunBlock("select_transitions"),
+        *_resolve_conflicts(context),
+        Branch(
+            _any_selected_condition(context, _selected_variable_name(context)),
+            (RunBlock("commit"),),
+        ),
     ]
-    if charting.size > 1:
-        ops.append(Branch(WAITING, (FaultBit(MICRO_STEP_LIMIT),)))
+    if context.queue_capacity > 1:
+        ops.append(Branch(HAS_WAITING_EVENT, (FaultBit(MICRO_STEP_LIMIT_FAULT),)))
     return tuple(ops)
 
 
-def _several(charting: Charting) -> Block:
+def _lower_micro_step_loop(context: ChartContext) -> Block:
     """Micro-steps until nothing is enabled and no event waits, or the bound is reached."""
-    ops: list[Op] = [Assign(LOGGED, whole(0)), Assign(STEPS.name, whole(0))]
-    if charting.size:
-        ops += arrived(charting.chart)
+    ops: list[Op] = [Assign(LOG_COUNT_VARIABLE, integer(0)), Assign(STEP_COUNT.name, integer(0))]
+    if context.queue_capacity:
+        ops += enqueue_input_events(context.chart)
     ops += [
         Assign(flag.name, Value(value))
-        for flag, value in ((BUSY, True), (FIRST, True), (OVER, False))
+        for flag, value in (
+            (HAS_NEXT_STEP, True),
+            (IS_FIRST_STEP, True),
+            (IS_STEP_LIMIT_REACHED, False),
+        )
     ]
-    turns = charting.chart.micro_steps + charting.size + 2
-    return (*ops, Loop(turns, TURN, (Branch(BUSY, (Run("micro_step"),)),)))
+    turns = context.chart.micro_steps + context.queue_capacity + 2
+    return (*ops, Loop(turns, LOOP_INDEX, (Branch(HAS_NEXT_STEP, (RunBlock("micro_step"),)),)))
 
 
-def _step(charting: Charting) -> Block:
+def _lower_micro_step(context: ChartContext) -> Block:
     """One turn: a micro-step, or the next event, or the end."""
-    fired = _any(charting, _chosen(charting))
-    over: Block = (FaultBit(MICRO_STEP_LIMIT), Assign(BUSY.name, Value(False)))
+    fired = _any_selected_condition(context, _selected_variable_name(context))
+    over: Block = (FaultBit(MICRO_STEP_LIMIT_FAULT), Assign(HAS_NEXT_STEP.name, Value(False)))
     done: list[Op] = [
-        Run("commit"),
-        _noted(charting, whole(0)),
-        Assign(STEPS.name, add(STEPS, whole(1))),
+        RunBlock("commit"),
+        _append_log_entry(context, integer(0)),
+        Assign(STEP_COUNT.name, add(STEP_COUNT, integer(1))),
     ]
-    if charting.size:
-        done.append(Assign(EVENT.name, whole(0)))
-    reached = Compare("==", STEPS, whole(charting.chart.micro_steps))
-    done.append(Assign(OVER.name, reached))
-    end: Block = (Assign(BUSY.name, Value(False)),)
-    if charting.size:
-        late: Block = (Branch(OVER, over, take_event()),)
-        end = (Branch(WAITING, late, end),)
-    ops: list[Op] = [Run("select_transitions"), *_heard(charting)]
-    ops.append(Branch(fired, (Branch(OVER, over, tuple(done)),), end))
-    return (*ops, Assign(FIRST.name, Value(False)))
+    if context.queue_capacity:
+        done.append(Assign(CURRENT_EVENT.name, integer(0)))
+    reached = Compare("==", STEP_COUNT, integer(context.chart.micro_steps))
+    done.append(Assign(IS_STEP_LIMIT_REACHED.name, reached))
+    end: Block = (Assign(HAS_NEXT_STEP.name, Value(False)),)
+    if context.queue_capacity:
+        late: Block = (Branch(IS_STEP_LIMIT_REACHED, over, take_event()),)
+        end = (Branch(HAS_WAITING_EVENT, late, end),)
+    ops: list[Op] = [RunBlock("select_transitions"), *_resolve_conflicts(context)]
+    ops.append(Branch(fired, (Branch(IS_STEP_LIMIT_REACHED, over, tuple(done)),), end))
+    return (*ops, Assign(IS_FIRST_STEP.name, Value(False)))
 
 
-def _heard(charting: Charting) -> Block:
-    return (Run("hear"),) if len(charting.chart.regions) > 1 else ()
+def _resolve_conflicts(context: ChartContext) -> Block:
+    return (RunBlock("hear"),) if len(context.chart.regions) > 1 else ()
 
 
-def _chosen(charting: Charting) -> Callable[[str], str]:
+def _selected_variable_name(context: ChartContext) -> Callable[[str], str]:
     """The variable of what a region takes: a single one always takes what it wishes for."""
-    return taken if len(charting.chart.regions) > 1 else wish
+    return selected_variable if len(context.chart.regions) > 1 else request_variable
 
 
-def _any(charting: Charting, chosen: Callable[[str], str]) -> Expr:
+def _any_selected_condition(context: ChartContext, variable_of: Callable[[str], str]) -> Expr:
     found: Expr | None = None
-    for region in charting.chart.regions:
-        here = Compare("!=", Ref(chosen(region.region)), whole(0))
+    for region in context.chart.regions:
+        here = Compare("!=", Ref(variable_of(region.region)), integer(0))
         found = here if found is None else Binary("or", found, here)
     assert found is not None
     return found
 
 
-def _commit(charting: Charting, again: Op) -> Block:
+def _commit_block(context: ChartContext, evaluate_equations: Op) -> Block:
     """What the transitions do that are taken."""
     ops: list[Op] = []
-    leaving = [n for n in charting.chart.nodes if (m := charting.mode(n)) and m.exit]
-    coming = [n for n in charting.chart.nodes if (m := charting.mode(n)) and m.entry]
-    ops += [Assign(leaves_flag(node).name, Value(False)) for node in leaving]
-    ops += [Assign(enters_flag(node).name, Value(False)) for node in coming]
-    ops += _left(charting)
-    for depth in sorted({charting.chart.depth(node) for node in leaving}, reverse=True):
-        nodes = [node for node in leaving if charting.chart.depth(node) == depth]
-        ops += _stage(
-            charting, [(leaves_flag(n), charting.automaton.by_key[n.mode].exit) for n in nodes]
+    leaving = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.exit]
+    coming = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.entry]
+    ops += [Assign(exit_flag(node).name, Value(False)) for node in leaving]
+    ops += [Assign(entry_flag(node).name, Value(False)) for node in coming]
+    ops += _log_and_exit(context)
+    for depth in sorted({context.chart.depth(node) for node in leaving}, reverse=True):
+        nodes = [node for node in leaving if context.chart.depth(node) == depth]
+        ops += _lower_flagged_stage(
+            context,
+            [(exit_flag(n), context.automaton.modes_by_key[n.mode_key].exit) for n in nodes],
         )
-    ops += _resets(charting)
-    ops += _entered(charting)
-    ops += _entries(charting, coming, again)
-    return (*ops, again)
+    ops += _lower_resets(context)
+    ops += _enter_targets(context)
+    ops += _lower_entries(context, coming, evaluate_equations)
+    return (*ops, evaluate_equations)
 
 
-def _left(charting: Charting) -> Block:
+def _log_and_exit(context: ChartContext) -> Block:
     """Note what fired, and leave what that leaves."""
     ops: list[Op] = []
-    for region in charting.chart.regions:
-        chosen = Ref(_chosen(charting)(region.region))
+    for region in context.chart.regions:
+        chosen = Ref(_selected_variable_name(context)(region.region))
         cases = []
-        for transition, way in charting.ways_in(region.region):
+        for transition, way in context.transitions_in(region.region):
             if way.domain is not None:
-                block = (leave(charting.chart.nodes[way.domain]),)
-                cases.append((charting.info(transition).number, block))
-        if not charting.ways_in(region.region):
+                block = (run_exit_block(context.chart.nodes[way.domain]),)
+                cases.append((context.info_of(transition).number, block))
+        if not context.transitions_in(region.region):
             continue
         log: Block = (Assign(fired_variable(region.region), chosen),)
-        if charting.several:
-            log = (*log, _noted(charting, chosen))
-        ops.append(Branch(Compare("!=", chosen, whole(0)), log))
+        if context.has_several_micro_steps:
+            log = (*log, _append_log_entry(context, chosen))
+        ops.append(Branch(Compare("!=", chosen, integer(0)), log))
         if cases:
-            ops.append(Choose(chosen.name, tuple(cases)))
+            ops.append(Switch(chosen.name, tuple(cases)))
     return tuple(ops)
 
 
-def _log_size(charting: Charting) -> int:
+def _log_size(context: ChartContext) -> int:
     """Return how many entries a tick has at most: one of each region in a step, and its end."""
-    return charting.chart.micro_steps * (len(charting.chart.regions) + 1)
+    return context.chart.micro_steps * (len(context.chart.regions) + 1)
 
 
-def _noted(charting: Charting, entry: Expr) -> Op:
+def _append_log_entry(context: ChartContext, entry: Expr) -> Op:
     """Write an entry. There is always room; the test says so to tools that follow ranges."""
-    written = (Store(LOG, Ref(LOGGED), entry), Assign(LOGGED, add(Ref(LOGGED), whole(1))))
-    return Branch(Compare("<", Ref(LOGGED), whole(_log_size(charting))), written)
+    written = (
+        Store(LOG_VARIABLE, Ref(LOG_COUNT_VARIABLE), entry),
+        Assign(LOG_COUNT_VARIABLE, add(Ref(LOG_COUNT_VARIABLE), integer(1))),
+    )
+    return Branch(Compare("<", Ref(LOG_COUNT_VARIABLE), integer(_log_size(context))), written)
 
 
-def _stage(charting: Charting, flagged: list[tuple[Ref, Mapping[str, Formula]]]) -> Block:
+def _lower_flagged_stage(
+    context: ChartContext, flagged: list[tuple[Ref, Mapping[str, Formula]]]
+) -> Block:
     """Assignments of the nodes that have their flag set: all read, then all commit."""
-    automaton = charting.automaton
+    automaton = context.automaton
     reads = [
-        Branch(flag, tuple(reading(automaton, written, charting.everywhere)))
+        Branch(flag, tuple(read_stage(automaton, written, context.bindings)))
         for flag, written in flagged
     ]
-    commits = [Branch(flag, tuple(committing(automaton, written))) for flag, written in flagged]
+    commits = [Branch(flag, tuple(commit_stage(automaton, written))) for flag, written in flagged]
     return (*reads, *commits)
 
 
-def _resets(charting: Charting) -> Block:
+def _lower_resets(context: ChartContext) -> Block:
     """The resets of all transitions as one stage, and the events that they raise."""
-    automaton = charting.automaton
+    automaton = context.automaton
     reads: list[Op] = []
     commits: list[Op] = []
-    for region in charting.chart.regions:
+    for region in context.chart.regions:
         read, commit = [], []
-        for transition, _ in charting.ways_in(region.region):
-            number = charting.info(transition).number
+        for transition, _ in context.transitions_in(region.region):
+            number = context.info_of(transition).number
             written = transition.reset
             if written:
-                read.append((number, tuple(reading(automaton, written, charting.everywhere))))
-            ops = tuple(committing(automaton, written))
+                read.append((number, tuple(read_stage(automaton, written, context.bindings))))
+            ops = tuple(commit_stage(automaton, written))
             for name in transition.raises:
-                ops = (*ops, *put(charting.chart, name, charting.size))
+                ops = (*ops, *enqueue_event(context.chart, name, context.queue_capacity))
             if ops:
                 commit.append((number, ops))
-        chosen = _chosen(charting)(region.region)
-        reads += [Choose(chosen, tuple(read))] if read else []
-        commits += [Choose(chosen, tuple(commit))] if commit else []
+        chosen = _selected_variable_name(context)(region.region)
+        reads += [Switch(chosen, tuple(read))] if read else []
+        commits += [Switch(chosen, tuple(commit))] if commit else []
     return (*reads, *commits)
 
 
-def _entered(charting: Charting) -> Block:
+def _enter_targets(context: ChartContext) -> Block:
     ops: list[Op] = []
-    for region in charting.chart.regions:
+    for region in context.chart.regions:
         cases = []
-        for transition, way in charting.ways_in(region.region):
-            block = entering(charting, transition, way)
+        for transition, way in context.transitions_in(region.region):
+            block = lower_entry_set(context, transition, way)
             if block:
-                cases.append((charting.info(transition).number, block))
+                cases.append((context.info_of(transition).number, block))
         if cases:
-            ops.append(Choose(_chosen(charting)(region.region), tuple(cases)))
+            ops.append(Switch(_selected_variable_name(context)(region.region), tuple(cases)))
     return tuple(ops)
 
 
-def _entries(charting: Charting, coming: list[Node], again: Op) -> Block:
+def _lower_entries(
+    context: ChartContext, entered_nodes: list[ChartNode], evaluate_equations: Op
+) -> Block:
     """Entries from the outside in; the equations that they read are evaluated before each stage."""
     ops: list[Op] = []
-    automaton = charting.automaton
-    for depth in sorted({charting.chart.depth(node) for node in coming}):
-        nodes = [node for node in coming if charting.chart.depth(node) == depth]
-        written = [automaton.by_key[node.mode].entry for node in nodes]
-        reads = reads_of(formula.tree for each in written for formula in each.values())
-        if any(name in charting.everywhere and name not in charting.now for name in reads):
-            ops.append(again)
-        ops += _stage(charting, list(zip(map(enters_flag, nodes), written, strict=True)))
+    automaton = context.automaton
+    for depth in sorted({context.chart.depth(node) for node in entered_nodes}):
+        nodes = [node for node in entered_nodes if context.chart.depth(node) == depth]
+        written = [automaton.modes_by_key[node.mode_key].entry for node in nodes]
+        reads = names_read(formula.tree for each in written for formula in each.values())
+        if any(name in context.bindings and name not in context.base_bindings for name in reads):
+            ops.append(evaluate_equations)
+        ops += _lower_flagged_stage(
+            context, list(zip(map(entry_flag, nodes), written, strict=True))
+        )
     return tuple(ops)

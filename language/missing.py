@@ -3,5 +3,5 @@
 from __future__ import annotations
 
 
-class ToolMissing(Exception):
+class MissingToolError(Exception):
     """A program or package that is needed is not installed; the message says how to get it."""

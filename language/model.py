@@ -8,13 +8,13 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
-from language.chart import Chart, Keeping
+from language.chart import Chart, HistoryKind
 from language.declaration import Formula, Input, Parameter, State
-from language.document import Scalar
-from language.kind import Kind as ValueKind
+from language.document import ScalarNode
+from language.kind import ExprType as ValueKind
 from language.number import NumberType
 from language.problem import Span
-from language.syntax import Tree
+from language.syntax import SyntaxTree
 from language.truth import TruthTable
 from language.units import Dimension
 
@@ -27,8 +27,8 @@ class Balance:
     """`left = right`, where left is a coefficient times der(state)."""
 
     state: str
-    left: Tree
-    right: Tree
+    left: SyntaxTree
+    right: SyntaxTree
     key: str
 
 
@@ -36,7 +36,7 @@ class Balance:
 class Invariant:
     """An assertion about a mode: what holds in it, and what is told where it does not."""
 
-    that: Formula
+    condition: Formula
     message: str
 
 
@@ -78,10 +78,10 @@ class Transition:
     targets: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
     raises: tuple[str, ...] = ()
-    history: Keeping = ""
+    history: HistoryKind = ""
     internal: bool = False
-    completes: bool = False
-    in_cell: bool = False
+    is_completion: bool = False
+    is_table_cell: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,16 +109,16 @@ class Observer:
     at: Mapping[str, Formula] = field(default_factory=dict)
     g: Mapping[str, Formula] = field(default_factory=dict)
     constants: Mapping[str, Formula] = field(default_factory=dict)
-    runs: bool = False
+    predicts_by_run: bool = False
     gain: str = "steady"
     covariance: str = "steady"
     correct: str | None = None
-    limits: Mapping[str, tuple[Formula, Formula]] = field(default_factory=dict)
+    variance_limits: Mapping[str, tuple[Formula, Formula]] = field(default_factory=dict)
     unknown_instant: Mapping[str, Formula] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Run:
+class ModelRun:
     """A mode of the model run inside the tick, following the model's own transitions.
 
     Where it does not follow them it keeps the one flow. `linearise` is the point at which the
@@ -149,12 +149,12 @@ class Mode:
     flow: Mapping[str, Balance]
     update: Mapping[str, Formula]
     observer: Observer | None
-    run: Run | None
+    run: ModelRun | None
     transitions: tuple[Transition, ...]
     key: str
     span: Span
     region: str = CHART
-    beside: tuple[Region, ...] = ()
+    parallel_regions: tuple[Region, ...] = ()
     entry: Mapping[str, Formula] = field(default_factory=dict)
     exit: Mapping[str, Formula] = field(default_factory=dict)
     invariants: Mapping[str, Invariant] = field(default_factory=dict)
@@ -180,7 +180,7 @@ class Region:
     inactive: int | None = None
 
     @cached_property
-    def widest(self) -> int:
+    def max_transitions(self) -> int:
         """The largest number of transitions that leave one mode."""
         return max(len(mode.transitions) for mode in self.modes.values())
 
@@ -221,20 +221,20 @@ class Automaton:
     discrete: Mapping[str, State] = field(default_factory=dict)
     faults: Mapping[str, bool] = field(default_factory=dict)
     fault_mode: str | None = None
-    kinds: Mapping[str, ValueKind] = field(default_factory=dict, repr=False)
-    sources: Mapping[str, str] = field(default_factory=dict)
+    name_types: Mapping[str, ValueKind] = field(default_factory=dict, repr=False)
+    output_sources: Mapping[str, str] = field(default_factory=dict)
     elements: Mapping[str, Element] = field(default_factory=dict)
     places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
     numbers: NumberType = "float64"
-    recording_map: Scalar | None = field(default=None, repr=False)
+    recording_map: ScalarNode | None = field(default=None, repr=False)
     tables: tuple[TruthTable, ...] = ()
     superstates: tuple[Mode, ...] = ()
-    tree: Chart | None = None
+    statechart: Chart | None = None
 
-    def source_of(self, output: str) -> str:
+    def output_source(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""
-        return self.sources.get(output, output)
+        return self.output_sources.get(output, output)
 
     @property
     def is_sampled(self) -> bool:
@@ -242,14 +242,14 @@ class Automaton:
         return self.period is not None
 
     @cached_property
-    def chart(self) -> Region:
+    def root_region(self) -> Region:
         """The modes at the root, as a region."""
         return Region(CHART, self.modes, self.initial, self.span)
 
     @cached_property
     def all_regions(self) -> tuple[Region, ...]:
         """The chart, then the regions beside it."""
-        return (self.chart, *self.regions)
+        return (self.root_region, *self.regions)
 
     @cached_property
     def all_modes(self) -> tuple[Mode, ...]:
@@ -258,19 +258,19 @@ class Automaton:
         return (*inner, *self.superstates)
 
     @cached_property
-    def by_key(self) -> Mapping[str, Mode]:
+    def modes_by_key(self) -> Mapping[str, Mode]:
         """All modes by their key path."""
         return {mode.key: mode for mode in self.all_modes}
 
     @cached_property
-    def _by_name(self) -> Mapping[str, Region]:
+    def _regions_by_name(self) -> Mapping[str, Region]:
         return {region.name: region for region in reversed(self.all_regions)}
 
     def region(self, name: str) -> Region:
         """Return the region of a name."""
-        return self._by_name[name]
+        return self._regions_by_name[name]
 
-    def source(self, transition: Transition) -> Mode:
+    def source_mode(self, transition: Transition) -> Mode:
         """Return the mode that a transition leaves."""
         found = self.region(transition.region).modes.get(transition.source)
         return found or next(
@@ -279,20 +279,20 @@ class Automaton:
             if (mode.region, mode.name) == (transition.region, transition.source)
         )
 
-    def target(self, transition: Transition) -> Mode:
+    def target_mode(self, transition: Transition) -> Mode:
         """Return the mode that a transition enters."""
         return self.region(transition.region).modes[transition.target]
 
     @cached_property
-    def carried(self) -> Mapping[str, State]:
+    def state_variables(self) -> Mapping[str, State]:
         """The states and discrete variables: all that assignments may write."""
         return {**self.states, **self.discrete}
 
     @cached_property
-    def literals(self) -> Mapping[str, int]:
+    def enum_literals(self) -> Mapping[str, int]:
         """The names of enumerations with their numbers, those of the model too."""
         lists = [thing.values for thing in self.parameters.values()]
         lists += [thing.values for thing in self.inputs.values()]
         lists += [thing.values for thing in self.discrete.values()]
         own = {name: place for values in lists for place, name in enumerate(values)}
-        return {**(self.model.literals if self.model else {}), **own}
+        return {**(self.model.enum_literals if self.model else {}), **own}

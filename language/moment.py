@@ -12,166 +12,181 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from language.action import place_of
+from language.action import storage_of
 from language.activity import is_active, is_complete
-from language.chart import Chart, Node
+from language.chart import Chart, ChartNode
 from language.chart_target import mode_paths
-from language.constants import exact_value
+from language.constants import evaluate_exactly
 from language.declaration import Formula
 from language.graph import post_order
-from language.lower import WHOLE_TYPES, assigned, expression
-from language.memory import ticks_of, type_of
+from language.lower import WHOLE_TYPES, lower_assigned_value, lower_expression
+from language.memory import evaluate_ticks, expression_type
 from language.model import Automaton, Mode, Transition
-from language.number import rounded
-from language.once import once
-from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, whole
-from language.parameter import constant_names
+from language.number import round_to_type
+from language.once import cache_on_owner
+from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, integer
+from language.parameter import constant_bindings
 from language.precedence import node_of
 from language.program import mode_variable
-from language.question import Extent, Step
-from language.syntax import EDGES, MEMORY, Application, Tree, memory_key, walk
+from language.question import SymbolicAssignment, VariableDomain
+from language.syntax import (
+    EDGE_FUNCTIONS,
+    MEMORY_FUNCTIONS,
+    FunctionCall,
+    SyntaxTree,
+    memory_key,
+    walk,
+)
 
-ELAPSED = "memory.elapsed"
+TIME_IN_MODE = "memory.elapsed"
 """The time since the entry of the mode: in ticks of a sampled automaton, else in seconds."""
 
 
 @dataclass
-class Story:
+class SymbolicPath:
     """What is computed at an instant, in order, and what is known of it besides."""
 
-    steps: list[Step] = field(default_factory=list)
-    facts: list[Expr] = field(default_factory=list)
-    extents: dict[str, Extent] = field(default_factory=dict)
-    moments: int = 0
+    assignments: list[SymbolicAssignment] = field(default_factory=list)
+    assumptions: list[Expr] = field(default_factory=list)
+    domains: dict[str, VariableDomain] = field(default_factory=dict)
+    snapshot_count: int = 0
 
 
-class Moment:
+class GuardSnapshot:
     """A mode of one region at an instant; `after` a transition comes the next one."""
 
     def __init__(
         self,
         automaton: Automaton,
         mode: Mode,
-        story: Story | None = None,
-        carried: Mapping[str, Expr] | None = None,
+        path: SymbolicPath | None = None,
+        values: Mapping[str, Expr] | None = None,
     ) -> None:
         """Begin an instant, or go on with the values that a transition left."""
         self.automaton = automaton
         self.mode = mode
-        self.story = story or Story()
-        self.tag = f" {self.story.moments}" if self.story.moments else ""
-        self.elapsed = ELAPSED
-        self.story.moments += 1
-        self.known: dict[str, Expr] = dict(constant_names(automaton))
+        self.path = path or SymbolicPath()
+        self.suffix = f" {self.path.snapshot_count}" if self.path.snapshot_count else ""
+        self.time_in_mode = TIME_IN_MODE
+        self.path.snapshot_count += 1
+        self.bindings: dict[str, Expr] = dict(constant_bindings(automaton))
         for name, thing in automaton.inputs.items():
-            self.known[name] = Ref(f"input.{name}", thing.type in WHOLE_TYPES)
-        for name, variable in automaton.carried.items():
-            self.known[name] = Ref(place_of(automaton, name), variable.type in WHOLE_TYPES)
-        self.known.update(carried or {})
-        self.known.update(self._modes())
+            self.bindings[name] = Ref(f"input.{name}", thing.type in WHOLE_TYPES)
+        for name, variable in automaton.state_variables.items():
+            self.bindings[name] = Ref(storage_of(automaton, name), variable.type in WHOLE_TYPES)
+        self.bindings.update(values or {})
+        self.bindings.update(self._mode_bindings())
 
-    def expression(self, tree: Tree) -> Expr:
+    def lower_expression(self, tree: SyntaxTree) -> Expr:
         """Return an expression of this moment. Raises KeyError where a name is not known here."""
-        self._define([tree])
-        return expression(tree, self.known)
+        self._define_equations([tree])
+        return lower_expression(tree, self.bindings)
 
-    def guard(self, transition: Transition) -> Expr:
+    def lower_guard(self, transition: Transition) -> Expr:
         """Return when a transition is enabled, events aside: where it completes, by the modes."""
-        chart = self.automaton.tree
-        node = node_of(self.automaton, self.automaton.source(transition))
-        if transition.completes and chart and node:
+        chart = self.automaton.statechart
+        node = node_of(self.automaton, self.automaton.source_mode(transition))
+        if transition.is_completion and chart and node:
             return is_complete(chart, node, "mode")
-        return self.expression(transition.when.tree)
+        return self.lower_expression(transition.when.tree)
 
-    def seen_by(self, outer: Mode) -> Moment:
+    def in_enclosing_mode(self, outer: Mode) -> GuardSnapshot:
         """Return this moment as a mode around ours has it: it is active for as long, or longer."""
         seen = copy.copy(self)
-        seen.known = {key: value for key, value in self.known.items() if key[:6] != "after "}
-        seen.elapsed = f"{ELAPSED} {outer.key}"
-        ages = Ref(seen.elapsed, True), Ref(ELAPSED, True)
-        self.story.extents.update((age.name, Extent("whole", low=Fraction(0))) for age in ages)
-        self.story.facts.append(Compare(">=", *ages))
+        seen.bindings = {key: value for key, value in self.bindings.items() if key[:6] != "after "}
+        seen.time_in_mode = f"{TIME_IN_MODE} {outer.key}"
+        ages = Ref(seen.time_in_mode, True), Ref(TIME_IN_MODE, True)
+        self.path.domains.update(
+            (age.name, VariableDomain("whole", low=Fraction(0))) for age in ages
+        )
+        self.path.assumptions.append(Compare(">=", *ages))
         return seen
 
-    def after(self, transition: Transition) -> Moment:
+    def apply_transition(self, transition: Transition) -> GuardSnapshot:
         """Return the moment after a transition: exit, reset and entry, each read as a whole."""
-        target = self.automaton.target(transition)
-        carried = self._stage(self.mode.exit, {})
-        carried = self._stage(transition.reset, carried)
-        there = Moment(self.automaton, target, self.story, {**self._carried(), **carried})
+        target = self.automaton.target_mode(transition)
+        carried = self._apply_stage(self.mode.exit, {})
+        carried = self._apply_stage(transition.reset, carried)
+        there = GuardSnapshot(
+            self.automaton, target, self.path, {**self._carried_values(), **carried}
+        )
         if target.entry:
-            entered = there._stage(target.entry, {})
-            there = Moment(self.automaton, target, self.story, {**there._carried(), **entered})
+            entered = there._apply_stage(target.entry, {})
+            there = GuardSnapshot(
+                self.automaton, target, self.path, {**there._carried_values(), **entered}
+            )
         return there
 
-    def _carried(self) -> dict[str, Expr]:
-        return {name: self.known[name] for name in self.automaton.carried}
+    def _carried_values(self) -> dict[str, Expr]:
+        return {name: self.bindings[name] for name in self.automaton.state_variables}
 
-    def _stage(self, formulas: Mapping[str, Formula], carried: dict[str, Expr]) -> dict[str, Expr]:
+    def _apply_stage(
+        self, formulas: Mapping[str, Formula], values: dict[str, Expr]
+    ) -> dict[str, Expr]:
         """Return what is carried after a stage; its equations are those of this moment."""
-        self._define(formula.tree for formula in formulas.values())
-        known = {**self.known, **carried}
-        found = dict(carried)
+        self._define_equations(formula.tree for formula in formulas.values())
+        known = {**self.bindings, **values}
+        found = dict(values)
         for name, formula in formulas.items():
-            is_whole = self.automaton.carried[name].type in WHOLE_TYPES
-            target = f"{place_of(self.automaton, name)} {len(self.story.steps)}"
-            value = assigned(formula.tree, known, is_whole)
-            self.story.steps.append((target, value))
+            is_whole = self.automaton.state_variables[name].type in WHOLE_TYPES
+            target = f"{storage_of(self.automaton, name)} {len(self.path.assignments)}"
+            value = lower_assigned_value(formula.tree, known, is_whole)
+            self.path.assignments.append((target, value))
             found[name] = Ref(target, is_whole)
         return found
 
-    def _modes(self) -> dict[str, Expr]:
+    def _mode_bindings(self) -> dict[str, Expr]:
         """Return what `in(...)` is: of our own region it is certain, of others any mode."""
         model = self.automaton.model
-        found = _modes_of_run(model, self.story.extents) if model else {}
-        if self.automaton.tree:
-            return {**found, **self._modes_of_chart(self.automaton.tree)}
+        found = _run_mode_bindings(model, self.path.domains) if model else {}
+        if self.automaton.statechart:
+            return {**found, **self._chart_mode_bindings(self.automaton.statechart)}
         for region in self.automaton.all_regions:
             own = region.name == self.mode.region
             selector = Ref(f"mode.{region.name}", True)
             if not own:
-                self.story.extents[selector.name] = _any_mode(region.modes.values())
+                self.path.domains[selector.name] = _mode_domain(region.modes.values())
             for name, mode in region.modes.items():
-                is_in: Expr = Compare("==", selector, whole(mode.number))
+                is_in: Expr = Compare("==", selector, integer(mode.number))
                 found[f"in {region.name}.{name}"] = Value(name == self.mode.name) if own else is_in
         return found
 
-    def _modes_of_chart(self, chart: Chart) -> dict[str, Expr]:
+    def _chart_mode_bindings(self, chart: Chart) -> dict[str, Expr]:
         """Return what `in(...)` is inside a chart: around our own mode only what holds it."""
-        own = next(node for node in chart.nodes if node.mode == self.mode.key)
+        own = next(node for node in chart.nodes if node.mode_key == self.mode.key)
         for region in self.automaton.all_regions:
             leaves = chart.leaves(region.name)
-            around = chart.region_node(region.name).holds(own.index)
-            here = [leaf for leaf in leaves if leaf.holds(own.index) or own.holds(leaf.index)]
+            around = chart.region_node(region.name).contains(own.index)
+            here = [leaf for leaf in leaves if leaf.contains(own.index) or own.contains(leaf.index)]
             numbers = [
                 leaf.number for leaf in (here if around else leaves) if leaf.number is not None
             ]
             if not around and region.inactive is not None:
                 numbers.append(region.inactive)
             name = mode_variable("mode", region.name)
-            self.story.extents[name] = Extent("whole", numbers=tuple(numbers))
+            self.path.domains[name] = VariableDomain("whole", numbers=tuple(numbers))
         found: dict[str, Expr] = {}
-        for path, (node, active) in _active(chart).items():
-            found[f"in {path}"] = Value(True) if node.holds(own.index) else active
+        for path, (node, active) in _mode_activity(chart).items():
+            found[f"in {path}"] = Value(True) if node.contains(own.index) else active
         return found
 
-    def _define(self, trees: Iterable[Tree]) -> None:
+    def _define_equations(self, trees: Iterable[SyntaxTree]) -> None:
         """Make the equations known that some expressions need, each after those that it reads."""
         trees = list(trees)
         needed: dict[str, list[tuple[int | None, str, Formula]]] = {}
-        stack = [name for tree in trees for name in _reads(tree)]
+        stack = [name for tree in trees for name in _names_read(tree)]
         while stack:
             name = stack.pop()
-            if name in needed or name in self.known:
+            if name in needed or name in self.bindings:
                 continue
             needed[name] = list(self._alternatives(name))
             stack += [read for _, _, formula in needed[name] for read in formula.reads]
         reads = {n: [r for _, _, f in found for r in f.reads] for n, found in needed.items()}
         for name in post_order(reads):
             if needed[name]:
-                self._equation(name, needed[name])
+                self._define_equation(name, needed[name])
         for tree in trees:
-            self.remember(tree)
+            self.define_memory(tree)
 
     def _alternatives(self, name: str) -> Iterator[tuple[int | None, str, Formula]]:
         """Yield the formulas that an equation can have: our mode's, else by another region's."""
@@ -183,117 +198,121 @@ class Moment:
                 if name in mode.equations:
                     yield mode.number, region.name, mode.equations[name]
 
-    def _equation(self, name: str, found: list[tuple[int | None, str, Formula]]) -> None:
-        is_whole = found[0][2].whole
+    def _define_equation(
+        self, name: str, alternatives: list[tuple[int | None, str, Formula]]
+    ) -> None:
+        is_whole = alternatives[0][2].is_integer
         value: Expr | None = None
-        for number, region, formula in reversed(found):
-            self.remember(formula.tree)
-            own = assigned(formula.tree, self.known, formula.whole)
+        for number, region, formula in reversed(alternatives):
+            self.define_memory(formula.tree)
+            own = lower_assigned_value(formula.tree, self.bindings, formula.is_integer)
             if value is None or number is None:
                 value = own
             else:
-                is_in = Compare("==", Ref(f"mode.{region}", True), whole(number))
+                is_in = Compare("==", Ref(f"mode.{region}", True), integer(number))
                 value = Select(is_in, own, value)
         assert value is not None
-        target = f"equation.{name}{self.tag}"
-        self.story.steps.append((target, value))
-        self.known[name] = Ref(target, is_whole)
+        target = f"equation.{name}{self.suffix}"
+        self.path.assignments.append((target, value))
+        self.bindings[name] = Ref(target, is_whole)
 
-    def remember(self, tree: Tree) -> None:
+    def define_memory(self, tree: SyntaxTree) -> None:
         """Make the functions with memory known; what is inside of one comes first."""
         for part in reversed(walk(tree)):
-            if isinstance(part, Application) and part.function in MEMORY:
+            if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
                 key = memory_key(part)
-                if key not in self.known:
-                    self.known[key] = self._remembered(part)
+                if key not in self.bindings:
+                    self.bindings[key] = self._memory_value(part)
 
-    def _remembered(self, part: Application) -> Expr:
+    def _memory_value(self, call: FunctionCall) -> Expr:
         automaton = self.automaton
-        if self.tag and part.function in (*EDGES, "every"):
+        if self.suffix and call.function in (*EDGE_FUNCTIONS, "every"):
             return Value(False)  # nothing was seen before in this activation
-        if part.function == "after":
-            if self.tag:
-                return Value(_time_of(automaton, part) <= 0)
+        if call.function == "after":
+            if self.suffix:
+                return Value(_after_seconds(automaton, call) <= 0)
             if automaton.is_sampled:
-                return self._aged(part)
-            self.story.extents[ELAPSED] = Extent(low=Fraction(0))
-            time = expression(part.arguments[0], constant_names(automaton))
-            return Compare(">=", Ref(ELAPSED), time)
-        if part.function in ("rising", "falling"):
-            level = expression(part.arguments[0], self.known)
-            now = level if part.function == "rising" else Unary("not", level)
-            return Binary("and", self._changed(part), now)
-        name = f"memory.{part.function}_{len(self.story.extents)}{self.tag}"
-        if part.function in ("changed", "every"):
-            self.story.extents[name] = Extent("truth")
-            if part.function == "every" and automaton.is_sampled:
-                aged = self._aged(part)
-                if ticks_of(automaton, part.arguments[0]) == 1:
+                return self._is_in_mode_for(call)
+            self.path.domains[TIME_IN_MODE] = VariableDomain(low=Fraction(0))
+            time = lower_expression(call.arguments[0], constant_bindings(automaton))
+            return Compare(">=", Ref(TIME_IN_MODE), time)
+        if call.function in ("rising", "falling"):
+            level = lower_expression(call.arguments[0], self.bindings)
+            now = level if call.function == "rising" else Unary("not", level)
+            return Binary("and", self._changed_value(call), now)
+        name = f"memory.{call.function}_{len(self.path.domains)}{self.suffix}"
+        if call.function in ("changed", "every"):
+            self.path.domains[name] = VariableDomain("truth")
+            if call.function == "every" and automaton.is_sampled:
+                aged = self._is_in_mode_for(call)
+                if evaluate_ticks(automaton, call.arguments[0]) == 1:
                     return aged  # each tick after the first
-                self.story.facts.append(Binary("or", Unary("not", Ref(name)), aged))
+                self.path.assumptions.append(Binary("or", Unary("not", Ref(name)), aged))
             return Ref(name)
-        kind = type_of(automaton, part.arguments[0])
-        self.story.extents[name] = replace(self._extent_of(part.arguments[0]), type=kind)
+        kind = expression_type(automaton, call.arguments[0])
+        self.path.domains[name] = replace(self._domain_of(call.arguments[0]), type=kind)
         return Ref(name, kind == "whole")
 
-    def _changed(self, part: Application) -> Expr:
+    def _changed_value(self, call: FunctionCall) -> Expr:
         """Return whether a condition changed, which is what a rise and a fall of it share."""
-        change = Application("changed", part.arguments, part.span)
+        change = FunctionCall("changed", call.arguments, call.span)
         key = memory_key(change)
-        if key not in self.known:
-            self.known[key] = self._remembered(change)
-        return self.known[key]
+        if key not in self.bindings:
+            self.bindings[key] = self._memory_value(change)
+        return self.bindings[key]
 
-    def _aged(self, part: Application) -> Expr:
+    def _is_in_mode_for(self, call: FunctionCall) -> Expr:
         """Return that a mode has been active for the whole ticks of a time."""
-        self.story.extents[self.elapsed] = Extent("whole", low=Fraction(0))
-        ticks = whole(ticks_of(self.automaton, part.arguments[0]))
-        return Compare(">=", Ref(self.elapsed, True), ticks)
+        self.path.domains[self.time_in_mode] = VariableDomain("whole", low=Fraction(0))
+        ticks = integer(evaluate_ticks(self.automaton, call.arguments[0]))
+        return Compare(">=", Ref(self.time_in_mode, True), ticks)
 
-    def _extent_of(self, tree: Tree) -> Extent:
+    def _domain_of(self, tree: SyntaxTree) -> VariableDomain:
         """Return the bounds of a name that is delayed."""
         path = getattr(tree, "path", "")
-        thing = self.automaton.inputs.get(path) or self.automaton.carried.get(path)
+        thing = self.automaton.inputs.get(path) or self.automaton.state_variables.get(path)
         if thing is None or thing.range is None:
-            return Extent()
-        low, high = (Fraction(rounded(bound, self.automaton.numbers)) for bound in thing.range)
-        return Extent(low=low, high=high)
+            return VariableDomain()
+        low, high = (
+            Fraction(round_to_type(bound, self.automaton.numbers)) for bound in thing.range
+        )
+        return VariableDomain(low=low, high=high)
 
 
-@once
-def _active(chart: Chart) -> dict[str, tuple[Node, Expr]]:
+@cache_on_owner
+def _mode_activity(chart: Chart) -> dict[str, tuple[ChartNode, Expr]]:
     """Return the modes of a chart by their paths, with whether each is active."""
     paths = mode_paths(chart).items()
     return {path: (node, is_active(chart, node, "mode")) for path, node in paths}
 
 
-def _time_of(automaton: Automaton, part: Application) -> Fraction:
+def _after_seconds(automaton: Automaton, call: FunctionCall) -> Fraction:
     """Return the time of `after` exactly [s]."""
-    return exact_value(Formula(part.arguments[0], ""), automaton)
+    return evaluate_exactly(Formula(call.arguments[0], ""), automaton)
 
 
-def _reads(tree: Tree) -> list[str]:
+def _names_read(tree: SyntaxTree) -> list[str]:
     return list(Formula(tree, "").reads)
 
 
-def _modes_of_run(model: Automaton, extents: dict[str, Extent]) -> dict[str, Expr]:
+def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> dict[str, Expr]:
     """Return what `in(model.mode)` is: a run may be in any mode of the model."""
     found: dict[str, Expr] = {}
     for region in model.all_regions:
         selector = Ref(f"run.{region.name}", True)
-        extents[selector.name] = _any_mode(region.modes.values())
+        domains[selector.name] = _mode_domain(region.modes.values())
         for name, mode in region.modes.items():
-            is_in = Compare("==", selector, whole(mode.number))
+            is_in = Compare("==", selector, integer(mode.number))
             found[f"in {model.name}.{region.name}.{name}"] = is_in
-            if region.name == model.chart.name:
+            if region.name == model.root_region.name:
                 found[f"in {model.name}.{name}"] = is_in
     return found
 
 
-def _any_mode(modes: Iterable[Mode]) -> Extent:
+def _mode_domain(modes: Iterable[Mode]) -> VariableDomain:
     """Return the numbers of some modes, with the names that a witness shows."""
     by_number = {mode.number: mode.name for mode in modes}
     names: tuple[str, ...] = ()
     if min(by_number) >= 0:
         names = tuple(by_number.get(number, "") for number in range(max(by_number) + 1))
-    return Extent("whole", numbers=tuple(by_number), names=names)
+    return VariableDomain("whole", numbers=tuple(by_number), names=names)

@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from language.field import Field, any_guard, at_time
-from language.look import Polynomials, look_block
+from language.field import VectorField, any_guard_condition, set_point_time
+from language.look import DenseOutput, event_search_block
 from language.model import Mode
-from language.number import DIGITS, NumberType
+from language.number import SIGNIFICAND_BITS, NumberType
 from language.operation import (
     Assign,
     Binary,
@@ -26,34 +26,34 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Store,
     Unary,
     Value,
     add,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.program import Constant, Variable
-from language.region import slots
-from language.resting import movable, resting
-from language.units import per_second
+from language.region import guard_slots
+from language.resting import constant_states, ever_varying_states
+from language.units import rate_dimension
 
 MERGE_ULPS = 4096
 """Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
-RUN_HALVINGS = 24
+RUN_BISECTIONS = 24
 """Halvings inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 an ULP."""
-FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
+FLOW_BISECTIONS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 """Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
 
-Armed = Mapping[str, str]
+ArmedGuards = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class Method:
+class IntegrationMethod:
     """A method of integration for one field; `norms` are |A h| of each mode, where it has them.
 
     `resting` are the states that move in no mode: they have no polynomial.
@@ -63,21 +63,21 @@ class Method:
     terms: int
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
-    norms: Mapping[str, float] = field(default_factory=dict)
-    resting: frozenset[str] = frozenset()
+    step_norms: Mapping[str, float] = field(default_factory=dict)
+    constant_states: frozenset[str] = frozenset()
 
 
-def at_rest(field: Field, mode: str) -> list[Op]:
+def hold_constant_states(field: VectorField, mode: str) -> list[Op]:
     """Return the ends of a step of the states that rest in a mode."""
-    still = resting(field.automaton.modes[mode])
+    still = constant_states(field.automaton.modes[mode])
     return [Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in field.states if n in still]
 
 
-def flat(field: Field, mode: str, terms: int) -> list[Op]:
+def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]:
     """Return the polynomials of a mode's step of the states that rest in this mode, not in all."""
-    still = resting(field.automaton.modes[mode])
-    names = [name for name in movable(field.automaton) if name in still]
-    return [Store(f"work.series_{n}", whole(k), real(0.0)) for n in names for k in range(terms)]
+    still = constant_states(field.automaton.modes[mode])
+    names = [name for name in ever_varying_states(field.automaton) if name in still]
+    return [Store(f"work.series_{n}", integer(k), real(0.0)) for n in names for k in range(terms)]
 
 
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
@@ -87,16 +87,16 @@ def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0))
     its states are as coarse: ULPs of the step, 0.5 us in 1 ms.
     """
     whole = max(time, step) if number == "float64" else step
-    return float(whole) * MERGE_ULPS * 2.0 ** (1 - DIGITS[number])
+    return float(whole) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
 
 
-def motion_blocks(
-    field: Field,
-    method: Method,
+def continuous_step_blocks(
+    field: VectorField,
+    method: IntegrationMethod,
     flows: Mapping[str, Block],
     merge: Expr,
-    halvings: int,
-    armed: Callable[[Mode], Armed | None],
+    bisections: int,
+    armed: Callable[[Mode], ArmedGuards | None],
     is_wait: Expr | None = None,
 ) -> dict[str, Block]:
     """Return `point`, and `look_<mode>`, `locate_<mode>` and `move_<mode>` of every mode.
@@ -105,17 +105,17 @@ def motion_blocks(
     gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
     crosses just after it is at that instant.
     """
-    paths = Polynomials(method.terms, method.resting)
-    blocks = {"point": paths.at(field.states)}
+    paths = DenseOutput(method.terms, method.constant_states)
+    blocks = {"point": paths.evaluate(field.states)}
     for mode in field.automaton.modes.values():
-        blocks[f"look_{mode.name}"] = look_block(field, mode, paths, flows)
-        crossed = any_guard(field, mode, armed(mode))
-        blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
-        blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)
+        blocks[f"look_{mode.name}"] = event_search_block(field, mode, paths, flows)
+        crossed = any_guard_condition(field, mode, armed(mode))
+        blocks[f"locate_{mode.name}"] = _bisect_crossing(field, mode, crossed, bisections, merge)
+        blocks[f"move_{mode.name}"] = _lower_continuous_step(field, mode, crossed, merge, is_wait)
     return blocks
 
 
-def motion_variables(field: Field, method: Method) -> list[Variable]:
+def continuous_step_variables(field: VectorField, method: IntegrationMethod) -> list[Variable]:
     """Return the work variables of a motion."""
     found = [
         Variable("work.h", "real", "s", about="step to flow over"),
@@ -129,13 +129,13 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
             "work.is_before_end", "truth", about="a guard turns true before the end of the step"
         ),
         Variable("work.term", "whole"),
-        *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.slots),
+        *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.guard_slots),
     ]
     for name, state in field.automaton.states.items():
         dimension = state.unit.dimension
-        unit, rate = str(dimension), str(per_second(dimension))
+        unit, rate = str(dimension), str(rate_dimension(dimension))
         found.append(Variable(f"work.end_{name}", "real", unit, about="at the end of the step"))
-        if name in method.resting:
+        if name in method.constant_states:
             continue
         found.append(Variable(f"work.sum_{name}", "real", rate))
         about = "factor of s; those of s^2, s^3, ... have one more 1/s each"
@@ -143,12 +143,14 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
     return [*found, *method.variables]
 
 
-def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr) -> Block:
+def _bisect_crossing(
+    field: VectorField, mode: Mode, crossed: Expr, bisections: int, merge: Expr
+) -> Block:
     """Halve (low, high]: a guard has changed at high, none has at low."""
     low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_before_end"
     middle = add(low, multiply(real(0.5), subtract(high, low)))
     body: Block = (
-        *_look(mode, middle),
+        *_evaluate_guards_at(mode, middle),
         Branch(
             crossed,
             (Assign("work.high", Ref("work.s")), Assign(inside, Value(True))),
@@ -159,40 +161,44 @@ def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr)
         Assign("work.low", real(0.0)),
         Assign("work.high", Ref("work.h")),
         Assign(inside, Value(False)),
-        Loop(halvings, "work.halving", body),
-        *_at_high(field, mode, Ref(inside)),
-        *_merged(field, mode, merge),
+        Loop(bisections, "work.halving", body),
+        *_accept_upper_end(field, mode, Ref(inside)),
+        *_merge_close_events(field, mode, merge),
         Assign("work.elapsed", Call("min", (high, Ref("work.h")))),
     )
 
 
-def _at_high(field: Field, mode: Mode, inside: Expr) -> Block:
+def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Block:
     """Take the point at the upper end where that lies inside, and read the guards there if more
     than one may change.
     """
     high = Ref("work.high")
-    kept = (Assign("work.s", high), *_kept(field))
-    if len(slots(mode)) < 2:
-        return (Branch(inside, kept),)
-    return (Branch(inside, (*kept, Run(f"guards_{mode.name}")), _look(mode, high)),)
+    kept = (Assign("work.s", high), *_accept_point(field))
+    if len(guard_slots(mode)) < 2:
+        return (Branch(is_before_end, kept),)
+    return (
+        Branch(
+            is_before_end, (*kept, RunBlock(f"guards_{mode.name}")), _evaluate_guards_at(mode, high)
+        ),
+    )
 
 
-def _look(mode: Mode, s: Expr, why: str = "") -> Block:
-    """Read the guards at `s`."""
-    return (Assign("work.s", s, why), Run(f"look_{mode.name}"))
+def _evaluate_guards_at(mode: Mode, time: Expr, comment: str = "") -> Block:
+    """Read the guards at `time`."""
+    return (Assign("work.s", time, comment), RunBlock(f"look_{mode.name}"))
 
 
-def _kept(field: Field) -> Block:
+def _accept_point(field: VectorField) -> Block:
     """Take the point at `work.s` for the end."""
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
-    return (Run("point"), *keep)
+    return (RunBlock("point"), *keep)
 
 
-def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
+def _merge_close_events(field: VectorField, mode: Mode, merge: Expr) -> Block:
     """Where another guard changes within `merge` after the first, take both as one instant; what
     they are at the first is known.
     """
-    watched = slots(mode)
+    watched = guard_slots(mode)
     if len(watched) < 2:
         return ()
     first = [Assign(f"work.guard_{k}_at_high", Ref(f"work.guard_{k}")) for k in watched]
@@ -201,32 +207,40 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
         turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.guard_{k}_at_high")))
         another = turned if position == 0 else Binary("or", another, turned)
     high = Ref("work.high")
-    accepted: Block = (Assign("work.high", Ref("work.s")), *_kept(field))
+    accepted: Block = (Assign("work.high", Ref("work.s")), *_accept_point(field))
     return (
         *first,
-        *_look(mode, add(high, merge), "what turns true until then does so at the same instant"),
+        *_evaluate_guards_at(
+            mode, add(high, merge), "what turns true until then does so at the same instant"
+        ),
         Branch(another, accepted),
     )
 
 
-def _move(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None) -> Block:
-    watched = slots(mode)
-    ops: list[Op] = [Run(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
+def _lower_continuous_step(
+    field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None
+) -> Block:
+    watched = guard_slots(mode)
+    ops: list[Op] = [RunBlock(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
     if watched:
         ops += [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
-        ops += at_time(field, Ref("work.h"))
-        ops.append(Run(f"guards_{mode.name}"))
+        ops += set_point_time(field, Ref("work.h"))
+        ops.append(RunBlock(f"guards_{mode.name}"))
     ops.append(Assign("work.crossed", crossed if watched else Value(False)))
     if watched:
-        found: Block = (Run(f"series_{mode.name}"), Run(f"locate_{mode.name}"))
-        just_after = () if is_wait is None else _just_after(field, mode, crossed, merge, is_wait)
+        found: Block = (RunBlock(f"series_{mode.name}"), RunBlock(f"locate_{mode.name}"))
+        just_after = (
+            () if is_wait is None else _merge_event_after_wait(field, mode, crossed, merge, is_wait)
+        )
         ops.append(Branch(Ref("work.crossed"), found, just_after))
     ops += [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     return tuple(ops)
 
 
-def _just_after(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr) -> Block:
+def _merge_event_after_wait(
+    field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr
+) -> Block:
     """A guard that changes within `merge` after the end of a wait changes at that instant."""
-    look = (Run(f"series_{mode.name}"), *_look(mode, add(Ref("work.h"), merge)))
-    change = Branch(crossed, (Assign("work.crossed", Value(True)), *_kept(field)))
+    look = (RunBlock(f"series_{mode.name}"), *_evaluate_guards_at(mode, add(Ref("work.h"), merge)))
+    change = Branch(crossed, (Assign("work.crossed", Value(True)), *_accept_point(field)))
     return (Branch(is_wait, (*look, change)),)

@@ -4,58 +4,60 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.document import Node, Scalar, Table
+from language.document import MappingNode, ScalarNode, YamlNode
 from language.problem import Span
-from language.redirect import rewritten
-from language.rewrite import joined, reads, sides, summands
-from language.tree import at, entries, put
+from language.redirect import rewrite_scalar
+from language.rewrite import join_summands, names_in_text, split_balance, split_summands
+from language.tree import entries, find_node, put_node
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedSummands:
     """A tree without the summands that left, and these with their signs; terms by name."""
 
-    tree: Table
+    tree: MappingNode
     summands: list[tuple[str, str]]
-    terms: dict[str, Node]
+    terms: dict[str, YamlNode]
     source: Span
 
 
-def taken_out(tree: Table, state: str, names: set[str], span: Span) -> Moved | None:
+def remove_summands(
+    tree: MappingNode, state: str, names: set[str], span: Span
+) -> MovedSummands | None:
     """Take the top-level summands that name some variables out of the balance of a state.
 
     Its terms count as summands. None where the balance is not the same in every mode.
     """
-    balance = at(tree, ("flow", state))
-    if not isinstance(balance, Scalar):
+    balance = find_node(tree, ("flow", state))
+    if not isinstance(balance, ScalarNode):
         return None
-    left, right = sides(balance.text)
-    parts = summands(right)
-    gone = [part for part in parts if names & set(reads(part[1]))]
-    stay = [part for part in parts if part not in gone]
-    if gone:
-        text = f"{left} = {joined(stay)}"
-        tree = put(tree, ("flow", state), rewritten(balance, text, span))
-    moved: dict[str, Node] = {}
+    left, right = split_balance(balance.text)
+    parts = split_summands(right)
+    removed = [part for part in parts if names & set(names_in_text(part[1]))]
+    remaining = [part for part in parts if part not in removed]
+    if removed:
+        text = f"{left} = {join_summands(remaining)}"
+        tree = put_node(tree, ("flow", state), rewrite_scalar(balance, text, span))
+    moved: dict[str, YamlNode] = {}
     kept = {}
-    terms = at(tree, ("terms", state))
+    terms = find_node(tree, ("terms", state))
     for entry in entries(terms):
-        if isinstance(entry.node, Scalar) and names & set(reads(entry.node.text)):
+        if isinstance(entry.node, ScalarNode) and names & set(names_in_text(entry.node.text)):
             moved[entry.key] = entry.node
         else:
             kept[entry.key] = entry
     if moved and terms:
-        tree = put(tree, ("terms", state), Table(kept, terms.span))
-    return Moved(tree, gone, moved, balance.span)
+        tree = put_node(tree, ("terms", state), MappingNode(kept, terms.span))
+    return MovedSummands(tree, removed, moved, balance.span)
 
 
-def put_in(body: Table, state: str, moved: Moved) -> Table:
+def insert_summands(body: MappingNode, state: str, moved: MovedSummands) -> MappingNode:
     """Return an effect's body with the summands that moved in the balance of its state."""
-    balance = at(body, ("flow", state))
-    if isinstance(balance, Scalar) and moved.summands:
-        left, right = sides(balance.text)
-        text = f"{left} = {joined([*summands(right), *moved.summands])}"
-        body = put(body, ("flow", state), rewritten(balance, text, moved.source))
+    balance = find_node(body, ("flow", state))
+    if isinstance(balance, ScalarNode) and moved.summands:
+        left, right = split_balance(balance.text)
+        text = f"{left} = {join_summands([*split_summands(right), *moved.summands])}"
+        body = put_node(body, ("flow", state), rewrite_scalar(balance, text, moved.source))
     for name, node in moved.terms.items():
-        body = put(body, ("terms", state, name), node)
+        body = put_node(body, ("terms", state, name), node)
     return body

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from language.aliases import stepped
+from language.aliases import increment_hint
 from language.problem import Problems, Span
-from language.reserved import C_MACRO, DEVICE_WORDS, FILE_WORDS, reserved_words
+from language.reserved import C_MACRO_PATTERN, DEVICE_NAME_PATTERN, FILE_WORDS, reserved_words
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
 COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
 
 
@@ -17,8 +17,8 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
     """Report a name that is not one: docs/language.md, "Names, numbers, units"."""
     words = reserved_words()
     another = f"another name, like `{name}_1`"
-    if not NAME.fullmatch(name):
-        hint = COMMA_HINT if ")" in name else stepped(name)
+    if not NAME_PATTERN.fullmatch(name):
+        hint = COMMA_HINT if ")" in name else increment_hint(name)
         hint = hint or "a letter, then at most 30 letters, digits or `_`"
         problems.error("name", span, f"`{name}` is not a name", hint)
     elif name in words["GRAMMAR"]:
@@ -31,7 +31,7 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
         problems.error("name", span, label, another)
     else:
         for language in ("C", "C++", "A2L"):
-            if name in words[language] or (language == "C" and C_MACRO.fullmatch(name)):
+            if name in words[language] or (language == "C" and C_MACRO_PATTERN.fullmatch(name)):
                 label = f"`{name}` is a word of {language}, and generated files keep the names"
                 problems.error("name", span, label, another)
                 return
@@ -46,15 +46,15 @@ def check_region_name(name: str, span: Span, problems: Problems) -> None:
 def check_file_name(name: str, span: Span, problems: Problems) -> None:
     """Report a name of an automaton that cannot be the name of its files."""
     check_name(name, span, problems)
-    if name.lower() in FILE_WORDS or DEVICE_WORDS.fullmatch(name):
+    if name.lower() in FILE_WORDS or DEVICE_NAME_PATTERN.fullmatch(name):
         label = f"an automaton is not called `{name}`: that is another file"
         problems.error("name", span, label, f"another name, like `{name}_1`")
 
 
-def report_case_twins(named: Iterable[tuple[str, Span]], problems: Problems) -> None:
+def report_case_collisions(names: Iterable[tuple[str, Span]], problems: Problems) -> None:
     """Report names that differ in case only: many tools for A2L and CSV do not tell them apart."""
     first: dict[str, tuple[str, Span]] = {}
-    for name, span in named:
+    for name, span in names:
         other, place = first.setdefault(name.lower(), (name, span))
         if other != name:
             label = f"`{name}` and `{other}` differ in case only"

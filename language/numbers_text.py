@@ -4,36 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from language.longest import most_operations
-from language.motion import RUN_HALVINGS
-from language.program import MotionInfo, ObserverInfo, Program
+from language.longest import max_operations
+from language.motion import RUN_BISECTIONS
+from language.program import IntegrationInfo, ObserverInfo, Program
 
-LETTERS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
+MATRIX_COLUMNS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
 """Matrices of an observer that are shown, and what their columns are."""
 
 
-def numbers_text(program: Program) -> str:
+def format_solved_numbers(program: Program) -> str:
     """Return the method of a run or flow with K, |A h|, limits, work; matrices of observers."""
     lines = [f"program {program.name}"]
-    if program.motion:
-        lines += motion_lines(program.motion)
-        lines += _work_lines(program, program.motion)
-        lines += _rewind_lines(program)
+    if program.integration:
+        lines += format_method_lines(program.integration)
+        lines += _format_work_lines(program, program.integration)
+        lines += _format_rewind_lines(program)
     if program.period is not None:
-        most = most_operations(program.blocks, "step")
+        most = max_operations(program.blocks, "step")
         what = "operations (arithmetic, comparisons, stores)"
         lines.append(f"longest tick: at most {most} {what}, every loop to its end")
     for observer in program.observers:
-        lines += _observer_lines(program, observer)
+        lines += _format_observer_lines(program, observer)
     return "\n".join(lines) + "\n"
 
 
-def motion_lines(motion: MotionInfo) -> Iterator[str]:
+def format_method_lines(motion: IntegrationInfo) -> Iterator[str]:
     """Yield the method, |A h| of each mode and the largest stable step of each mode."""
-    yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.terms}"
+    yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.series_terms}"
     for mode, norm in motion.norms.items():
         yield f"  mode {mode}: |A h| = {norm:.4g}, at most 4"
-    for limit in motion.limits:
+    for limit in motion.stability_limits:
         value = limit.eigenvalue
         turning = f" +- {abs(value.imag):.6g} i" if value.imag else ""
         yield (
@@ -42,34 +42,34 @@ def motion_lines(motion: MotionInfo) -> Iterator[str]:
         )
 
 
-def _work_lines(program: Program, motion: MotionInfo) -> Iterator[str]:
+def _format_work_lines(program: Program, motion: IntegrationInfo) -> Iterator[str]:
     """K products by A, then halvings that evaluate the polynomials: once for each event."""
-    if program.period is None or not motion.events:
+    if program.period is None or not motion.max_events:
         return
-    n = motion.states
-    once = motion.terms * n * n + RUN_HALVINGS * motion.terms * n
+    n = motion.state_count
+    once = motion.series_terms * n * n + RUN_BISECTIONS * motion.series_terms * n
     yield (
-        f"  work: at most {motion.events} events per substep, {motion.events * once} products and "
-        f"{motion.events * RUN_HALVINGS} looks at the guards"
+        f"  work: at most {motion.max_events} events per substep, {motion.max_events * once} products and "
+        f"{motion.max_events * RUN_BISECTIONS} looks at the guards"
     )
 
 
-def _rewind_lines(program: Program) -> Iterator[str]:
+def _format_rewind_lines(program: Program) -> Iterator[str]:
     """What a transition that goes back does at most in its tick."""
     for info in program.transitions:
-        if info.rewind:
+        if info.rewind_ticks:
             way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
-            looks = info.rewind + RUN_HALVINGS + 2
+            looks = info.rewind_ticks + RUN_BISECTIONS + 2
             yield (
-                f"  rewind {way}: at most {looks} looks at `until` and {info.rewind} runs, "
+                f"  rewind {way}: at most {looks} looks at `until` and {info.rewind_ticks} runs, "
                 f"one of them over a part of a period"
             )
 
 
-def _observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:
+def _format_observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:
     yield f"observer of mode {observer.mode}: gain {observer.gain}"
     values = {constant.name: constant.value for constant in program.constants}
-    for letter, what in LETTERS.items():
+    for letter, what in MATRIX_COLUMNS.items():
         columns = getattr(observer, what)
         rows = []
         for row in observer.states:

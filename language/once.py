@@ -9,20 +9,20 @@ from collections.abc import Callable
 from functools import wraps
 from typing import TypeVar
 
-Thing = TypeVar("Thing")
+Owner = TypeVar("Owner")
 Fact = TypeVar("Fact")
 
 
-def once(find: Callable[[Thing], Fact]) -> Callable[[Thing], Fact]:
+def cache_on_owner(compute: Callable[[Owner], Fact]) -> Callable[[Owner], Fact]:
     """Return a function that finds a fact of each thing once; nobody changes what it returns."""
-    name = f"once {find.__module__}.{find.__qualname__}"
+    name = f"once {compute.__module__}.{compute.__qualname__}"
 
-    @wraps(find)
-    def found(thing: Thing) -> Fact:
+    @wraps(compute)
+    def cached(thing: Owner) -> Fact:
         kept = vars(thing)
         if name not in kept:
-            kept[name] = find(thing)
+            kept[name] = compute(thing)
         fact: Fact = kept[name]
         return fact
 
-    return found
+    return cached

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from language.number import NumberType, rounded
+from language.number import NumberType, round_to_type
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,11 +16,11 @@ class Value:
     value: float | int | bool
     exact: Fraction | None = field(default=None, compare=False, repr=False)
 
-    def rounded(self, number: NumberType) -> Value:
+    def round_to_type(self, number_type: NumberType) -> Value:
         """Return the literal in a number type."""
         if not isinstance(self.value, float):
             return self
-        return Value(rounded(self.value if self.exact is None else self.exact, number))
+        return Value(round_to_type(self.value if self.exact is None else self.exact, number_type))
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Ref:
     """The value of a variable or constant; `whole` if that is a whole number."""
 
     name: str
-    whole: bool = False
+    is_integer: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Item:
 
     name: str
     index: Expr
-    whole: bool = False
+    is_integer: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Branch:
 
 
 @dataclass(frozen=True, slots=True)
-class Choose:
+class Switch:
     """Run the block of the case that a whole-number variable has."""
 
     selector: str
@@ -150,24 +150,24 @@ class FaultBit:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class RunBlock:
     """Run a named block."""
 
     block: str
 
 
-Op = Assign | Store | Branch | Choose | Loop | Count | FaultBit | Run
+Op = Assign | Store | Branch | Switch | Loop | Count | FaultBit | RunBlock
 Block = tuple[Op, ...]
 
 
 def real(value: float | Fraction) -> Value:
     """Return a real literal; give the exact value where it is known."""
     if isinstance(value, Fraction):
-        return Value(rounded(value), value)
+        return Value(round_to_type(value), value)
     return Value(float(value))
 
 
-def whole(value: int) -> Value:
+def integer(value: int) -> Value:
     """Return a whole-number literal."""
     return Value(int(value))
 
@@ -192,7 +192,7 @@ def divide(left: Expr, right: Expr) -> Binary:
     return Binary("/", left, right)
 
 
-def total(parts: list[Expr]) -> Expr:
+def sum_of(parts: list[Expr]) -> Expr:
     """Return the sum from left to right, 0 for no parts."""
     if not parts:
         return real(0.0)

@@ -2,74 +2,80 @@
 
 from __future__ import annotations
 
-from language.document import Entry, Items, Node, Scalar, Table
-from language.problem import Problems, nearest
+from language.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.problem import Problems, suggest_name
 
 
-def lay(base: Table, over: Table, problems: Problems, *, template: bool = False) -> Table:
-    """Return `base` with `over` laid over it (docs/language.md, "Variants, effects, calibrations").
+def apply_overlay(
+    base: MappingNode, overlay: MappingNode, problems: Problems, *, template: bool = False
+) -> MappingNode:
+    """Return `base` with `overlay` laid over it (docs/language.md, "Variants, effects, calibrations").
 
     Mappings merge by name, to any depth; a scalar or a list replaces; `{remove: true}` removes.
     A removal of what is absent is a problem; an override by an equal value is a warning,
     unless `base` is a template.
     """
     entries = dict(base.entries)
-    for entry in over:
+    for entry in overlay:
         present = base.entries.get(entry.key)
         if _is_removal(entry.node):
             if present is None:
                 label = f"`{entry.key}` cannot be removed: it is not there"
-                problems.error("overlay", entry.span, label, nearest(entry.key, base.entries))
+                problems.error("overlay", entry.span, label, suggest_name(entry.key, base.entries))
             entries.pop(entry.key, None)
         elif present is None:
-            entries[entry.key] = _added(entry, base, problems)
+            entries[entry.key] = _reject_removals(entry, base, problems)
         else:
-            node = _combined(present, entry, problems, template)
+            node = _merge_entry(present, entry, problems, template)
             entries[entry.key] = Entry(entry.key, present.span, node)
-    return Table(entries, base.span)
+    return MappingNode(entries, base.span)
 
 
-def without(table: Table, *keys: str) -> Table:
+def without_keys(table: MappingNode, *keys: str) -> MappingNode:
     """Return the table without some of its keys."""
     kept = {key: entry for key, entry in table.entries.items() if key not in keys}
-    return Table(kept, table.span)
+    return MappingNode(kept, table.span)
 
 
-def _is_removal(node: Node) -> bool:
-    if not isinstance(node, Table) or set(node.entries) != {"remove"}:
+def _is_removal(node: YamlNode) -> bool:
+    if not isinstance(node, MappingNode) or set(node.entries) != {"remove"}:
         return False
     value = node.get("remove")
-    return isinstance(value, Scalar) and value.text == "true"
+    return isinstance(value, ScalarNode) and value.text == "true"
 
 
-def _added(entry: Entry, base: Table, problems: Problems) -> Entry:
+def _reject_removals(entry: Entry, base: MappingNode, problems: Problems) -> Entry:
     """Nothing can be removed inside what is new."""
-    if not isinstance(entry.node, Table):
+    if not isinstance(entry.node, MappingNode):
         return entry
-    found = Problems()
-    made = lay(Table({}, entry.node.span), entry.node, found)
-    near = nearest(entry.key, base.entries)
-    for problem in found.found:
+    nested_problems = Problems()
+    made = apply_overlay(MappingNode({}, entry.node.span), entry.node, nested_problems)
+    near = suggest_name(entry.key, base.entries)
+    for problem in nested_problems.reported:
         hint = problem.help or (f"`{entry.key}` is new: {near}" if near else "")
         problems.error("overlay", problem.span, problem.label, hint)
     return Entry(entry.key, entry.span, made)
 
 
-def _combined(base: Entry, over: Entry, problems: Problems, template: bool) -> Node:
-    if isinstance(base.node, Table) and isinstance(over.node, Table):
-        return lay(base.node, over.node, problems, template=template)
-    if not template and not isinstance(base.node, Table) and _value(base.node) == _value(over.node):
-        label = f"`{over.key}` is overridden by the value that it has"
-        problems.warning("overlay", over.span, label, f"it is given at {base.span}")
-    return over.node
+def _merge_entry(base: Entry, overlay: Entry, problems: Problems, template: bool) -> YamlNode:
+    if isinstance(base.node, MappingNode) and isinstance(overlay.node, MappingNode):
+        return apply_overlay(base.node, overlay.node, problems, template=template)
+    if (
+        not template
+        and not isinstance(base.node, MappingNode)
+        and _plain_content(base.node) == _plain_content(overlay.node)
+    ):
+        label = f"`{overlay.key}` is overridden by the value that it has"
+        problems.warning("overlay", overlay.span, label, f"it is given at {base.span}")
+    return overlay.node
 
 
-def _value(node: Node) -> object:
+def _plain_content(node: YamlNode) -> object:
     """What a tree says, without its places."""
     match node:
-        case Scalar():
+        case ScalarNode():
             return node.text
-        case Items():
-            return tuple(_value(item) for item in node.nodes)
-        case Table():
-            return {entry.key: _value(entry.node) for entry in node}
+        case SequenceNode():
+            return tuple(_plain_content(item) for item in node.nodes)
+        case MappingNode():
+            return {entry.key: _plain_content(entry.node) for entry in node}

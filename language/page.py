@@ -6,22 +6,24 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from language.declaration import Parameter
-from language.document import Entry, Node, Scalar, Table
-from language.experiment import Page, System
-from language.problem import Problems, Source, Span, nearest
+from language.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.experiment import ScheduledCalibration, System
+from language.problem import Problems, Source, Span, suggest_name
 from language.stimulus import StimulusReader
 from language.wait import tunable_waits
 
 
-def read_pages(node: Node | None, system: System, problems: Problems) -> tuple[Page, ...]:
+def read_pages(
+    node: YamlNode | None, system: System, problems: Problems
+) -> tuple[ScheduledCalibration, ...]:
     """Return the pages of `pages: {1.5 s: {est.k_hs: 6000 N*m/rad}}`, problems reported."""
-    return _PageReader(problems, system).pages(node)
+    return _PageReader(problems, system).read_pages(node)
 
 
-def pages_of(texts: Sequence[str], system: System) -> tuple[Page, ...]:
+def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibration, ...]:
     """Return the pages of command-line texts `1.5 s: k_hs = 6000 N*m/rad`. Raises SpecError."""
     problems = Problems()
-    times: dict[str, Table] = {}
+    times: dict[str, MappingNode] = {}
     for text in texts:
         span = Span(Source("--change", (text,)), 1, 1, max(1, len(text)))
         time, colon, rest = text.partition(":")
@@ -30,13 +32,13 @@ def pages_of(texts: Sequence[str], system: System) -> tuple[Page, ...]:
             label = "a change of the calibration is `time: parameter = value`"
             problems.error("form", span, label, "like `1.5 s: k_hs = 6000 N*m/rad`")
             continue
-        entry = Entry(name.strip(), span, Scalar(value.strip(), span))
-        before = times.get(time.strip(), Table({}, span))
-        times[time.strip()] = Table({**before.entries, entry.key: entry}, span)
+        entry = Entry(name.strip(), span, ScalarNode(value.strip(), span))
+        before = times.get(time.strip(), MappingNode({}, span))
+        times[time.strip()] = MappingNode({**before.entries, entry.key: entry}, span)
     table = {time: Entry(time, page.span, page) for time, page in times.items()}
-    problems.stop_if_any()
-    found = read_pages(Table(table, Span(Source("--change"), 1, 1)), system, problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
+    found = read_pages(MappingNode(table, Span(Source("--change"), 1, 1)), system, problems)
+    problems.raise_if_errors()
     return found
 
 
@@ -51,26 +53,28 @@ class _PageReader(StimulusReader):
             name: {
                 p.name: p
                 for p in instance.automaton.parameters.values()
-                if _may_change(p) and p.name not in self.waits[name]
+                if _is_changeable(p) and p.name not in self.waits[name]
             }
             for name, instance in system.instances.items()
         }
 
-    def pages(self, node: Node | None) -> tuple[Page, ...]:
-        found: list[Page] = []
-        for entry in self.table(node, "pages"):
-            told = len(self.problems.found)
-            time = self.time(Scalar(entry.key, entry.span), "the time of a page", entry.span)
-            is_time = len(self.problems.found) == told
+    def read_pages(self, node: YamlNode | None) -> tuple[ScheduledCalibration, ...]:
+        found: list[ScheduledCalibration] = []
+        for entry in self.read_mapping(node, "pages"):
+            error_count = len(self.problems.reported)
+            time = self.read_time(
+                ScalarNode(entry.key, entry.span), "the time of a page", entry.span
+            )
+            is_time = len(self.problems.reported) == error_count
             if is_time and found and time <= found[-1].time:
                 self.problems.error("order", entry.span, "pages are in the order of time")
             values: dict[tuple[str, str], Fraction] = {}
-            for item in self.table(entry.node, f"pages.{entry.key}"):
-                values.update(self._values(item))
-            found.append(Page(time, values))
+            for item in self.read_mapping(entry.node, f"pages.{entry.key}"):
+                values.update(self._read_values(item))
+            found.append(ScheduledCalibration(time, values))
         return tuple(found)
 
-    def _values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
+    def _read_values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
         """A parameter of one instance, or of all that have it as a tunable one."""
         owner, dot, name = entry.key.rpartition(".")
         held = [o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)]
@@ -82,12 +86,12 @@ class _PageReader(StimulusReader):
         if not owners:
             known = [f"{o}.{n}" for o, tunable in self.tunable.items() for n in tunable]
             label = f"`{entry.key}` is not a tunable parameter of `{self.system.name}`"
-            hint = nearest(entry.key, [*known, *(n for t in self.tunable.values() for n in t)])
+            hint = suggest_name(entry.key, [*known, *(n for t in self.tunable.values() for n in t)])
             self.problems.error("name", entry.span, label, hint)
-        return {(o, name): self._tuned(entry, self.tunable[o][name]) for o in owners}
+        return {(o, name): self._read_tunable(entry, self.tunable[o][name]) for o in owners}
 
-    def _tuned(self, entry: Entry, parameter: Parameter) -> Fraction:
-        value, _ = self.quantity(entry.node, entry.key, entry.span, parameter.unit)
+    def _read_tunable(self, entry: Entry, parameter: Parameter) -> Fraction:
+        value, _ = self.read_quantity(entry.node, entry.key, entry.span, parameter.unit)
         limits = parameter.range
         if limits and not limits[0] <= value <= limits[1]:
             place = entry.node.span
@@ -96,6 +100,6 @@ class _PageReader(StimulusReader):
         return value
 
 
-def _may_change(parameter: Parameter) -> bool:
+def _is_changeable(parameter: Parameter) -> bool:
     """Tables, whole numbers, waits and words stay as they are while a system runs."""
     return parameter.kind == "tunable" and parameter.type == "real" and parameter.table is None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from language.experiment import Column, RecordingMap
+from language.experiment import ColumnMapping, RecordingMap
 from language.map import column_dimension
 from language.model import Automaton
-from language.problem import Problems, nearest
-from language.units import NUMBER, Dimension, fits
+from language.problem import Problems, suggest_name
+from language.units import PURE_NUMBER, Dimension, are_compatible
 
 
-def paired(
+def pair_columns(
     automaton: Automaton, mapping: RecordingMap, problems: Problems
 ) -> tuple[list[str], list[str]]:
     """Return the columns of a map that an automaton reads or compares, and those left out.
@@ -37,7 +37,7 @@ def paired(
     for name, thing in automaton.inputs.items():
         if name not in fed and thing.default is None:
             label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
-            problems.error("missing", mapping.span, label, nearest(name, left_out))
+            problems.error("missing", mapping.span, label, suggest_name(name, left_out))
     return used, left_out
 
 
@@ -46,12 +46,13 @@ def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problem
 
     Here every column is for it: one for an input that it lacks is most often a name misspelt.
     """
-    _, left_out = paired(automaton, mapping, problems)
+    _, left_out = pair_columns(automaton, mapping, problems)
     for name in left_out:
         column = mapping.columns[name]
         label = f"`{column.to}` is not an input of `{automaton.name}`"
         help = (
-            nearest(column.to or "", automaton.inputs) or "leave out what the model does not read"
+            suggest_name(column.to or "", automaton.inputs)
+            or "leave out what the model does not read"
         )
         problems.error("name", column.span, label, help)
     first: dict[str, str] = {}
@@ -68,26 +69,28 @@ def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problem
         problems.error("missing", mapping.span, label, hint)
 
 
-def _check_output(automaton: Automaton, column: Column, problems: Problems) -> None:
+def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problems) -> None:
     output = column.compare or ""
     if output in automaton.outputs:
-        want = automaton.dimensions.get(automaton.source_of(output), NUMBER)
+        want = automaton.dimensions.get(automaton.output_source(output), PURE_NUMBER)
         _check_dimension(column, want, f"output `{output}`", problems)
         return
     label = f"`{output}` is not an output of `{automaton.name}`"
-    problems.error("name", column.span, label, nearest(output, automaton.outputs))
+    problems.error("name", column.span, label, suggest_name(output, automaton.outputs))
 
 
-def _check_dimension(column: Column, want: Dimension, what: str, problems: Problems) -> None:
-    if not fits(column_dimension(column), want):
-        label = f"column `{column.name}` is in `{column_dimension(column).shown}`"
-        problems.error("dimension", column.span, label, f"{what} is in `{want.shown}`")
+def _check_dimension(
+    column: ColumnMapping, expected: Dimension, what: str, problems: Problems
+) -> None:
+    if not are_compatible(column_dimension(column), expected):
+        label = f"column `{column.name}` is in `{column_dimension(column).display_name}`"
+        problems.error("dimension", column.span, label, f"{what} is in `{expected.display_name}`")
 
 
 def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
     for name, (_, dimension) in mapping.constants.items():
         thing = automaton.inputs.get(name)
-        if thing and not fits(dimension, thing.unit.dimension):
-            label = f"constant `{name}` is in `{dimension.shown}`"
-            hint = f"input `{name}` is in `{thing.unit.dimension.shown}`"
+        if thing and not are_compatible(dimension, thing.unit.dimension):
+            label = f"constant `{name}` is in `{dimension.display_name}`"
+            hint = f"input `{name}` is in `{thing.unit.dimension.display_name}`"
             problems.error("dimension", mapping.span, label, hint)

@@ -9,31 +9,37 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from language.action import stage_of_regions
+from language.action import lower_stage_of_regions
 from language.declaration import Formula
-from language.field import Field, all_known_at, at_state, enter, known_at
-from language.lower import choice, equations, reads_of
+from language.field import (
+    VectorField,
+    all_bindings_at_point,
+    bindings_at_point,
+    set_point_to_state,
+    set_target_mode,
+)
+from language.lower import choose_by_mode, lower_equations, names_read
 from language.model import Mode, Transition
-from language.operation import Assign, Block, Branch, Choose, Expr, Op, Run, whole
-from language.region import by_priority, slot
+from language.operation import Assign, Block, Branch, Expr, Op, RunBlock, Switch, integer
+from language.region import guard_slot, transitions_by_priority
 
 
 @dataclass(frozen=True)
-class Selection:
+class TransitionSelection:
     """How a micro-step names what it takes: the variable of a region, and each transition's number.
 
     `enabled` is whether a transition may fire, given the ending of its guard's variables; `moved`
     is what else happens when it has fired.
     """
 
-    verb: str
-    taken: Callable[[str], str]
-    number: Callable[[Transition], int]
-    enabled: Callable[[Transition, str], Expr]
-    moved: Callable[[Transition], Block]
+    block_prefix: str
+    selected_variable: Callable[[str], str]
+    number_of: Callable[[Transition], int]
+    enabled_condition: Callable[[Transition, str], Expr]
+    after_switch: Callable[[Transition], Block]
 
 
-def parallel_blocks(field: Field, selection: Selection) -> dict[str, Block]:
+def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
     """Return `<verb>_<region>_<mode>` of the regions beside the chart, and `commit_<verb>`.
 
     `verb` keeps those of a run apart from those of the automaton that runs.
@@ -41,67 +47,86 @@ def parallel_blocks(field: Field, selection: Selection) -> dict[str, Block]:
     blocks: dict[str, Block] = {}
     for region in field.automaton.regions:
         for mode in region.modes.values():
-            blocks[f"{selection.verb}_{mode.label}"] = _choose(mode, selection, field.prefix)
-    blocks[f"commit_{selection.verb}"] = _commit(field, selection)
+            blocks[f"{selection.block_prefix}_{mode.label}"] = _select_transition(
+                mode, selection, field.key_prefix
+            )
+    blocks[f"commit_{selection.block_prefix}"] = _commit_block(field, selection)
     return blocks
 
 
-def parallel_step(field: Field, mode: Mode, selection: Selection) -> Block:
+def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
     """Return one micro-step of all regions while a mode of the chart is active."""
     regions = field.automaton.all_regions
-    ops: list[Op] = [Assign(selection.taken(region.name), whole(0)) for region in regions]
-    ops += _choose(mode, selection, field.prefix)
-    for region in mode.beside:
+    ops: list[Op] = [
+        Assign(selection.selected_variable(region.name), integer(0)) for region in regions
+    ]
+    ops += _select_transition(mode, selection, field.key_prefix)
+    for region in mode.parallel_regions:
         others = region.modes.values()
         cases: dict[str, Block] = {
-            other.name: (Run(f"{selection.verb}_{other.label}"),) for other in others
+            other.name: (RunBlock(f"{selection.block_prefix}_{other.label}"),) for other in others
         }
-        ops.append(choice(region, known_at(field), cases))
-    return (*ops, Run(f"commit_{selection.verb}"))
+        ops.append(choose_by_mode(region, bindings_at_point(field), cases))
+    return (*ops, RunBlock(f"commit_{selection.block_prefix}"))
 
 
-def _choose(mode: Mode, selection: Selection, prefix: str) -> Block:
+def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) -> Block:
     """The enabled transition with the smallest priority."""
     ops: Block = ()
-    for k, transition in reversed(by_priority(mode)):
-        number = whole(selection.number(transition))
-        taken = Assign(selection.taken(mode.region), number, prefix + transition.key)
-        ops = (Branch(selection.enabled(transition, slot(mode.region, k)), (taken,), ops),)
+    for k, transition in reversed(transitions_by_priority(mode)):
+        number = integer(selection.number_of(transition))
+        taken = Assign(selection.selected_variable(mode.region), number, prefix + transition.key)
+        ops = (
+            Branch(
+                selection.enabled_condition(transition, guard_slot(mode.region, k)), (taken,), ops
+            ),
+        )
     return ops
 
 
-def _commit(field: Field, selection: Selection) -> Block:
+def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
     """What the regions have chosen, stage by stage; `in(...)` is of the source up to the entry."""
     automaton = field.automaton
-    before = _stage(field, selection, lambda way: automaton.source(way).exit)
-    resets = _stage(field, selection, lambda way: way.reset)
+    before = _lower_stage(field, selection, lambda way: automaton.source_mode(way).exit)
+    resets = _lower_stage(field, selection, lambda way: way.reset)
     if before and resets:
-        before = (*before, *at_state(field))
+        before = (*before, *set_point_to_state(field))
     moved = []
     for region in automaton.all_regions:
         ways = [way for mode in region.modes.values() for way in mode.transitions]
-        cases = [(selection.number(w), (enter(field, w), *selection.moved(w))) for w in ways]
-        moved.append(Choose(selection.taken(region.name), tuple(cases)))
-    after = _stage(field, selection, lambda way: automaton.target(way).entry)
+        cases = [
+            (selection.number_of(w), (set_target_mode(field, w), *selection.after_switch(w)))
+            for w in ways
+        ]
+        moved.append(Switch(selection.selected_variable(region.name), tuple(cases)))
+    after = _lower_stage(field, selection, lambda way: automaton.target_mode(way).entry)
     if after:
-        after = (*at_state(field), *_equations_of_entries(field), *after)
+        after = (*set_point_to_state(field), *_entry_equations(field), *after)
     return (*before, *resets, *moved, *after)
 
 
-def _stage(
-    field: Field, selection: Selection, written: Callable[[Transition], Mapping[str, Formula]]
+def _lower_stage(
+    field: VectorField,
+    selection: TransitionSelection,
+    assignments_of: Callable[[Transition], Mapping[str, Formula]],
 ) -> Block:
-    known, number = all_known_at(field), selection.number
-    return stage_of_regions(field.automaton, selection.taken, number, written, known)
+    known, number = all_bindings_at_point(field), selection.number_of
+    return lower_stage_of_regions(
+        field.automaton, selection.selected_variable, number, assignments_of, known
+    )
 
 
-def _equations_of_entries(field: Field) -> Block:
+def _entry_equations(field: VectorField) -> Block:
     """The equations that entries read, of the new modes and after the reset."""
     automaton = field.automaton
     entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
-    wanted = reads_of(formula.tree for formula in entries)
+    wanted = names_read(formula.tree for formula in entries)
     cases = []
     for mode in automaton.modes.values():
-        ops = equations(mode, known_at(field), "work.at_", field.prefix, wanted)
+        ops = lower_equations(mode, bindings_at_point(field), "work.at_", field.key_prefix, wanted)
         cases.append((mode.number, tuple(ops)))
-    return (Choose(field.mode, tuple(cases)),) if any(block for _, block in cases) else ()
+    return (
+        (Switch(field.mode_variable_name, tuple(cases)),)
+        if any(block for _, block in cases)
+        else ()
+    )

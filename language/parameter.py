@@ -6,26 +6,26 @@ from collections.abc import Iterable
 
 from language.declaration import Formula
 from language.graph import post_order
-from language.kind import Type
-from language.lower import WHOLE_TYPES, reads_of
+from language.kind import TypeName
+from language.lower import WHOLE_TYPES, names_read
 from language.model import Automaton
-from language.number import rounded
-from language.once import once
+from language.number import round_to_type
+from language.once import cache_on_owner
 from language.operation import (
     Expr,
     Ref,
     Value,
 )
-from language.program import TICKS, Constant, value_type
+from language.program import TICK_UNIT, Constant, value_type
 from language.units import Unit
-from language.wait import range_in_ticks, tunable_waits
+from language.wait import tunable_waits, wait_range_in_ticks
 
 
-@once
-def constant_names(automaton: Automaton) -> dict[str, Expr]:
+@cache_on_owner
+def constant_bindings(automaton: Automaton) -> dict[str, Expr]:
     """Return the parameters, and the names of enumerations, as what a Program reads."""
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
-    found: dict[str, Expr] = {name: Value(n) for name, n in automaton.literals.items()}
+    found: dict[str, Expr] = {name: Value(n) for name, n in automaton.enum_literals.items()}
     for name, kind in parameter_kinds(automaton).items():
         is_whole = automaton.parameters[name].type in WHOLE_TYPES
         found[name] = Ref(f"{groups[kind]}.{name}", is_whole)
@@ -36,7 +36,7 @@ def constant_names(automaton: Automaton) -> dict[str, Expr]:
     return found
 
 
-@once
+@cache_on_owner
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     """Return each parameter's kind: what is derived from fixed values alone is fixed."""
     kinds: dict[str, str] = {}
@@ -49,7 +49,7 @@ def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     return {name: kinds[name] for name in automaton.parameters}
 
 
-@once
+@cache_on_owner
 def parameter_order(automaton: Automaton) -> list[str]:
     """Return the parameters so that each comes after those that it is derived from."""
     parameters = automaton.parameters.items()
@@ -59,7 +59,7 @@ def parameter_order(automaton: Automaton) -> list[str]:
 def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
     """Return the tunable parameters that some formulas read, directly or through derived ones."""
     found: dict[str, None] = {}
-    stack = reads_of(formula.tree for formula in formulas)
+    stack = names_read(formula.tree for formula in formulas)
     seen: set[str] = set()
     while stack:
         name = stack.pop()
@@ -79,36 +79,38 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
     parameter = automaton.parameters[name]
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
     is_wait = name in tunable_waits(automaton)
-    limits = range_in_ticks(automaton, parameter) if is_wait else parameter.range
-    kept: Type = "int" if is_wait else parameter.type
+    limits = wait_range_in_ticks(automaton, parameter) if is_wait else parameter.range
+    kept: TypeName = "int" if is_wait else parameter.type
     return Constant(
         name=f"{groups[kind]}.{name}",
         kind=kind,  # type: ignore[arg-type]
-        value=typed(value, kept),
-        unit=TICKS if is_wait else si_text(automaton, name),
-        key=f"{owner(automaton, name)} {parameter.key}",
-        range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
+        value=cast_to_type(value, kept),
+        unit=TICK_UNIT if is_wait else si_unit_text(automaton, name),
+        key=f"{declaring_automaton(automaton, name)} {parameter.key}",
+        range=(round_to_type(limits[0]), round_to_type(limits[1])) if limits else None,
         type=value_type(kept),
         values=parameter.values,
-        items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
+        items=tuple(round_to_type(item) for item in parameter.table.values)
+        if parameter.table
+        else (),
         about=parameter.about,
     )
 
 
-def typed(value: float, kind: Type) -> float | int | bool:
+def cast_to_type(value: float, kind: TypeName) -> float | int | bool:
     """Return a number as a value of a type."""
     if kind == "real":
         return value
     return bool(value) if kind == "bool" else int(value)
 
 
-def owner(automaton: Automaton, name: str) -> str:
+def declaring_automaton(automaton: Automaton, name: str) -> str:
     """Return the automaton that declares a parameter: the model, or this one."""
     model = automaton.model
     return model.name if model and name in model.parameters else automaton.name
 
 
-def si_text(automaton: Automaton, name: str) -> str:
+def si_unit_text(automaton: Automaton, name: str) -> str:
     """Return the SI unit of a name, for comments: the unit as written where it is SI."""
     unit = _unit_of(automaton, name)
     if unit and unit.factor == 1 and not unit.offset:
@@ -122,4 +124,4 @@ def _unit_of(automaton: Automaton, name: str) -> Unit | None:
         return automaton.parameters[name].unit
     if name in automaton.inputs:
         return automaton.inputs[name].unit
-    return automaton.carried[name].unit if name in automaton.carried else None
+    return automaton.state_variables[name].unit if name in automaton.state_variables else None

@@ -6,86 +6,91 @@ import re
 
 import lark
 
-from language.aliases import stepped
-from language.build import built
-from language.document import Scalar
-from language.grammar import parsed
+from language.aliases import increment_hint
+from language.build import build_trees
+from language.document import ScalarNode
+from language.grammar import parse_shape
 from language.names import COMMA_HINT
 from language.problem import Problems, Span, SpecError
-from language.quantity import DECIMAL, QUANTITY, number, quantity
-from language.syntax import Name, Tree, depth
+from language.quantity import (
+    DECIMAL_PATTERN,
+    QUANTITY_PATTERN,
+    parse_number_literal,
+    parse_quantity_literal,
+)
+from language.syntax import Name, SyntaxTree, depth
 
-FOREIGN = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not", "~": "not"}
+FOREIGN_OPERATORS = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not", "~": "not"}
 """Operators of other languages, and how they are written here."""
 
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-WORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
-MAX_TEXT = 2000
+KEYWORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
+MAX_EXPRESSION_LENGTH = 2000
 """Longest expression read; longer ones want an equation of their own."""
 MAX_DEPTH = 100
 """Deepest tree: a sum of 100 terms; more want an equation of their own."""
 
 
-def parse_expression(scalar: Scalar) -> Tree:
+def parse_expression(scalar: ScalarNode) -> SyntaxTree:
     """Parse an expression. Raises SpecError with the place inside the text."""
     (tree,) = _parse(scalar, "expression")
     return tree
 
 
-def parse_balance(scalar: Scalar) -> tuple[Tree, Tree]:
+def parse_balance(scalar: ScalarNode) -> tuple[SyntaxTree, SyntaxTree]:
     """Parse `left = right`. Raises SpecError with the place inside the text."""
     left, right = _parse(scalar, "balance")
     return left, right
 
 
-def _parse(scalar: Scalar, start: str) -> tuple[Tree, ...]:
+def _parse(scalar: ScalarNode, start_rule: str) -> tuple[SyntaxTree, ...]:
     text, span = scalar.text, scalar.text_span
     problems = Problems()
-    if len(text) > MAX_TEXT:
+    if len(text) > MAX_EXPRESSION_LENGTH:
         problems.error("expression", span, f"an expression of {len(text)} characters is too long")
     if "\n" in text:
         problems.error("expression", span, "an expression stands on one line")
-    problems.stop_if_any()
-    simple = _simple(text, span) if start == "expression" else None
+    problems.raise_if_errors()
+    simple = _parse_simple(text, span) if start_rule == "expression" else None
     if simple is not None:
         return (simple,)
     try:
-        found = parsed(text, start)
-        trees = built(found, span)
-        if found.depth <= MAX_DEPTH or all(depth(tree) <= MAX_DEPTH for tree in trees):
+        shape = parse_shape(text, start_rule)
+        trees = build_trees(shape, span)
+        if shape.depth <= MAX_DEPTH or all(depth(tree) <= MAX_DEPTH for tree in trees):
             return trees
         problems.error("expression", span, "the expression is nested too deeply")
     except lark.exceptions.UnexpectedInput as error:
-        problems.error("expression", *_explain(text, span, start, error))
+        problems.error("expression", *_explain_syntax_error(text, span, start_rule, error))
     except RecursionError:
         problems.error("expression", span, "the expression is nested too deeply")
-    raise SpecError(problems.found)
+    raise SpecError(problems.reported)
 
 
-def _simple(text: str, span: Span) -> Tree | None:
+def _parse_simple(text: str, span: Span) -> SyntaxTree | None:
     """Return a name or a literal without the parser: most values of a spec are one."""
-    if SIMPLE_NAME.fullmatch(text) and text not in WORDS:
-        return Name(text, span.inside(0, len(text)))
-    if DECIMAL.fullmatch(text):
-        return number(text, span.inside(0, len(text)))
-    if QUANTITY.fullmatch(text) and text.partition(" ")[2] not in WORDS:
-        return quantity(text, span.inside(0, len(text)))
+    if SIMPLE_NAME.fullmatch(text) and text not in KEYWORDS:
+        return Name(text, span.subspan(0, len(text)))
+    if DECIMAL_PATTERN.fullmatch(text):
+        return parse_number_literal(text, span.subspan(0, len(text)))
+    if QUANTITY_PATTERN.fullmatch(text) and text.partition(" ")[2] not in KEYWORDS:
+        return parse_quantity_literal(text, span.subspan(0, len(text)))
     return None
 
 
-def _explain(
-    text: str, span: Span, start: str, error: lark.exceptions.UnexpectedInput
+def _explain_syntax_error(
+    text: str, span: Span, start_rule: str, error: lark.exceptions.UnexpectedInput
 ) -> tuple[Span, str, str]:
     column = getattr(error, "column", 0)
-    found = str(getattr(error, "token", "")) or ""
+    token = str(getattr(error, "token", "")) or ""
     ended = (
         getattr(getattr(error, "token", None), "type", "") == "$END"
         or column < 1
-        or (not found and column > len(text))
-        or found == "$END"
+        or (not token and column > len(text))
+        or token == "$END"
     )
-    place = span.inside(len(text)) if ended else span.inside(column - 1, len(found))
-    if start == "balance" and "=" not in text:
+    place = span.subspan(len(text)) if ended else span.subspan(column - 1, len(token))
+    if start_rule == "balance" and "=" not in text:
         return span, "a balance is `coefficient * der(x) = ...`", ""
     if text.count("(") > text.count(")"):
         return place, "a `(` is not closed", COMMA_HINT
@@ -94,16 +99,16 @@ def _explain(
     rest = text[column - 1 :]
     if rest.startswith("[") and text.endswith("]"):
         label = "a condition stands without brackets"
-        return span.inside(0, len(text)), label, f"it is written `{text[1:-1].strip()}`"
+        return span.subspan(0, len(text)), label, f"it is written `{text[1:-1].strip()}`"
     if re.match(r"(\+\+|--|[-+*/]=)", text[max(column - 2, 0) :]) or rest.startswith("+="):
-        return place, f"`{rest.split(' ')[0][:20]}` was not expected here", stepped(text)
-    if found in ("<", "<=", ">", ">=", "==", "!="):
+        return place, f"`{rest.split(' ')[0][:20]}` was not expected here", increment_hint(text)
+    if token in ("<", "<=", ">", ">=", "==", "!="):
         return place, "one relation only", "write `a < b and b < c`"
-    for foreign, ours in FOREIGN.items():
+    for foreign, ours in FOREIGN_OPERATORS.items():
         at = text.find(foreign, max(column - 2, 0), column - 1 + len(foreign))
         if at >= 0:
             label = f"`{foreign}` is not part of an expression"
-            return span.inside(at, len(foreign)), label, f"it is written `{ours}`"
+            return span.subspan(at, len(foreign)), label, f"it is written `{ours}`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""

@@ -2,117 +2,136 @@
 
 from __future__ import annotations
 
-from language.action import first_entry
+from language.action import initial_entry_assignments
 from language.constants import derive_block
 from language.field import (
-    Field,
-    at_state,
-    at_time,
-    by_mode,
-    entered,
+    VectorField,
+    lower_entry_at_point,
+    run_block_by_mode,
+    set_point_time,
+    set_point_to_state,
 )
 from language.history import (
-    AGE,
-    History,
+    RECORD_AGE,
+    ContinuousDelay,
     alarms_of,
     fill_block,
     record_block,
 )
-from language.lower import Names, equation_names
+from language.lower import NameBindings, equation_bindings
 from language.model import Automaton, Mode
 from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
-    Choose,
     Loop,
     Ref,
-    Run,
+    RunBlock,
+    Switch,
     Unary,
     Value,
+    integer,
     real,
-    whole,
 )
-from language.region import slots
+from language.region import guard_slots
 from language.stepping import (
-    Waits,
-    begun,
-    of_mode,
+    WaitTimers,
+    begin_blocks,
+    block_of_mode,
 )
-from language.turning import forgotten, settled
+from language.turning import reset_levels, store_levels
 from language.wiring import (
-    enter_initial,
-    initial_ops,
-    none_fired,
+    clear_fired,
+    enter_initial_modes,
+    lower_initial_values,
 )
 
 
-def parts_block(
-    field: Field, known: Names, waits: Waits, histories: tuple[History, ...]
+def engine_blocks(
+    field: VectorField, known: NameBindings, waits: WaitTimers, delays: tuple[ContinuousDelay, ...]
 ) -> dict[str, Block]:
     """What is run from outside."""
     automaton = field.automaton
-    now = (*at_state(field), *at_time(field, real(0.0)))
+    now = (*set_point_to_state(field), *set_point_time(field, real(0.0)))
     ends = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in field.states]
     modes = automaton.modes.values()
-    at_start = at_time(field, real(0.0))
-    evaluate: Block = (*at_start, by_mode(field, "equations"))
-    whole_known = {**known, **equation_names(automaton, "equation.")}
+    at_start = set_point_time(field, real(0.0))
+    evaluate: Block = (*at_start, run_block_by_mode(field, "equations"))
+    whole_known = {**known, **equation_bindings(automaton, "equation.")}
     # A delayed quantity may read another one: each round fills one more from what is inside it.
-    rounds = (*evaluate, *fill_block(histories, whole_known))
-    fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
-    keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
-    record = {"record": keep} if histories else {}
-    watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
+    rounds = (*evaluate, *fill_block(delays, whole_known))
+    fill: Block = (Loop(len(delays), "work.round", rounds),) if delays else ()
+    keep: Block = (
+        *evaluate,
+        *record_block(delays, whole_known),
+        Assign(RECORD_AGE.name, real(0.0)),
+    )
+    record = {"record": keep} if delays else {}
+    watch = tuple((mode.number, _watch_block(automaton, mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
         "init": (
             Assign("memory.started", Value(False)),
-            *enter_initial(automaton, "memory.mode"),
-            Assign("memory.faults", whole(0)),
+            *enter_initial_modes(automaton, "memory.mode"),
+            Assign("memory.faults", integer(0)),
         ),
-        "start": (*_start(field, known, waits, histories), *fill),
+        "start": (*_start_block(field, known, waits, delays), *fill),
         "equations": evaluate,
         **record,
-        "watch": (*_silenced(automaton), *now, Choose("memory.mode", watch), Run("load")),
-        "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
-        "flow": (by_mode(field, "move"),),
-        "dense": (Choose(field.mode, tuple((m.number, _dense(m)) for m in modes)),),
-        "peek": (Run("point"), *ends),
+        "watch": (
+            *_clear_periodic_alarms(automaton),
+            *now,
+            Switch("memory.mode", watch),
+            RunBlock("load"),
+        ),
+        "jump": (*clear_fired(automaton), *now, run_block_by_mode(field, "jump")),
+        "flow": (run_block_by_mode(field, "move"),),
+        "dense": (
+            Switch(
+                field.mode_variable_name, tuple((m.number, _dense_output_block(m)) for m in modes)
+            ),
+        ),
+        "peek": (RunBlock("point"), *ends),
     }
 
 
-def _start(field: Field, known: Names, waits: Waits, histories: tuple[History, ...]) -> Block:
+def _start_block(
+    field: VectorField, known: NameBindings, waits: WaitTimers, delays: tuple[ContinuousDelay, ...]
+) -> Block:
     """What a run begins with, at time 0 and in the initial mode (rule 16b)."""
     automaton = field.automaton
-    begins = begun(waits)
+    begins = begin_blocks(waits)
     return (
-        *initial_ops(automaton, known, field.prefix),
-        *enter_initial(automaton, "memory.mode"),
-        *(wait.load for wait in waits),
-        *forgotten(automaton),
-        *(op for r in automaton.all_regions for op in of_mode(begins, r.modes[r.initial])),
-        *((Assign(AGE.name, real(0.0)),) if histories else ()),
+        *lower_initial_values(automaton, known, field.key_prefix),
+        *enter_initial_modes(automaton, "memory.mode"),
+        *(wait.restart for wait in waits),
+        *reset_levels(automaton),
+        *(op for r in automaton.all_regions for op in block_of_mode(begins, r.modes[r.initial])),
+        *((Assign(RECORD_AGE.name, real(0.0)),) if delays else ()),
         Assign("memory.time", real(0.0)),
         Assign("memory.started", Value(True)),
-        *entered(field, automaton.modes[automaton.initial], first_entry(automaton)),
+        *lower_entry_at_point(
+            field, automaton.modes[automaton.initial], initial_entry_assignments(automaton)
+        ),
     )
 
 
-def _silenced(automaton: Automaton) -> Block:
+def _clear_periodic_alarms(automaton: Automaton) -> Block:
     """What repeats is true for one instant, which is over when guards are watched."""
     repeating = [alarm for alarm in alarms_of(automaton) if alarm.repeats]
     return tuple(Assign(alarm.variable, Value(False)) for alarm in repeating)
 
 
-def _dense(mode: Mode) -> Block:
+def _dense_output_block(mode: Mode) -> Block:
     """The polynomial of the flow that was just done, where no crossing was looked for on it."""
-    run: Block = (Run(f"series_{mode.name}"),)
+    run: Block = (RunBlock(f"series_{mode.name}"),)
     is_known = Binary("or", Ref("work.crossed"), Ref("work.is_wait"))
-    return (Branch(Unary("not", is_known), run),) if slots(mode) else run
+    return (Branch(Unary("not", is_known), run),) if guard_slots(mode) else run
 
 
-def _watch(automaton: Automaton, mode: Mode) -> Block:
-    armed = [Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in slots(mode)]
-    return (Run(f"guards_{mode.name}"), *armed, *settled(automaton))
+def _watch_block(automaton: Automaton, mode: Mode) -> Block:
+    armed = [
+        Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in guard_slots(mode)
+    ]
+    return (RunBlock(f"guards_{mode.name}"), *armed, *store_levels(automaton))

@@ -5,79 +5,81 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from language.document import Entry, Items, Node, Scalar, Table
+from language.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 
-Path = tuple[str, ...]
+KeyPath = tuple[str, ...]
 """The keys from the root of a tree to a value."""
-Change = Callable[[Path, Scalar], Scalar]
+ScalarTransform = Callable[[KeyPath, ScalarNode], ScalarNode]
 
-EVERY = "every scalar below"
-TEXTS = frozenset({"about", "req", "kind"})
+ALL_SCALARS = "every scalar below"
+NON_FORMULA_KEYS = frozenset({"about", "req", "kind"})
 """Keys inside whose values are no expressions."""
-OBSERVER = {
-    key: EVERY
+OBSERVER_SITES = {
+    key: ALL_SCALARS
     for key in ("A", "B", "C", "f", "process_noise", "measurement_noise", "at", "unknown_instant")
 }
-TRANSITION = {
-    "when": EVERY,
-    "wait": EVERY,
-    "reset": EVERY,
-    "rewind": {"until": EVERY, "within": EVERY},
+TRANSITION_SITES = {
+    "when": ALL_SCALARS,
+    "wait": ALL_SCALARS,
+    "reset": ALL_SCALARS,
+    "rewind": {"until": ALL_SCALARS, "within": ALL_SCALARS},
 }
-FORMULAS = ("equations", "flow", "terms", "update", "entry", "exit", "invariant")
-MODE: dict[str, Any] = {
-    **dict.fromkeys(FORMULAS, EVERY),
-    "observer": {**OBSERVER, "correct": EVERY},
-    "transitions": {"*": TRANSITION},
+FORMULA_SECTIONS = ("equations", "flow", "terms", "update", "entry", "exit", "invariant")
+MODE_SITES: dict[str, Any] = {
+    **dict.fromkeys(FORMULA_SECTIONS, ALL_SCALARS),
+    "observer": {**OBSERVER_SITES, "correct": ALL_SCALARS},
+    "transitions": {"*": TRANSITION_SITES},
 }
-MODE["transition_table"] = {"columns": {"*": TRANSITION}}
-MODE["modes"] = {"*": MODE}
-AUTOMATON: dict[str, Any] = {
-    **MODE,
-    "templates": {"*": MODE},
-    "regions": {"*": MODE},
-    "elements": {"*": EVERY},
-    "places": {"*": EVERY},
-    "tables": {"*": {"if": EVERY, "rows": EVERY}},
-    "instances": {"*": {"inputs": EVERY}},
+MODE_SITES["transition_table"] = {"columns": {"*": TRANSITION_SITES}}
+MODE_SITES["modes"] = {"*": MODE_SITES}
+AUTOMATON_SITES: dict[str, Any] = {
+    **MODE_SITES,
+    "templates": {"*": MODE_SITES},
+    "regions": {"*": MODE_SITES},
+    "elements": {"*": ALL_SCALARS},
+    "places": {"*": ALL_SCALARS},
+    "tables": {"*": {"if": ALL_SCALARS, "rows": ALL_SCALARS}},
+    "instances": {"*": {"inputs": ALL_SCALARS}},
 }
 """Expressions that effects may redirect; start values and parameters are not among them."""
-EFFECT: dict[str, Any] = {
-    **AUTOMATON,
-    "states": {"*": {"initial": EVERY}},
-    "discrete": {"*": {"initial": EVERY}},
-    "parameters": {"*": {"derived": EVERY}},
-    "redirect": {"*": EVERY},
+EFFECT_SITES: dict[str, Any] = {
+    **AUTOMATON_SITES,
+    "states": {"*": {"initial": ALL_SCALARS}},
+    "discrete": {"*": {"initial": ALL_SCALARS}},
+    "parameters": {"*": {"derived": ALL_SCALARS}},
+    "redirect": {"*": ALL_SCALARS},
 }
 """Expressions that an effect brings."""
 
 
-def changed(tree: Table, shape: Mapping[str, Any], change: Change) -> Table:
-    """Return a tree in which every expression is what `change` makes of it."""
-    node = _changed(tree, shape, change, ())
-    assert isinstance(node, Table)
+def map_formulas(
+    tree: MappingNode, sites: Mapping[str, Any], transform: ScalarTransform
+) -> MappingNode:
+    """Return a tree in which every expression is what `transform` makes of it."""
+    node = _map_node(tree, sites, transform, ())
+    assert isinstance(node, MappingNode)
     return node
 
 
-def _changed(node: Node, shape: Any, change: Change, path: Path) -> Node:
+def _map_node(node: YamlNode, sites: Any, transform: ScalarTransform, path: KeyPath) -> YamlNode:
     match node:
-        case Scalar():
-            return change(path, node) if shape == EVERY else node
-        case Items(nodes, span):
-            parts = (_changed(part, shape, change, path) for part in nodes)
-            return Items(tuple(parts), span) if shape == EVERY else node
-        case Table():
+        case ScalarNode():
+            return transform(path, node) if sites == ALL_SCALARS else node
+        case SequenceNode(nodes, span):
+            parts = (_map_node(part, sites, transform, path) for part in nodes)
+            return SequenceNode(tuple(parts), span) if sites == ALL_SCALARS else node
+        case MappingNode():
             entries = {}
             for key, entry in node.entries.items():
-                below = _shape_of(shape, key)
-                kept = entry.node
+                below = _sites_below(sites, key)
+                mapped = entry.node
                 if below is not None:
-                    kept = _changed(kept, below, change, (*path, key))
-                entries[key] = Entry(key, entry.span, kept)
-            return Table(entries, node.span)
+                    mapped = _map_node(mapped, below, transform, (*path, key))
+                entries[key] = Entry(key, entry.span, mapped)
+            return MappingNode(entries, node.span)
 
 
-def _shape_of(shape: Any, key: str) -> Any:
-    if shape == EVERY:
-        return None if key in TEXTS else EVERY
-    return shape.get(key, shape.get("*"))
+def _sites_below(sites: Any, key: str) -> Any:
+    if sites == ALL_SCALARS:
+        return None if key in NON_FORMULA_KEYS else ALL_SCALARS
+    return sites.get(key, sites.get("*"))

@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.elementary import Body, horner, within
-from language.exponent import POWERS, Powers, raised
-from language.logarithm import DOUBLE, Binades, halved
-from language.number import NumberType, rounded
+from language.elementary import FunctionBuilder, clamp, horner
+from language.exponent import EXP_FLOAT64, ExpConstants, emit_exp
+from language.logarithm import LOG_FLOAT64, LogConstants, emit_frexp
+from language.number import NumberType, round_to_type
 from language.operation import (
     Binary,
     Compare,
@@ -31,113 +31,115 @@ from language.operation import (
 from language.program import Function
 
 BASE, DEGREE = Ref("work.base"), Ref("work.degree")
-LARGEST_DEGREE = 2.0**60
+MAX_DEGREE = 2.0**60
 """Larger degrees are clamped: of the nearest numbers to 1 they overflow in float64, too."""
 
 
 @dataclass(frozen=True)
-class PowerNumbers:
+class PowConstants:
     """The numbers of pow in one type: of its log and exp, of `terms` of the series of the log, and
     the factor that splits a number in two halves whose products are exact.
     """
 
-    number: NumberType
-    log: Binades
-    exp: Powers
+    number_type: NumberType
+    log: LogConstants
+    exp: ExpConstants
     terms: int
     splitter: float
 
 
-DOUBLE_POWER = PowerNumbers("float64", DOUBLE, POWERS, 12, 2.0**27 + 1.0)
+POW_FLOAT64 = PowConstants("float64", LOG_FLOAT64, EXP_FLOAT64, 12, 2.0**27 + 1.0)
 
 
-def power_of(numbers: PowerNumbers = DOUBLE_POWER) -> Function:
+def build_pow(constants: PowConstants = POW_FLOAT64) -> Function:
     """x^y = e^(y log x) of x >= 0, y within its bound; 0^y is 0 for y > 0.
 
     log x = k ln 2 + log m as in logarithm.py, log m = 2 s + s^3 (2/3 + 2/5 s^2 + ...), where
     s = (m - 1) / (m + 1): its first two terms with their errors, what follows without.
     """
-    body = Body()
-    pairs = _Pairs(body, numbers.splitter)
-    y = body.let("bounded_degree", within(DEGREE, real(-LARGEST_DEGREE), real(LARGEST_DEGREE)))
-    head, tail = _logarithm(body, pairs, numbers)
-    product, error = pairs.product("power", y, head)
-    exp = numbers.exp
-    bounded = body.let("bounded_power", within(product, exp.lowest, exp.highest))
+    body = FunctionBuilder()
+    double_words = _DoubleWordBuilder(body, constants.splitter)
+    y = body.let("bounded_degree", clamp(DEGREE, real(-MAX_DEGREE), real(MAX_DEGREE)))
+    head, tail = _emit_log(body, double_words, constants)
+    product, error = double_words.two_product("power", y, head)
+    exp = constants.exp
+    bounded = body.let("bounded_power", clamp(product, exp.lowest, exp.highest))
     is_inside = Compare("==", bounded, product)
     rest = body.let("rest", Select(is_inside, add(error, multiply(y, tail)), real(0.0)))
-    value = raised(body, bounded, rest, exp)
+    value = emit_exp(body, bounded, rest, exp)
     is_nought = Binary("and", Compare("<=", BASE, real(0.0)), Compare(">", DEGREE, real(0.0)))
     body.let("y", Select(is_nought, real(0.0), value))
     about = "base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP"
-    return body.function("pow", about, ("base", "degree"))
+    return body.build("pow", about, ("base", "degree"))
 
 
-def _logarithm(body: Body, pairs: _Pairs, numbers: PowerNumbers) -> tuple[Ref, Ref]:
+def _emit_log(
+    body: FunctionBuilder, double_words: _DoubleWordBuilder, constants: PowConstants
+) -> tuple[Ref, Ref]:
     """Return (head, tail), whose sum is log of the base but for 2^-63 of it, in float32 2^-34: the
     largest errors among 40 000 and 20 000 bases.
     """
-    k, f = halved(body, BASE, numbers.log)
-    first, *more = (Fraction(2, 2 * n + 3) for n in range(numbers.terms))
-    large, small = _parts(first, numbers.number)
-    s, s_rest = pairs.quotient("s", f)
-    square, error = pairs.product("square", s, s)
+    k, f = emit_frexp(body, BASE, constants.log)
+    first, *more = (Fraction(2, 2 * n + 3) for n in range(constants.terms))
+    large, small = _split_constant(first, constants.number_type)
+    s, s_rest = double_words.double_word_quotient("s", f)
+    square, error = double_words.two_product("square", s, s)
     square_rest = add(error, multiply(multiply(real(2.0), s), s_rest))
-    series = horner(tuple(rounded(c, numbers.number) for c in more), square)
+    series = horner(tuple(round_to_type(c, constants.number_type) for c in more), square)
     higher = body.let("higher", multiply(square, series))
     factor = body.let("factor", add(large, higher))
     factor_rest = add(subtract(higher, subtract(factor, large)), small)
-    cubic, error = pairs.product("cubic", square, factor)
+    cubic, error = double_words.two_product("cubic", square, factor)
     parts = add(multiply(square, factor_rest), multiply(square_rest, factor))
     cubic_rest = body.let("cubic_rest", add(error, parts))
-    curved, error = pairs.product("curved", s, cubic)
+    curved, error = double_words.two_product("curved", s, cubic)
     parts = add(multiply(s, cubic_rest), multiply(s_rest, cubic))
     curved_rest = body.let("curved_rest", add(error, parts))
     twice = body.let("twice", multiply(real(2.0), s))
-    whole = body.let("whole", multiply(k, numbers.log.ln_2[0]))
-    sum_1, lost_1 = pairs.sum("sum_1", whole, twice)
-    sum_2, lost_2 = pairs.sum("sum_2", sum_1, curved)
+    whole = body.let("whole", multiply(k, constants.log.ln_2[0]))
+    sum_1, lost_1 = double_words.fast_two_sum("sum_1", whole, twice)
+    sum_2, lost_2 = double_words.fast_two_sum("sum_2", sum_1, curved)
     small_parts = add(curved_rest, multiply(real(2.0), s_rest))
-    low = add(add(lost_1, lost_2), add(small_parts, multiply(k, numbers.log.ln_2[1])))
-    return pairs.sum("log", sum_2, body.let("low", low))
+    low = add(add(lost_1, lost_2), add(small_parts, multiply(k, constants.log.ln_2[1])))
+    return double_words.fast_two_sum("log", sum_2, body.let("low", low))
 
 
-def _parts(value: Fraction, number: NumberType) -> tuple[Value, Value]:
+def _split_constant(value: Fraction, number_type: NumberType) -> tuple[Value, Value]:
     """Return a number in two parts."""
-    large = rounded(value, number)
-    return real(large), real(rounded(value - Fraction(large), number))
+    large = round_to_type(value, number_type)
+    return real(large), real(round_to_type(value - Fraction(large), number_type))
 
 
-class _Pairs:
+class _DoubleWordBuilder:
     """Sums, products and a quotient, each with its rounding error as a second number."""
 
-    def __init__(self, body: Body, splitter: float) -> None:
+    def __init__(self, body: FunctionBuilder, splitter: float) -> None:
         self.body = body
         self.splitter = real(splitter)
         self.halves: dict[Ref, tuple[Ref, Ref]] = {}
 
-    def sum(self, name: str, larger: Expr, smaller: Expr) -> tuple[Ref, Ref]:
+    def fast_two_sum(self, name: str, larger: Expr, smaller: Expr) -> tuple[Ref, Ref]:
         """Return a sum of a number and one that is no larger; also of 0 and any number."""
-        found = self.body.let(name, add(larger, smaller))
-        return found, self.body.let(f"{name}_lost", subtract(smaller, subtract(found, larger)))
+        result = self.body.let(name, add(larger, smaller))
+        return result, self.body.let(f"{name}_lost", subtract(smaller, subtract(result, larger)))
 
-    def product(self, name: str, a: Ref, b: Ref) -> tuple[Ref, Ref]:
+    def two_product(self, name: str, a: Ref, b: Ref) -> tuple[Ref, Ref]:
         """Return a product."""
-        (a_1, a_2), (b_1, b_2) = self._halves(a), self._halves(b)
-        found = self.body.let(name, multiply(a, b))
-        lost = add(subtract(multiply(a_1, b_1), found), multiply(a_1, b_2))
+        (a_1, a_2), (b_1, b_2) = self._split(a), self._split(b)
+        result = self.body.let(name, multiply(a, b))
+        lost = add(subtract(multiply(a_1, b_1), result), multiply(a_1, b_2))
         lost = add(add(lost, multiply(a_2, b_1)), multiply(a_2, b_2))
-        return found, self.body.let(f"{name}_lost", lost)
+        return result, self.body.let(f"{name}_lost", lost)
 
-    def quotient(self, name: str, f: Ref) -> tuple[Ref, Ref]:
+    def double_word_quotient(self, name: str, f: Ref) -> tuple[Ref, Ref]:
         """Return f / (2 + f)."""
-        below, below_lost = self.sum(f"{name}_below", real(2.0), f)
-        found = self.body.let(name, divide(f, below))
-        back, back_lost = self.product(f"{name}_back", found, below)
-        left = subtract(subtract(subtract(f, back), back_lost), multiply(found, below_lost))
-        return found, self.body.let(f"{name}_lost", divide(left, below))
+        below, below_lost = self.fast_two_sum(f"{name}_below", real(2.0), f)
+        result = self.body.let(name, divide(f, below))
+        back, back_lost = self.two_product(f"{name}_back", result, below)
+        left = subtract(subtract(subtract(f, back), back_lost), multiply(result, below_lost))
+        return result, self.body.let(f"{name}_lost", divide(left, below))
 
-    def _halves(self, x: Ref) -> tuple[Ref, Ref]:
+    def _split(self, x: Ref) -> tuple[Ref, Ref]:
         """Return two numbers of half as many digits whose sum is x."""
         if x not in self.halves:
             name = x.name.partition(".")[2]

@@ -12,7 +12,6 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -21,41 +20,42 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
 )
 from language.program import Program
 
 INDENT = "    "
-MOST_KEPT = 16
+MAX_CACHED_DIGESTS = 16
 """Programs whose digests are kept, the latest ones: they are asked for before each run."""
 
-_kept: OrderedDict[int, tuple[Program, str]] = OrderedDict()
+_digest_cache: OrderedDict[int, tuple[Program, str]] = OrderedDict()
 """By identity: what is kept holds its Program, so no other one has it meanwhile."""
 
 
-def program_text(program: Program) -> str:
+def format_program(program: Program) -> str:
     """Return the whole program as text, one operation a line."""
     return "\n".join(_program_lines(program)) + "\n"
 
 
 def digest(program: Program) -> str:
     """Return the first 16 hexadecimal digits of the SHA-256 of the program's text."""
-    known = _kept.pop(id(program), None) or (program, _digest(program))
-    _kept[id(program)] = known
-    if len(_kept) > MOST_KEPT:
-        _kept.popitem(last=False)
-    return known[1]
+    cached = _digest_cache.pop(id(program), None) or (program, _compute_digest(program))
+    _digest_cache[id(program)] = cached
+    if len(_digest_cache) > MAX_CACHED_DIGESTS:
+        _digest_cache.popitem(last=False)
+    return cached[1]
 
 
-def _digest(program: Program) -> str:
-    return hashlib.sha256(program_text(program).encode()).hexdigest()[:16]
+def _compute_digest(program: Program) -> str:
+    return hashlib.sha256(format_program(program).encode()).hexdigest()[:16]
 
 
-def expr_text(expr: Expr) -> str:
+def format_expr(expr: Expr) -> str:
     """Return an expression with every operation in parentheses."""
     match expr:
         case Value(value):
@@ -63,16 +63,16 @@ def expr_text(expr: Expr) -> str:
         case Ref(name):
             return name
         case Item(name, index):
-            return f"{name}[{expr_text(index)}]"
+            return f"{name}[{format_expr(index)}]"
         case Unary(operator, operand):
-            return f"({operator} {expr_text(operand)})"
+            return f"({operator} {format_expr(operand)})"
         case Binary(operator, left, right) | Compare(operator, left, right):
-            return f"({expr_text(left)} {operator} {expr_text(right)})"
+            return f"({format_expr(left)} {operator} {format_expr(right)})"
         case Select(condition, then, other):
-            parts = (expr_text(part) for part in (condition, then, other))
+            parts = (format_expr(part) for part in (condition, then, other))
             return "(if {} then {} else {})".format(*parts)
         case Call(function, arguments):
-            return f"{function}({', '.join(expr_text(argument) for argument in arguments)})"
+            return f"{function}({', '.join(format_expr(argument) for argument in arguments)})"
 
 
 def block_lines(block: Block, depth: int = 0) -> Iterator[str]:
@@ -84,16 +84,16 @@ def block_lines(block: Block, depth: int = 0) -> Iterator[str]:
 def _op_lines(op: Op) -> Iterator[str]:
     match op:
         case Assign(target, value, key):
-            yield f"{target} := {expr_text(value)}{_cited(key)}"
+            yield f"{target} := {format_expr(value)}{_format_citation(key)}"
         case Store(array, index, value):
-            yield f"{array}[{expr_text(index)}] := {expr_text(value)}"
+            yield f"{array}[{format_expr(index)}] := {format_expr(value)}"
         case Branch(condition, then, other):
-            yield f"if {expr_text(condition)}"
+            yield f"if {format_expr(condition)}"
             yield from block_lines(then, 1)
             if other:
                 yield "else"
                 yield from block_lines(other, 1)
-        case Choose(selector, cases):
+        case Switch(selector, cases):
             for number, case_block in cases:
                 yield f"when {selector} is {number}"
                 yield from block_lines(case_block, 1)
@@ -101,14 +101,14 @@ def _op_lines(op: Op) -> Iterator[str]:
             yield f"repeat {count} times as {index}"
             yield from block_lines(body, 1)
         case Count(timer, condition, limit, key):
-            yield f"count {timer} up to {limit} while {expr_text(condition)}{_cited(key)}"
+            yield f"count {timer} up to {limit} while {format_expr(condition)}{_format_citation(key)}"
         case FaultBit(fault, signal, value):
             yield f"{'fault' if value else 'no fault'} {fault}{f' of {signal}' if signal else ''}"
-        case Run(name):
+        case RunBlock(name):
             yield f"run {name}"
 
 
-def _cited(key: str) -> str:
+def _format_citation(key: str) -> str:
     return f"    # {key}" if key else ""
 
 
@@ -127,7 +127,7 @@ def _program_lines(program: Program) -> Iterator[str]:
 
 def _mode_lines(program: Program) -> Iterator[str]:
     yield f"program {program.name}"
-    yield f"numbers {program.number}"
+    yield f"numbers {program.number_type}"
     yield f"period {program.period}" if program.period else f"major step {program.major_step}"
     for mode in program.modes:
         yield f"mode {mode.number} {mode.name}"
@@ -140,10 +140,10 @@ def _mode_lines(program: Program) -> Iterator[str]:
 
 def _event_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
-        waited = t.tunable or (f"{t.wait} s" if t.wait else "")
+        waited = t.tunable_wait or (f"{t.wait} s" if t.wait else "")
         wait = f" wait {waited} = {t.ticks} ticks" if waited else ""
-        back = f" rewind {t.rewind} ticks" if t.rewind else ""
-        source, target = t.between or (t.source, t.target)
+        back = f" rewind {t.rewind_ticks} ticks" if t.rewind_ticks else ""
+        source, target = t.chart_endpoints or (t.source, t.target)
         target = "[]" if target == "" else target
         yield f"transition {t.number} {t.name}: {source} -> {target}{wait}{back}"
     for alarm in program.alarms:

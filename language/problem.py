@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from language.codes import code_of
-from language.text import around, one_for_one, shortened, visible
+from language.text import crop_line, escape_invisible, mask_invisible, truncate
 
-LONGEST_LABEL = 1000
+MAX_LABEL_LENGTH = 1000
 """Characters of a message; a name of a million characters is quoted in part."""
 Severity = Literal["error", "warning"]
 
-NEAREST_CUTOFF = 0.6
+SIMILARITY_CUTOFF = 0.6
 """Similarity above which a known name is proposed for an unknown one (difflib's own default)."""
 
 
@@ -29,7 +29,7 @@ class Source:
     name: str
     lines: tuple[str, ...] = field(repr=False, compare=False, default=())
     layer: str = ""
-    laid: Span | None = field(repr=False, default=None)
+    applied_at: Span | None = field(repr=False, default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +43,11 @@ class Span:
     line: int
     column: int
     width: int = 1
-    whole: bool = False
+    is_atomic: bool = False
 
-    def inside(self, offset: int, width: int = 1) -> Span:
+    def subspan(self, offset: int, width: int = 1) -> Span:
         """Return the span `offset` characters into this one."""
-        if self.whole:
+        if self.is_atomic:
             return self
         return Span(self.source, self.line, self.column + offset, max(1, width))
 
@@ -90,28 +90,28 @@ class Problems:
 
     def __init__(self) -> None:
         """Start empty."""
-        self.found: list[Problem] = []
+        self.reported: list[Problem] = []
 
     def error(self, kind: str, span: Span, label: str, help: str = "") -> None:
         """Report an error."""
-        self.found.append(Problem(kind, span, label, help))
+        self.reported.append(Problem(kind, span, label, help))
 
     def warning(self, kind: str, span: Span, label: str, help: str = "") -> None:
         """Report a warning."""
-        self.found.append(Problem(kind, span, label, help, "warning"))
+        self.reported.append(Problem(kind, span, label, help, "warning"))
 
     @property
     def has_errors(self) -> bool:
         """Tell whether an error (not only warnings) was reported."""
-        return any(p.severity == "error" for p in self.found)
+        return any(p.severity == "error" for p in self.reported)
 
-    def stop_if_any(self) -> None:
+    def raise_if_errors(self) -> None:
         """Raise SpecError with everything found so far, if an error is among it."""
         if self.has_errors:
-            raise SpecError(self.found)
+            raise SpecError(self.reported)
 
     @contextmanager
-    def collecting(self) -> Iterator[None]:
+    def collect_errors(self) -> Iterator[None]:
         """Take the problems of a SpecError raised inside and go on.
 
         What it carries may begin with those that are here already: they are taken once.
@@ -119,36 +119,36 @@ class Problems:
         try:
             yield
         except SpecError as error:
-            known = len(self.found)
-            is_ours = error.problems[:known] == tuple(self.found)
-            self.found.extend(error.problems[known:] if is_ours else error.problems)
+            known = len(self.reported)
+            is_ours = error.problems[:known] == tuple(self.reported)
+            self.reported.extend(error.problems[known:] if is_ours else error.problems)
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def suggest_name(name: str, candidates: Iterable[str]) -> str:
     """Return "did you mean `x`?" for the known name nearest to `name`, or an empty text."""
-    matches = difflib.get_close_matches(name, sorted(known), n=1, cutoff=NEAREST_CUTOFF)
+    matches = difflib.get_close_matches(name, sorted(candidates), n=1, cutoff=SIMILARITY_CUTOFF)
     return f"did you mean `{matches[0]}`?" if matches else ""
 
 
-def render(problem: Problem) -> str:
+def render_problem(problem: Problem) -> str:
     """Return `file:line:col: severity: label [code]`, the line, carets and the help."""
     span = problem.span
     code = f" [{problem.code}]" if problem.code else ""
-    label = shortened(problem.label, LONGEST_LABEL) + code
-    rows = [visible(f"{span}: {problem.severity}: {label}")]
+    label = truncate(problem.label, MAX_LABEL_LENGTH) + code
+    rows = [escape_invisible(f"{span}: {problem.severity}: {label}")]
     if 1 <= span.line <= len(span.source.lines):
         line = span.source.lines[span.line - 1]
         width = max(1, min(span.width, len(line) - span.column + 1))
-        text, column, width = around(line, span.column, width)
-        rows += [f"  {one_for_one(text)}", "  " + " " * (column - 1) + "^" * width]
+        text, column, width = crop_line(line, span.column, width)
+        rows += [f"  {mask_invisible(text)}", "  " + " " * (column - 1) + "^" * width]
     if problem.help:
-        rows.append(visible(f"help: {shortened(problem.help, LONGEST_LABEL)}"))
-    if span.source.laid:
-        rows.append(f"in {span.source.layer}, laid at {span.source.laid}")
+        rows.append(escape_invisible(f"help: {truncate(problem.help, MAX_LABEL_LENGTH)}"))
+    if span.source.applied_at:
+        rows.append(f"in {span.source.layer}, laid at {span.source.applied_at}")
     return "\n".join(rows)
 
 
-def ordered(problems: Iterable[Problem]) -> list[Problem]:
+def sort_problems(problems: Iterable[Problem]) -> list[Problem]:
     """Return the problems without repetitions, sorted by file, line and column."""
     unique = dict.fromkeys(problems)
     return sorted(unique, key=lambda p: (p.span.source.name, p.span.line, p.span.column, p.label))
@@ -156,4 +156,4 @@ def ordered(problems: Iterable[Problem]) -> list[Problem]:
 
 def render_all(problems: Iterable[Problem]) -> str:
     """Return all problems rendered, sorted by place, with blank lines between."""
-    return "\n\n".join(render(problem) for problem in ordered(problems))
+    return "\n\n".join(render_problem(problem) for problem in sort_problems(problems))

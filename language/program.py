@@ -23,15 +23,15 @@ from language.model import CHART
 from language.number import NumberType
 from language.operation import Block
 
-MODE = "memory.mode"
+MODE_VARIABLE = "memory.mode"
 """The variable of the chart's mode; a run keeps its own."""
-LOG = "memory.log"
-LOGGED = "memory.count_of_log"
+LOG_VARIABLE = "memory.log"
+LOG_COUNT_VARIABLE = "memory.count_of_log"
 """The transitions of a tick with several micro-steps, a 0 after each step, and how many entries."""
 ValueType = Literal["real", "truth", "whole"]
-TICKS = "tick"
+TICK_UNIT = "tick"
 """The unit of a tunable wait on a calibration page."""
-MOST_TICKS = 65535
+MAX_TIMER_TICKS = 65535
 """What a counter of ticks goes up to (rule 4)."""
 
 
@@ -107,14 +107,14 @@ class TransitionInfo:
     key: str
     region: str = CHART
     slot: str = "0"
-    rewind: int = 0
-    between: tuple[str, str] | None = None
-    tunable: str | None = None
+    rewind_ticks: int = 0
+    chart_endpoints: tuple[str, str] | None = None
+    tunable_wait: str | None = None
 
     @property
-    def most(self) -> int:
+    def timer_limit(self) -> int:
         """What the timer counts to: one more than the wait, or than the longest tunable one."""
-        return MOST_TICKS if self.tunable else self.ticks + 1
+        return MAX_TIMER_TICKS if self.tunable_wait else self.ticks + 1
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Wire:
+class OutputWire:
     """An output: its name and the variable that holds it."""
 
     name: str
@@ -171,7 +171,7 @@ class ObserverInfo:
 
 
 @dataclass(frozen=True)
-class MotionLimit:
+class StabilityLimit:
     """The largest stable step [s] of a mode, and the eigenvalue [1/s] and term that set it."""
 
     mode: str
@@ -182,16 +182,16 @@ class MotionLimit:
 
 
 @dataclass(frozen=True)
-class MotionInfo:
+class IntegrationInfo:
     """How states move: method, step [s], terms of its polynomial, |A h| and limits by mode."""
 
     method: str
     step: float
-    terms: int
+    series_terms: int
     norms: Mapping[str, float]
-    limits: tuple[MotionLimit, ...]
-    states: int
-    events: int = 0
+    stability_limits: tuple[StabilityLimit, ...]
+    state_count: int
+    max_events: int = 0
 
 
 @dataclass(frozen=True)
@@ -214,12 +214,12 @@ class Program:
     """
 
     name: str
-    number: NumberType
+    number_type: NumberType
     period: Fraction | None
     major_step: Fraction
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
-    outputs: tuple[Wire, ...]
+    outputs: tuple[OutputWire, ...]
     modes: tuple[ModeInfo, ...]
     transitions: tuple[TransitionInfo, ...]
     faults: tuple[str, ...]
@@ -227,7 +227,7 @@ class Program:
     blocks: Mapping[str, Block]
     run_modes: tuple[ModeInfo, ...] = ()
     observers: tuple[ObserverInfo, ...] = ()
-    motion: MotionInfo | None = None
+    integration: IntegrationInfo | None = None
     defaults: Mapping[str, float | bool] = field(default_factory=dict)
     regions: tuple[RegionInfo, ...] = ()
     invariants: tuple[InvariantInfo, ...] = ()
@@ -251,11 +251,11 @@ class Program:
     @property
     def has_log(self) -> bool:
         """Tell whether a tick may have several micro-steps, so that it keeps their transitions."""
-        return any(variable.name == LOG for variable in self.variables)
+        return any(variable.name == LOG_VARIABLE for variable in self.variables)
 
-    def ends(self, info: TransitionInfo) -> tuple[str, str]:
+    def endpoint_names(self, info: TransitionInfo) -> tuple[str, str]:
         """Return the names of source and target of a transition: paths in a chart, "" for none."""
-        return info.between or (
+        return info.chart_endpoints or (
             self.mode_name(info.source, info.region),
             self.mode_name(info.target, info.region),
         )
@@ -263,7 +263,7 @@ class Program:
     def mode_variables(self) -> dict[str, str]:
         """Return the variable that holds the mode of each region, the chart first."""
         names = (CHART, *(region.name for region in self.regions))
-        return {name: mode_variable(MODE, name) for name in names}
+        return {name: mode_variable(MODE_VARIABLE, name) for name in names}
 
     def fired_variables(self) -> tuple[str, ...]:
         """Return the variables that hold the transition of each region, the chart first."""
@@ -280,12 +280,12 @@ def fired_variable(region: str) -> str:
     return mode_variable("memory.fired", region)
 
 
-def value_type(kind: str) -> ValueType:
+def value_type(type_name: str) -> ValueType:
     """Return what a declared type (real, int, bool, enum) is in a Program."""
     types: dict[str, ValueType] = {"real": "real", "bool": "truth"}
-    return types.get(kind, "whole")
+    return types.get(type_name, "whole")
 
 
-def short(name: str) -> str:
+def unqualified_name(name: str) -> str:
     """Return a variable's name without its group."""
     return name.partition(".")[2]

@@ -7,15 +7,17 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from language.document import Items, Node, Scalar, Table
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.problem import Source, Span
 
-HEAD = re.compile(r"^(automaton|system|scenario|map|variant|effect|study|test|calibration): *(\S+)")
-PLAIN = re.compile(
+HEAD_PATTERN = re.compile(
+    r"^(automaton|system|scenario|map|variant|effect|study|test|calibration): *(\S+)"
+)
+PLAIN_SCALAR = re.compile(
     r"[A-Za-z0-9$(.][A-Za-z0-9_ .+*/^()<>=@$-]*|-[0-9(A-Za-z][A-Za-z0-9_ .+*/^()<>=@$-]*"
 )
 """Texts that YAML and we read alike without quotes."""
-COLUMN = 64
+COMMENT_COLUMN = 64
 """Where the places stand in the printed spec."""
 
 
@@ -32,7 +34,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Row:
+class ProvenanceEntry:
     """A value by its key path, where it came from, and what rewrote a part of it, in order."""
 
     path: str
@@ -47,67 +49,72 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Difference:
+class SpecDifference:
     """A key path whose values differ; None where there is none."""
 
     path: str
-    old: Row | None
-    new: Row | None
+    old: ProvenanceEntry | None
+    new: ProvenanceEntry | None
 
 
-def rows(tree: Table) -> list[Row]:
+def provenance_entries(tree: MappingNode) -> list[ProvenanceEntry]:
     """Return every value of a tree in the order of the tree."""
-    return list(_rows(tree, ()))
+    return list(_iter_entries(tree, ()))
 
 
-def spec_text(tree: Table) -> str:
+def format_spec(tree: MappingNode) -> str:
     """Return a tree as a spec that can be read again, with the places as comments."""
-    return "\n".join(_lines(tree, 0, {row.path: row for row in rows(tree)}, ())) + "\n"
+    return (
+        "\n".join(_spec_lines(tree, 0, {row.path: row for row in provenance_entries(tree)}, ()))
+        + "\n"
+    )
 
 
-def differences(old: Table, new: Table) -> list[Difference]:
+def diff_specs(old: MappingNode, new: MappingNode) -> list[SpecDifference]:
     """Return what differs between two trees, by key path: those of the old first."""
-    before = {row.path: row for row in rows(old)}
-    after = {row.path: row for row in rows(new)}
-    found = []
+    before = {row.path: row for row in provenance_entries(old)}
+    after = {row.path: row for row in provenance_entries(new)}
+    result = []
     for path in dict.fromkeys([*before, *after]):
         a, b = before.get(path), after.get(path)
         if a is None or b is None or a.value != b.value:
-            found.append(Difference(path, a, b))
-    return found
+            result.append(SpecDifference(path, a, b))
+    return result
 
 
-def difference_text(found: Sequence[Difference]) -> str:
+def format_diff(changes: Sequence[SpecDifference]) -> str:
     """Return differences as lines: `-` what was, `+` what is."""
     lines = []
-    for difference in found:
+    for difference in changes:
         for sign, row in (("-", difference.old), ("+", difference.new)):
             if row:
-                lines.append(_commented(f"{sign} {row.path}: {row.value}", row.places))
+                lines.append(_append_comment(f"{sign} {row.path}: {row.value}", row.places))
     return "".join(f"{line}\n" for line in lines)
 
 
-def _rows(node: Node, path: tuple[str, ...]) -> Iterator[Row]:
+def _iter_entries(node: YamlNode, path: tuple[str, ...]) -> Iterator[ProvenanceEntry]:
     match node:
-        case Scalar(text, span, _, changes):
-            yield _row(path, text, span, changes)
-        case Items(nodes, span):
-            parts = [part for part in nodes if isinstance(part, Scalar)]
+        case ScalarNode(text, span, _, changes):
+            yield _provenance_entry(path, text, span, changes)
+        case SequenceNode(nodes, span):
+            parts = [part for part in nodes if isinstance(part, ScalarNode)]
             changes = tuple(change for part in parts for change in part.changes)
-            yield _row(path, _items_text(node), span, changes)
-        case Table(entries, span):
+            yield _provenance_entry(path, _format_sequence(node), span, changes)
+        case MappingNode(entries, span):
             if not entries and path:
-                yield _row(path, "{}", span, ())
+                yield _provenance_entry(path, "{}", span, ())
             for entry in node:
-                yield from _rows(entry.node, (*path, entry.key))
+                yield from _iter_entries(entry.node, (*path, entry.key))
 
 
-def _row(path: tuple[str, ...], text: str, span: Span, changes: tuple[Span, ...]) -> Row:
-    origins = dict.fromkeys(_origin(change) for change in changes)
-    return Row(".".join(path), text, _origin(span), tuple(origins))
+def _provenance_entry(
+    path: tuple[str, ...], text: str, span: Span, changes: tuple[Span, ...]
+) -> ProvenanceEntry:
+    origins = dict.fromkeys(_origin_of(change) for change in changes)
+    return ProvenanceEntry(".".join(path), text, _origin_of(span), tuple(origins))
 
 
-def _origin(span: Span) -> Origin:
+def _origin_of(span: Span) -> Origin:
     return Origin(f"{span.source.name}:{span.line}", layer_of(span.source))
 
 
@@ -116,35 +123,40 @@ def layer_of(source: Source) -> str:
     if source.layer:
         return source.layer
     for line in source.lines:
-        match = HEAD.match(line)
+        match = HEAD_PATTERN.match(line)
         if match:
             return f"{match.group(1)} {match.group(2)}"
     return ""
 
 
-def _lines(node: Table, depth: int, places: dict[str, Row], path: tuple[str, ...]) -> Iterator[str]:
+def _spec_lines(
+    node: MappingNode, depth: int, places: dict[str, ProvenanceEntry], path: tuple[str, ...]
+) -> Iterator[str]:
     for entry in node:
         below = (*path, entry.key)
-        head = "  " * depth + _text(entry.key) + ":"
-        if isinstance(entry.node, Table) and entry.node.entries:
+        head = "  " * depth + _quote_if_needed(entry.key) + ":"
+        if isinstance(entry.node, MappingNode) and entry.node.entries:
             yield head
-            yield from _lines(entry.node, depth + 1, places, below)
+            yield from _spec_lines(entry.node, depth + 1, places, below)
             continue
         row = places[".".join(below)]
-        value = _text(row.value) if isinstance(entry.node, Scalar) else row.value
-        yield _commented(f"{head} {value}", row.places)
+        value = _quote_if_needed(row.value) if isinstance(entry.node, ScalarNode) else row.value
+        yield _append_comment(f"{head} {value}", row.places)
 
 
-def _commented(text: str, comment: str) -> str:
-    return f"{text:<{COLUMN}}  # {comment}"
+def _append_comment(text: str, comment: str) -> str:
+    return f"{text:<{COMMENT_COLUMN}}  # {comment}"
 
 
-def _text(text: str) -> str:
+def _quote_if_needed(text: str) -> str:
     """Return a text as YAML reads it back."""
-    is_plain = PLAIN.fullmatch(text) and not text.endswith(" ")
+    is_plain = PLAIN_SCALAR.fullmatch(text) and not text.endswith(" ")
     return text if is_plain else json.dumps(text, ensure_ascii=False)
 
 
-def _items_text(items: Items) -> str:
-    parts = [_text(part.text) if isinstance(part, Scalar) else "..." for part in items.nodes]
+def _format_sequence(items: SequenceNode) -> str:
+    parts = [
+        _quote_if_needed(part.text) if isinstance(part, ScalarNode) else "..."
+        for part in items.nodes
+    ]
     return f"[{', '.join(parts)}]"

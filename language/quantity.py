@@ -8,35 +8,39 @@ from fractions import Fraction
 from functools import lru_cache
 
 from language.problem import Problems, Span, SpecError
-from language.syntax import Number
-from language.units import NO_UNIT, UNIT, Unit, UnitError, parse_unit, unit_hint
+from language.syntax import NumberLiteral
+from language.units import NO_UNIT, UNIT_PATTERN, Unit, UnitError, parse_unit, unit_hint
 
 UNIT_HINT = "a unit is written like `W`, `N*m`, `1/s`, a product with `*`: `2 * x`"
-DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
-PLAIN_DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?")
-QUANTITY = re.compile(rf"{DECIMAL.pattern} {UNIT.pattern}")
-LARGEST = Fraction(sys.float_info.max)
+DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
+PLAIN_DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?")
+QUANTITY_PATTERN = re.compile(rf"{DECIMAL_PATTERN.pattern} {UNIT_PATTERN.pattern}")
+MAX_QUANTITY = Fraction(sys.float_info.max)
 MAX_EXPONENT = 330
 """Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
 
 
-def number(text: str, span: Span) -> Number:
+def parse_number_literal(text: str, span: Span) -> NumberLiteral:
     """Return a number without a unit. Raises SpecError."""
-    return Number(_in_range(decimal(text, span), text, span), NO_UNIT, span)
+    return NumberLiteral(
+        _require_in_range(parse_decimal_literal(text, span), text, span), NO_UNIT, span
+    )
 
 
-def quantity(text: str, span: Span) -> Number:
+def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
     """Return a number with a unit behind a blank. Raises SpecError."""
     digits, _, unit_text = text.partition(" ")
-    value = decimal(digits, span.inside(0, len(digits)))
-    unit = _unit(unit_text, span.inside(len(digits) + 1, len(unit_text)))
-    return Number(_in_range(value * unit.factor + unit.offset, text, span), unit, span)
+    value = parse_decimal_literal(digits, span.subspan(0, len(digits)))
+    unit = _parse_unit(unit_text, span.subspan(len(digits) + 1, len(unit_text)))
+    return NumberLiteral(
+        _require_in_range(value * unit.factor + unit.offset, text, span), unit, span
+    )
 
 
-def decimal(text: str, span: Span) -> Fraction:
+def parse_decimal_literal(text: str, span: Span) -> Fraction:
     """Return the exact value of a decimal literal. Raises SpecError for other forms."""
-    if PLAIN_DECIMAL.fullmatch(text):
-        return _exact(text)
+    if PLAIN_DECIMAL_PATTERN.fullmatch(text):
+        return _to_fraction(text)
     problems = Problems()
     if re.fullmatch(r"\d+[eE][-+]?\d+", text):
         digits, exponent = re.split("[eE]", text)
@@ -46,24 +50,24 @@ def decimal(text: str, span: Span) -> Fraction:
         shorter = re.sub(r"^0+(?=\d)", "", text)
         hint = f"write `{shorter}`: other YAML tools read `{text}` as octal"
         problems.error("number", span, f"`{text}` starts with a zero", hint)
-    elif not DECIMAL.fullmatch(text):
-        hint = _apart(text) or "write it as `1.0e-3` or `12.5`"
+    elif not DECIMAL_PATTERN.fullmatch(text):
+        hint = _missing_blank_hint(text) or "write it as `1.0e-3` or `12.5`"
         problems.error("number", span, f"`{text}` is not a number", hint)
-    elif abs(_exponent(text)) > MAX_EXPONENT:
+    elif abs(_exponent_of(text)) > MAX_EXPONENT:
         problems.error("number", span, f"`{text}` is out of the range of a double")
-    problems.stop_if_any()
-    return _exact(text)
+    problems.raise_if_errors()
+    return _to_fraction(text)
 
 
 @lru_cache(maxsize=4096)
-def _exact(text: str) -> Fraction:
+def _to_fraction(text: str) -> Fraction:
     return Fraction(text)
 
 
-def _apart(text: str) -> str:
+def _missing_blank_hint(text: str) -> str:
     """Return how `100ms` is written, or an empty text where this is no number before a unit."""
     found = re.fullmatch(r"([0-9.]+?)\.?([A-Za-z].*)", text)
-    if not found or not DECIMAL.fullmatch(found[1]):
+    if not found or not DECIMAL_PATTERN.fullmatch(found[1]):
         return ""
     try:
         parse_unit(found[2])
@@ -72,25 +76,25 @@ def _apart(text: str) -> str:
     return f"one blank stands before the unit: `{found[1]} {found[2]}`"
 
 
-def _in_range(value: Fraction, text: str, span: Span) -> Fraction:
-    if abs(value) > LARGEST:
+def _require_in_range(value: Fraction, text: str, span: Span) -> Fraction:
+    if abs(value) > MAX_QUANTITY:
         problems = Problems()
         label = f"`{text}` is out of the range of a double"
         problems.error("number", span, label)
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     return value
 
 
-def _exponent(text: str) -> int:
+def _exponent_of(text: str) -> int:
     parts = re.split("[eE]", text)
     return int(parts[1]) if len(parts) == 2 else 0
 
 
-def _unit(text: str, span: Span) -> Unit:
+def _parse_unit(text: str, span: Span) -> Unit:
     try:
         return parse_unit(text)
     except UnitError as error:
         problems = Problems()
         hint = unit_hint(text) or UNIT_HINT
         problems.error("unit", span, str(error), hint)
-        raise SpecError(problems.found) from None
+        raise SpecError(problems.reported) from None

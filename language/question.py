@@ -18,15 +18,15 @@ from language.operation import Expr
 from language.program import ValueType
 from language.traversal import expr_names
 
-SHOWN_DIGITS = (2, 3, 4, 6, 9, 12)
+DISPLAY_DIGITS = (2, 3, 4, 6, 9, 12)
 """Digits of the values shown: the first number of them at which the conditions still hold."""
 
-Point = MutableMapping[str, Scalar]
-Step = tuple[str, Expr]
+Valuation = MutableMapping[str, Scalar]
+SymbolicAssignment = tuple[str, Expr]
 
 
 @dataclass(frozen=True)
-class Extent:
+class VariableDomain:
     """What a variable can be: its type, its bounds (SI) where it has some, or a few numbers.
 
     `names` are those of an enumeration, `default` is what it is where nothing speaks against it.
@@ -51,28 +51,28 @@ class Extent:
 
 
 @dataclass(frozen=True)
-class Question:
+class SolverQuery:
     """Whether all conditions can hold: after the steps, whatever the variables are.
 
     `values` are those of parameters: numbers, and tuples for tables.
     """
 
     conditions: tuple[Expr, ...]
-    steps: tuple[Step, ...]
-    extents: Mapping[str, Extent]
-    values: Mapping[str, Scalar] = field(repr=False)
+    assignments: tuple[SymbolicAssignment, ...]
+    domains: Mapping[str, VariableDomain]
+    parameter_values: Mapping[str, Scalar] = field(repr=False)
 
     @cached_property
     def variables(self) -> list[str]:
         """The variables that the conditions read, directly or through the steps, in order."""
-        read = self.read
-        return [name for name in self.extents if name in read]
+        read = self.names_read
+        return [name for name in self.domains if name in read]
 
     @cached_property
-    def read(self) -> set[str]:
+    def names_read(self) -> set[str]:
         """Every name that the conditions need."""
         found = {name for condition in self.conditions for name in expr_names(condition)}
-        for target, value in reversed(self.steps):
+        for target, value in reversed(self.assignments):
             if target in found:
                 found.update(expr_names(value))
         return found
@@ -80,24 +80,31 @@ class Question:
     @cached_property
     def key(self) -> object:
         """What the question says: two with equal keys have one answer."""
-        extents = tuple((name, self.extents[name]) for name in self.variables)
-        return self.conditions, tuple(self._needed), extents, tuple(self._constants.items())
+        extents = tuple((name, self.domains[name]) for name in self.variables)
+        return (
+            self.conditions,
+            tuple(self._needed_assignments),
+            extents,
+            tuple(self._read_parameter_values.items()),
+        )
 
     @cached_property
-    def _needed(self) -> list[Step]:
-        return [(target, value) for target, value in self.steps if target in self.read]
+    def _needed_assignments(self) -> list[SymbolicAssignment]:
+        return [(target, value) for target, value in self.assignments if target in self.names_read]
 
     @cached_property
-    def _constants(self) -> dict[str, Scalar]:
-        return {name: value for name, value in self.values.items() if name in self.read}
+    def _read_parameter_values(self) -> dict[str, Scalar]:
+        return {
+            name: value for name, value in self.parameter_values.items() if name in self.names_read
+        }
 
     def holds_at(self, point: Mapping[str, Scalar]) -> bool:
         """Tell whether a point lies within the extents and makes all conditions true."""
         try:
-            if not all(self.extents[name].holds(value) for name, value in point.items()):
+            if not all(self.domains[name].holds(value) for name, value in point.items()):
                 return False
-            values = {**self._constants, **point}
-            for target, value in self._needed:
+            values = {**self._read_parameter_values, **point}
+            for target, value in self._needed_assignments:
                 values[target] = evaluate(value, values)
             return all(evaluate(condition, values) is True for condition in self.conditions)
         except (KeyError, OverflowError, ValueError):
@@ -105,16 +112,16 @@ class Question:
 
     def value_at(self, point: Mapping[str, Scalar], expr: Expr) -> float:
         """Return the value of an expression at a point, after all steps."""
-        values = {**self.values, **point}
-        for target, value in self.steps:
+        values = {**self.parameter_values, **point}
+        for target, value in self.assignments:
             with suppress(KeyError):  # what the conditions do not need may lack a value
                 values[target] = evaluate(value, values)
         return float(evaluate(expr, values))
 
-    def shortened(self, point: Point) -> Point:
+    def shorten(self, point: Valuation) -> Valuation:
         """Return a point with as few digits as still show what it shows."""
-        for digits in SHOWN_DIGITS:
-            shorter: Point = {
+        for digits in DISPLAY_DIGITS:
+            shorter: Valuation = {
                 name: float(f"{value:.{digits}g}") if isinstance(value, float) else value
                 for name, value in point.items()
             }
@@ -123,22 +130,22 @@ class Question:
         return point
 
 
-def shown(point: Mapping[str, Scalar], extents: Mapping[str, Extent]) -> str:
+def format_valuation(point: Mapping[str, Scalar], domains: Mapping[str, VariableDomain]) -> str:
     """Return a point as text: `x = 0.5, ready = true, key = parked`."""
     return ", ".join(
-        f"{name.partition('.')[2] or name} = {_text(value, extents[name])}"
+        f"{name.partition('.')[2] or name} = {_format_value(value, domains[name])}"
         for name, value in point.items()
     )
 
 
-def _text(value: Scalar, extent: Extent) -> str:
+def _format_value(value: Scalar, domain: VariableDomain) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if extent.names:
-        return extent.names[int(value)]
-    return _shortest(float(value))
+    if domain.names:
+        return domain.names[int(value)]
+    return _format_shortest(float(value))
 
 
-def _shortest(value: float) -> str:
+def _format_shortest(value: float) -> str:
     """Return the shortest text that reads back as the value, without a needless `.0`."""
     return next(text for n in (4, 6, 9, 12, 15, 17) if float(text := f"{value:.{n}g}") == value)

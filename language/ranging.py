@@ -9,35 +9,42 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from language.interval import ANYTHING, Interval, corners, even, image, raised
+from language.interval import (
+    UNBOUNDED,
+    Interval,
+    even_power,
+    function_image,
+    image_of_corners,
+    power_or_inf,
+)
 from language.syntax import (
-    TIMES,
-    Application,
+    TIME_FUNCTIONS,
     Arithmetic,
-    Choice,
-    Likeness,
+    Conditional,
+    FunctionCall,
     Logic,
     Name,
-    Negative,
+    Negation,
     Not,
-    Number,
+    NumberLiteral,
     Power,
     Relation,
-    Tree,
-    alike,
+    SyntaxTree,
+    TreeNumbering,
     children,
+    is_same_expression,
 )
 
-OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
-Limits = Mapping[int, Interval]
+NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+Constraints = Mapping[int, Interval]
 """What enclosing conditions say of expressions, by the number of what is written alike."""
-NO_LIMITS: Limits = {}
-Look = Callable[[str], Interval]
-Report = Callable[[str, Tree, Interval], None]
+NO_CONSTRAINTS: Constraints = {}
+IntervalLookup = Callable[[str], Interval]
+DomainReport = Callable[[str, SyntaxTree, Interval], None]
 
 
-class Ranging:
+class RangeAnalysis:
     """Finds intervals; `look` gives those of names, `report` takes divisors and roots.
 
     A quiet one has no `report`: what conditions say is not looked into, only what they exclude.
@@ -45,105 +52,118 @@ class Ranging:
     """
 
     def __init__(
-        self, look: Look, table: Look, likeness: Likeness, report: Report | None = None
+        self,
+        name_interval: IntervalLookup,
+        table_interval: IntervalLookup,
+        numbering: TreeNumbering,
+        report: DomainReport | None = None,
     ) -> None:
-        """Know the names; `likeness` numbers the expressions that limits are about."""
-        self.look = look
-        self.table = table
-        self.likeness = likeness
+        """Know the names; `numbering` numbers the expressions that limits are about."""
+        self.name_interval = name_interval
+        self.table_interval = table_interval
+        self.numbering = numbering
         self.report = report
-        self.quiet = Ranging(look, table, likeness) if report else self
-        self.bounds: dict[tuple[int, int], tuple[Limits, Interval]] = {}
-        self.path: list[tuple[Tree, bool]] = []
+        self.unreported = (
+            RangeAnalysis(name_interval, table_interval, numbering) if report else self
+        )
+        self.bound_cache: dict[tuple[int, int], tuple[Constraints, Interval]] = {}
+        self.branch_path: list[tuple[SyntaxTree, bool]] = []
 
-    def expression(self, tree: Tree) -> Interval:
+    def analyse(self, tree: SyntaxTree) -> Interval:
         """Return the interval of an expression, reporting what is outside a domain inside it."""
-        self.quiet.bounds.clear()
-        before, self.path = self.path, []
-        found = self.of(tree, NO_LIMITS)
-        self.path = before
-        return found
+        self.unreported.bound_cache.clear()
+        before, self.branch_path = self.branch_path, []
+        interval = self.interval_of(tree, NO_CONSTRAINTS)
+        self.branch_path = before
+        return interval
 
-    def of(self, tree: Tree, limits: Limits) -> Interval:
+    def interval_of(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
         """Return the interval of a part of an expression within the limits that hold there."""
         if isinstance(tree, Relation | Logic | Not):
             if self.report:
                 for part in children(tree):
-                    self.of(part, limits)
-            return ANYTHING
-        found = self._of(tree, limits)
-        held = limits.get(self.likeness.number(tree)) if limits else None
-        return found.within(held) if held else found
+                    self.interval_of(part, constraints)
+            return UNBOUNDED
+        interval = self._compute_interval(tree, constraints)
+        held = constraints.get(self.numbering.number_of(tree)) if constraints else None
+        return interval.intersect(held) if held else interval
 
-    def _of(self, tree: Tree, limits: Limits) -> Interval:
+    def _compute_interval(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
         match tree:
-            case Number(value, _, _):
+            case NumberLiteral(value, _, _):
                 return Interval(float(value), float(value), True)
             case Name(path, _):
-                return self.look(path)
-            case Negative(operand, _):
-                inner = self.of(operand, limits)
-                return Interval(-inner.high, -inner.low, inner.known, inner.broken)
+                return self.name_interval(path)
+            case Negation(operand, _):
+                inner = self.interval_of(operand, constraints)
+                return Interval(-inner.high, -inner.low, inner.is_certain, inner.excludes_zero)
             case Arithmetic():
-                return self._arithmetic(tree, limits)
+                return self._arithmetic(tree, constraints)
             case Power(base, exponent, _):
-                return self._power(tree, self.of(base, limits), exponent)
-            case Choice(condition, then, other, _):
+                return self._power(tree, self.interval_of(base, constraints), exponent)
+            case Conditional(condition, then, other, _):
                 if self.report:
-                    self.of(condition, limits)
-                held = self._where(condition, True, then, limits)
-                return held.joined(self._where(condition, False, other, limits))
-            case Application():
-                return self._application(tree, limits)
-        return ANYTHING
+                    self.interval_of(condition, constraints)
+                held = self._branch_interval(condition, True, then, constraints)
+                return held.hull(self._branch_interval(condition, False, other, constraints))
+            case FunctionCall():
+                return self._call(tree, constraints)
+        return UNBOUNDED
 
-    def _where(self, condition: Tree, holds: bool, tree: Tree, limits: Limits) -> Interval:
+    def _branch_interval(
+        self, condition: SyntaxTree, holds: bool, tree: SyntaxTree, constraints: Constraints
+    ) -> Interval:
         """Return the interval of an alternative of a choice."""
-        self.path.append((condition, holds))
-        found = self.of(tree, self._limited(condition, holds, limits))
-        self.path.pop()
-        return found
+        self.branch_path.append((condition, holds))
+        interval = self.interval_of(tree, self._assume(condition, holds, constraints))
+        self.branch_path.pop()
+        return interval
 
-    def _arithmetic(self, tree: Arithmetic, limits: Limits) -> Interval:
-        left, right = self.of(tree.left, limits), self.of(tree.right, limits)
-        known = left.known and right.known
+    def _arithmetic(self, tree: Arithmetic, constraints: Constraints) -> Interval:
+        left, right = (
+            self.interval_of(tree.left, constraints),
+            self.interval_of(tree.right, constraints),
+        )
+        known = left.is_certain and right.is_certain
         match tree.operator:
             case "+":
                 return Interval(left.low + right.low, left.high + right.high, known)
             case "-":
                 return Interval(left.low - right.high, left.high - right.low, known)
             case "*":
-                if alike(tree.left, tree.right):
-                    return even(left, 2)
-                return corners(left, right, lambda a, b: a * b)
-        if right.meets_zero and self.report:
+                if is_same_expression(tree.left, tree.right):
+                    return even_power(left, 2)
+                return image_of_corners(left, right, lambda a, b: a * b)
+        if right.contains_zero and self.report:
             self.report("divisor", tree.right, right)
         if right.low <= 0.0 <= right.high:
-            return ANYTHING
-        return corners(left, right, lambda a, b: a / b)
+            return UNBOUNDED
+        return image_of_corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
-        if exponent < 0 and base.meets_zero and self.report:
+        if exponent < 0 and base.contains_zero and self.report:
             self.report("divisor", tree.base, base)
         if exponent < 0 and base.low <= 0.0 <= base.high:
-            return ANYTHING
+            return UNBOUNDED
         if exponent < 0:
             whole = self._power(tree, base, -exponent)
-            return corners(Interval(1.0, 1.0, True), whole, lambda a, b: a / b)
+            return image_of_corners(Interval(1.0, 1.0, True), whole, lambda a, b: a / b)
         if exponent % 2 == 0:
-            return even(base, exponent)
-        return Interval(raised(base.low, exponent), raised(base.high, exponent), base.known)
+            return even_power(base, exponent)
+        return Interval(
+            power_or_inf(base.low, exponent), power_or_inf(base.high, exponent), base.is_certain
+        )
 
-    def _application(self, tree: Application, limits: Limits) -> Interval:
+    def _call(self, tree: FunctionCall, constraints: Constraints) -> Interval:
         name = tree.function
         if name == "lookup":
             for part in tree.arguments[1:] if self.report else ():
-                self.of(part, limits)
+                self.interval_of(part, constraints)
             first = tree.arguments[0]
-            return self.table(first.path) if isinstance(first, Name) else ANYTHING
-        if name in ("in", *TIMES):
-            return ANYTHING
-        parts = [self.of(part, limits) for part in tree.arguments]
+            return self.table_interval(first.path) if isinstance(first, Name) else UNBOUNDED
+        if name in ("in", *TIME_FUNCTIONS):
+            return UNBOUNDED
+        parts = [self.interval_of(part, constraints) for part in tree.arguments]
         if self.report and name == "sqrt" and parts[0].low < 0.0:
             self.report("root", tree.arguments[0], parts[0])
         if self.report and name == "log" and parts[0].low <= 0.0:
@@ -153,38 +173,52 @@ class Ranging:
             if parts[0].low < 0.0 or (may_divide and parts[0].low == 0.0):
                 kind = "inverse power" if may_divide else "power"
                 self.report(kind, tree.arguments[0], parts[0])
-        return image(name, parts)
+        return function_image(name, parts)
 
-    def _limited(self, condition: Tree, holds: bool, limits: Limits) -> Limits:
+    def _assume(self, condition: SyntaxTree, holds: bool, constraints: Constraints) -> Constraints:
         """Return the limits where a condition holds, or does not."""
         match condition:
             case Not(operand, _):
-                return self._limited(operand, not holds, limits)
+                return self._assume(operand, not holds, constraints)
             case Logic(operator, left, right, _) if (operator == "and") == holds:
-                return self._limited(right, holds, self._limited(left, holds, limits))
+                return self._assume(right, holds, self._assume(left, holds, constraints))
             case Logic(_, left, right, _):
-                either = self._limited(left, holds, limits)
-                other = self._limited(right, holds, self._limited(left, not holds, limits))
-                return {key: either[key].joined(other[key]) for key in either if key in other}
-            case Relation(operator, left, right, _) if operator in OPPOSITE:
-                operator = operator if holds else OPPOSITE[operator]
-                first, second = self.quiet.bound(left, limits), self.quiet.bound(right, limits)
-                limits = self._bounded(left, operator, second, limits)
-                return self._bounded(right, MIRRORED[operator], first, limits)
+                either = self._assume(left, holds, constraints)
+                other = self._assume(right, holds, self._assume(left, not holds, constraints))
+                return {key: either[key].hull(other[key]) for key in either if key in other}
+            case Relation(operator, left, right, _) if operator in NEGATED_RELATION:
+                operator = operator if holds else NEGATED_RELATION[operator]
+                first, second = (
+                    self.unreported.bound_of(left, constraints),
+                    self.unreported.bound_of(right, constraints),
+                )
+                constraints = self._constrain_by_relation(left, operator, second, constraints)
+                return self._constrain_by_relation(
+                    right, FLIPPED_RELATION[operator], first, constraints
+                )
             case Relation(operator, left, right, _) if operator in ("==", "!="):
-                sides = self.quiet.bound(left, limits), self.quiet.bound(right, limits)
-                bounded = self._same if (operator == "==") == holds else self._other
-                return bounded(right, sides[0], bounded(left, sides[1], limits))
-        return limits
+                sides = (
+                    self.unreported.bound_of(left, constraints),
+                    self.unreported.bound_of(right, constraints),
+                )
+                bounded = (
+                    self._constrain_equal
+                    if (operator == "==") == holds
+                    else self._constrain_unequal
+                )
+                return bounded(right, sides[0], bounded(left, sides[1], constraints))
+        return constraints
 
-    def bound(self, side: Tree, limits: Limits) -> Interval:
+    def bound_of(self, side: SyntaxTree, constraints: Constraints) -> Interval:
         """Return the interval of a side of a condition, found once for both its outcomes."""
-        key = id(side), id(limits)
-        if key not in self.bounds:
-            self.bounds[key] = limits, self.of(side, limits)
-        return self.bounds[key][1]
+        key = id(side), id(constraints)
+        if key not in self.bound_cache:
+            self.bound_cache[key] = constraints, self.interval_of(side, constraints)
+        return self.bound_cache[key][1]
 
-    def _bounded(self, side: Tree, operator: str, bound: Interval, limits: Limits) -> Limits:
+    def _constrain_by_relation(
+        self, side: SyntaxTree, operator: str, bound: Interval, constraints: Constraints
+    ) -> Constraints:
         low, high = -math.inf, math.inf
         if operator == ">":
             low = math.nextafter(bound.low, math.inf)
@@ -194,20 +228,32 @@ class Ranging:
             high = math.nextafter(bound.high, -math.inf)
         else:
             high = bound.high
-        made = self._within(side, Interval(low, high), limits)
-        if isinstance(side, Application) and side.function == "abs" and low > 0.0:
-            return self._within(side.arguments[0], Interval(broken=True), made)
+        made = self._constrain(side, Interval(low, high), constraints)
+        if isinstance(side, FunctionCall) and side.function == "abs" and low > 0.0:
+            return self._constrain(side.arguments[0], Interval(excludes_zero=True), made)
         return made
 
-    def _same(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
+    def _constrain_equal(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
         """Return the limits where a side is equal to what has a bound."""
-        return self._within(side, Interval(bound.low, bound.high, broken=bound.broken), limits)
+        return self._constrain(
+            side, Interval(bound.low, bound.high, excludes_zero=bound.excludes_zero), constraints
+        )
 
-    def _other(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
+    def _constrain_unequal(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
         """Return the limits where a side is not equal to what has a bound: here only 0 counts."""
         is_zero = bound.low == bound.high == 0.0
-        return self._within(side, Interval(broken=True), limits) if is_zero else limits
+        return (
+            self._constrain(side, Interval(excludes_zero=True), constraints)
+            if is_zero
+            else constraints
+        )
 
-    def _within(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
-        number = self.likeness.number(side)
-        return {**limits, number: limits.get(number, ANYTHING).within(bound)}
+    def _constrain(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
+        number = self.numbering.number_of(side)
+        return {**constraints, number: constraints.get(number, UNBOUNDED).intersect(bound)}

@@ -12,10 +12,10 @@ from language.problem import Span
 from language.syntax import names
 
 
-def all_names(automaton: Automaton, with_waits: bool = True) -> Iterator[str]:
+def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[str]:
     """Yield the names in all expressions of an automaton, its own ones, no model's.
 
-    `with_waits`: those of `wait` too.
+    `include_waits`: those of `wait` too.
     """
     stack: list[Any] = [
         getattr(automaton, field.name)
@@ -34,6 +34,6 @@ def all_names(automaton: Automaton, with_waits: bool = True) -> Iterator[str]:
             stack += thing
         elif dataclasses.is_dataclass(thing) and not isinstance(thing, Span):
             fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
-            if isinstance(thing, Transition) and not with_waits:
+            if isinstance(thing, Transition) and not include_waits:
                 del fields["wait"]
             stack += fields.values()

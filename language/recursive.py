@@ -11,75 +11,85 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from language.covariance import Ahead, bounding, columns, corrected, entry, pairs, rows
-from language.density import at_rest, varies
-from language.derived import with_model
-from language.entries import number_diagonal, number_matrix, output_matrix
+from language.covariance import (
+    PredictionMatrices,
+    correct_by_measurement,
+    covariance_columns_block,
+    covariance_entry,
+    covariance_limit_blocks,
+    covariance_rows_block,
+    state_pairs,
+)
+from language.density import density_at_rest, is_time_varying
+from language.derived import derive_observer_matrices
+from language.entries import numeric_diagonal, numeric_matrix, output_matrix
 from language.evaluate import Scalar
-from language.instant import changed
+from language.instant import correct_input_change
 from language.kalman import (
-    Kalman,
+    LoweredObserver,
     SolvedNames,
-    is_fresh,
-    mean_ahead,
-    rest_constants,
+    has_new_measurement,
+    offset_constants,
+    predict_mean,
     solved_formulas,
 )
-from language.lower import Names, expression
+from language.lower import NameBindings, lower_expression
 from language.matrix import (
     Matrix,
-    exponential,
-    exponential_integral,
+    expm,
+    expm_integral,
     identity,
     multiply,
     subtract as less,
 )
-from language.model import Automaton, Mode, Observer, Run as ModelRun
+from language.model import Automaton, Mode, ModelRun as ModelRun, Observer
 from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Expr,
     Op,
     Ref,
-    Run,
+    RunBlock,
+    Switch,
     real,
     subtract,
-    total,
+    sum_of,
 )
 from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Constant, ObserverInfo
-from language.riccati import discrete_noise, steady_gain
+from language.riccati import discretise_noise, steady_kalman_gain
 
 
-def recursive(
+def lower_recursive_observer(
     automaton: Automaton,
     mode: Mode,
-    before: Names,
-    now: Names,
+    before: NameBindings,
+    now: NameBindings,
     values: Mapping[str, Scalar],
     problems: Problems,
-) -> Kalman | None:
+) -> LoweredObserver | None:
     """Return the observer of a mode; None where its numbers cannot be computed (reported)."""
     assert mode.observer and automaton.period is not None
-    with problems.collecting():
+    with problems.collect_errors():
         try:
-            return _Recursive(automaton, mode, (before, now), values, problems).kalman()
+            return _RecursiveObserverBuilder(
+                automaton, mode, (before, now), values, problems
+            ).build()
         except ValueError as error:
             problems.error("observer", mode.observer.span, f"it cannot be solved: {error}")
     return None
 
 
-class _Recursive:
+class _RecursiveObserverBuilder:
     """Builds the operations and numbers of one mode's observer."""
 
     def __init__(
         self,
         automaton: Automaton,
         mode: Mode,
-        known: tuple[Names, Names],
+        known: tuple[NameBindings, NameBindings],
         values: Mapping[str, Scalar],
         problems: Problems,
     ) -> None:
@@ -89,45 +99,49 @@ class _Recursive:
         self.period = float(automaton.period or 0)
         self.states = mode.observer.states
         noise = mode.observer.process_noise
-        self.varying = {n: f for n, f in noise.items() if varies(automaton, f)}
+        self.varying_densities = {n: f for n, f in noise.items() if is_time_varying(automaton, f)}
         self.depends_on: tuple[str, ...] = ()
 
-    def kalman(self) -> Kalman | None:
-        given = self.mode.observer
-        assert given
-        if given.runs and self.mode.run:
-            given = dataclasses.replace(given, of=self.mode.run.mode)
-        observer = with_model(self.automaton, self.mode.name, given, self.values, self.problems)
+    def build(self) -> LoweredObserver | None:
+        written = self.mode.observer
+        assert written
+        if written.predicts_by_run and self.mode.run:
+            written = dataclasses.replace(written, of=self.mode.run.mode)
+        observer = derive_observer_matrices(
+            self.automaton, self.mode.name, written, self.values, self.problems
+        )
         if observer is None:
             return None
-        self._same_states()
+        self._check_same_states()
         self.depends_on = tunables_of(self.automaton, solved_formulas(observer))
         c = output_matrix(self.automaton, self.values, observer)
         measured = tuple(observer.measures)
-        r = number_diagonal(self.automaton, self.values, observer.measurement_noise, measured)
-        own = self._ahead(observer, self.mode.name)
-        constants = self._constants(observer, own, c, r)
-        constants += rest_constants(self.automaton, observer, self.values)
-        start, enter, more = self._steady(observer, own, c, r)
+        r = numeric_diagonal(self.automaton, self.values, observer.measurement_noise, measured)
+        own = self._prediction_matrices(observer, self.mode.name)
+        constants = self._solved_constants(observer, own, c, r)
+        constants += offset_constants(self.automaton, observer, self.values)
+        start, enter, more = self._steady_covariance(observer, own, c, r)
         constants += more
-        if observer.runs:
-            predict, extra, spreads = self._by_run(given)
+        if observer.predicts_by_run:
+            predict, extra, spreads = self._predict_by_run(written)
             constants += extra
         else:
-            mean, extra = self._mean(observer, own)
-            spreads = self._spreads(observer, own)
-            late, more = self._late(observer, self.mode.name)
-            predict = (Run(f"spread_{self.mode.name}"), *mean, *late)
+            mean, extra = self._predict_mean(observer, own)
+            spreads = self._covariance_blocks(observer, own)
+            late, more = self._correct_input_change(observer, self.mode.name)
+            predict = (RunBlock(f"spread_{self.mode.name}"), *mean, *late)
             constants += extra + more
         info = ObserverInfo(
             self.mode.name, self.states, observer.inputs, measured, own.a, (), c,
             (), r, self.period, {}, "recursive",
         )  # fmt: skip
-        bounds = bounding(self.automaton, self.mode, self.values, self.problems)
-        correct = (*self._correct(observer, c), *map(Run, bounds))
-        return Kalman(predict, correct, tuple(constants), info, start, enter, {**spreads, **bounds})
+        bounds = covariance_limit_blocks(self.automaton, self.mode, self.values, self.problems)
+        correct = (*self._correct_block(observer, c), *map(RunBlock, bounds))
+        return LoweredObserver(
+            predict, correct, tuple(constants), info, start, enter, {**spreads, **bounds}
+        )
 
-    def _same_states(self) -> None:
+    def _check_same_states(self) -> None:
         """The covariance belongs to the automaton, as its states do."""
         observers = (mode.observer for mode in self.automaton.modes.values())
         first = next(o for o in observers if o and o.gain == "recursive")
@@ -136,50 +150,50 @@ class _Recursive:
             assert self.mode.observer
             self.problems.error("observer", self.mode.observer.span, label)
 
-    def _ahead(self, observer: Observer, tag: str) -> Ahead:
+    def _prediction_matrices(self, observer: Observer, tag: str) -> PredictionMatrices:
         """Return the numbers of a prediction by the matrix of an observer."""
         states, h = self.states, self.period
-        a = number_matrix(self.automaton, self.values, observer.a, states, states, "A")
-        fixed = {n: f for n, f in observer.process_noise.items() if n not in self.varying}
-        q = number_diagonal(self.automaton, self.values, fixed, states)
-        numbers = {"Phi": exponential(a, h), "Qd": discrete_noise(a, q, h)}
-        for name in self.varying:
+        a = numeric_matrix(self.automaton, self.values, observer.a, states, states, "A")
+        fixed = {n: f for n, f in observer.process_noise.items() if n not in self.varying_densities}
+        q = numeric_diagonal(self.automaton, self.values, fixed, states)
+        numbers = {"Phi": expm(a, h), "Qd": discretise_noise(a, q, h)}
+        for name in self.varying_densities:
             one = tuple(
                 tuple(1.0 if row == column == name else 0.0 for column in states) for row in states
             )
-            numbers[f"N_{name}"] = discrete_noise(a, one, h)
-        return Ahead(tag, a, numbers)
+            numbers[f"N_{name}"] = discretise_noise(a, one, h)
+        return PredictionMatrices(tag, a, numbers)
 
-    def _constants(
-        self, observer: Observer, ahead: Ahead, c: Matrix, r: Matrix
+    def _solved_constants(
+        self, observer: Observer, prediction: PredictionMatrices, c: Matrix, r: Matrix
     ) -> tuple[Constant, ...]:
         measured = {"C": c} if c else {}
-        found = SolvedNames(ahead.tag, observer).constants(
-            {**ahead.numbers, **measured}, self.depends_on
+        found = SolvedNames(prediction.name_prefix, observer).nonzero_constants(
+            {**prediction.matrices, **measured}, self.depends_on
         )
         variances = []
         for k, name in enumerate(observer.measures):
-            solved = f"solved.{ahead.tag}_R.{name}"
+            solved = f"solved.{prediction.name_prefix}_R.{name}"
             variances.append(Constant(solved, "solved", r[k][k], depends_on=self.depends_on))
         return (*found, *variances)
 
-    def _steady(
-        self, observer: Observer, own: Ahead, c: Matrix, r: Matrix
+    def _steady_covariance(
+        self, observer: Observer, prediction: PredictionMatrices, c: Matrix, r: Matrix
     ) -> tuple[Block, Block, tuple[Constant, ...]]:
         """Return what sets the steady covariance: before a correction, and after one.
 
         Densities that are not constant count here as they are while all inputs are 0.
         """
-        noise = own.numbers["Qd"]
-        for name, formula in self.varying.items():
-            size = at_rest(formula, self.automaton, self.values)
-            part = own.numbers[f"N_{name}"]
+        noise = prediction.matrices["Qd"]
+        for name, formula in self.varying_densities.items():
+            size = density_at_rest(formula, self.automaton, self.values)
+            part = prediction.matrices[f"N_{name}"]
             noise = tuple(
                 tuple(x + size * y for x, y in zip(p, q, strict=True))
                 for p, q in zip(noise, part, strict=True)
             )
         try:
-            gain, ahead = steady_gain(own.numbers["Phi"], noise, c, r)
+            gain, ahead = steady_kalman_gain(prediction.matrices["Phi"], noise, c, r)
         except ValueError as error:
             if observer.covariance == "keep" and self.mode.name != self.automaton.initial:
                 return (), (), ()
@@ -189,33 +203,37 @@ class _Recursive:
         after = multiply(less(identity(len(self.states)), multiply(gain, c)), ahead)
         solved = SolvedNames(self.mode.name, observer)
         numbers = {"P": ahead} | ({"Pe": after} if observer.covariance == "steady" else {})
-        constants = solved.constants(numbers, self.depends_on)
+        constants = solved.nonzero_constants(numbers, self.depends_on)
         known = {constant.name for constant in constants}
         start, enter = (
             tuple(
-                Assign(entry(i, j), Ref(name) if name in known else real(0.0))
-                for i, j in pairs(self.states)
-                for name in [solved.of(letter, i, j)]
+                Assign(covariance_entry(i, j), Ref(name) if name in known else real(0.0))
+                for i, j in state_pairs(self.states)
+                for name in [solved.entry(letter, i, j)]
             )
             for letter in ("P", "Pe")
         )
         return start, enter if observer.covariance == "steady" else (), constants
 
-    def _mean(self, observer: Observer, own: Ahead) -> tuple[Block, tuple[Constant, ...]]:
+    def _predict_mean(
+        self, observer: Observer, prediction: PredictionMatrices
+    ) -> tuple[Block, tuple[Constant, ...]]:
         states = self.states
-        b = number_matrix(self.automaton, self.values, observer.b, states, observer.inputs, "B")
-        held = exponential_integral(own.a, self.period)
+        b = numeric_matrix(self.automaton, self.values, observer.b, states, observer.inputs, "B")
+        held = expm_integral(prediction.a, self.period)
         numbers = {"G": held, "Gamma": multiply(held, b) if observer.inputs else ()}
         solved = SolvedNames(self.mode.name, observer)
         more = {name: Ref(f"solved.{name}") for name in observer.constants}
         known = {**self.before, **more}
         prefix = f"{self.automaton.name} "
-        mean = mean_ahead(
-            self.automaton, observer, solved, {**own.numbers, **numbers}, known, prefix
+        mean = predict_mean(
+            self.automaton, observer, solved, {**prediction.matrices, **numbers}, known, prefix
         )
-        return mean, solved.constants(numbers, self.depends_on)
+        return mean, solved.nonzero_constants(numbers, self.depends_on)
 
-    def _by_run(self, given: Observer) -> tuple[Block, tuple[Constant, ...], Mapping[str, Block]]:
+    def _predict_by_run(
+        self, written: Observer
+    ) -> tuple[Block, tuple[Constant, ...], Mapping[str, Block]]:
         """The covariance by the mode in which the run begins the period; the states by the run."""
         run, model = self.mode.run, self.automaton.model
         assert run and model
@@ -225,51 +243,65 @@ class _Recursive:
         spreads: dict[str, Block] = {}
         constants: tuple[Constant, ...] = ()
         for mode in modes:
-            there = dataclasses.replace(given, of=mode.name)
+            there = dataclasses.replace(written, of=mode.name)
             tag = f"{self.mode.name}_{mode.name}"
-            observer = with_model(self.automaton, tag, there, self.values, self.problems)
+            observer = derive_observer_matrices(
+                self.automaton, tag, there, self.values, self.problems
+            )
             if observer:
-                ahead = self._ahead(observer, tag)
+                ahead = self._prediction_matrices(observer, tag)
                 solved = SolvedNames(tag, observer)
                 depends_on = tunables_of(self.automaton, solved_formulas(observer))
-                constants += solved.constants(ahead.numbers, depends_on)
-                spreads |= self._spreads(observer, ahead)
-                cases.append((mode.number, (Run(f"spread_{tag}"),)))
-                late, more = self._late(observer, tag)
+                constants += solved.nonzero_constants(ahead.matrices, depends_on)
+                spreads |= self._covariance_blocks(observer, ahead)
+                cases.append((mode.number, (RunBlock(f"spread_{tag}"),)))
+                late, more = self._correct_input_change(observer, tag)
                 constants += more
                 if late:
                     spreads[f"late_{tag}"] = late
-                    after.append((mode.number, (Run(f"late_{tag}"),)))
-        chosen = self._chosen(run, cases)
-        predict = (*chosen, Run(f"run_{self.mode.name}"), *self._chosen(run, after))
+                    after.append((mode.number, (RunBlock(f"late_{tag}"),)))
+        chosen = self._choose_by_run_mode(run, cases)
+        predict = (
+            *chosen,
+            RunBlock(f"run_{self.mode.name}"),
+            *self._choose_by_run_mode(run, after),
+        )
         return predict, constants, spreads
 
-    def _chosen(self, run: ModelRun, cases: list[tuple[int, Block]]) -> Block:
+    def _choose_by_run_mode(self, run: ModelRun, cases: list[tuple[int, Block]]) -> Block:
         """The block of the mode in which the model is; a run that keeps its flow has one."""
         if run.follow and cases:
-            return (Choose("memory.run_mode", tuple(cases)),)
+            return (Switch("memory.run_mode", tuple(cases)),)
         return cases[0][1] if cases else ()
 
-    def _late(self, observer: Observer, tag: str) -> tuple[Block, tuple[Constant, ...]]:
+    def _correct_input_change(
+        self, observer: Observer, tag: str
+    ) -> tuple[Block, tuple[Constant, ...]]:
         """What inputs do that changed within this tick, at an instant that is not known."""
         solved, known = SolvedNames(tag, observer), (self.before, self.now)
-        ops, constants = changed(self.automaton, solved, known, self.values, self.problems)
+        ops, constants = correct_input_change(
+            self.automaton, solved, known, self.values, self.problems
+        )
         return ops, constants
 
-    def _spreads(self, observer: Observer, ahead: Ahead) -> dict[str, Block]:
+    def _covariance_blocks(
+        self, observer: Observer, prediction: PredictionMatrices
+    ) -> dict[str, Block]:
         """The densities of now, then the covariance over the period: its rows, its columns."""
         ops: list[Op] = []
-        for name, formula in self.varying.items():
+        for name, formula in self.varying_densities.items():
             key = f"{self.automaton.name} {formula.key}"
-            ops.append(Assign(f"work.density_{name}", expression(formula.tree, self.now), key))
-        solved, tag = SolvedNames(ahead.tag, observer), ahead.tag
+            ops.append(
+                Assign(f"work.density_{name}", lower_expression(formula.tree, self.now), key)
+            )
+        solved, tag = SolvedNames(prediction.name_prefix, observer), prediction.name_prefix
         return {
-            f"spread_{tag}": (*ops, Run(f"rows_{tag}"), Run(f"columns_{tag}")),
-            f"rows_{tag}": rows(solved, ahead),
-            f"columns_{tag}": columns(solved, ahead),
+            f"spread_{tag}": (*ops, RunBlock(f"rows_{tag}"), RunBlock(f"columns_{tag}")),
+            f"rows_{tag}": covariance_rows_block(solved, prediction),
+            f"columns_{tag}": covariance_columns_block(solved, prediction),
         }
 
-    def _correct(self, observer: Observer, c: Matrix) -> Block:
+    def _correct_block(self, observer: Observer, c: Matrix) -> Block:
         """Innovations against the prediction, then one measurement at a time in their order."""
         solved = SolvedNames(self.mode.name, observer)
         more = {name: Ref(f"solved.{name}") for name in observer.constants}
@@ -277,18 +309,20 @@ class _Recursive:
         first: list[Op] = []
         second: list[Op] = []
         for name in observer.measures:
-            fresh = is_fresh(observer, name)
-            seen = self._seen(observer, solved, c, name, known)
+            fresh = has_new_measurement(observer, name)
+            seen = self._expected_measurement(observer, solved, c, name, known)
             error = subtract(known[name], seen)
             first.append(Branch(fresh, (Assign(f"innovation.{name}", error),)))
-            second.append(Branch(fresh, corrected(self.automaton, solved, c, name, error)))
+            second.append(
+                Branch(fresh, correct_by_measurement(self.automaton, solved, c, name, error))
+            )
         return (*first, *second)
 
-    def _seen(
-        self, observer: Observer, solved: SolvedNames, c: Matrix, name: str, known: Names
+    def _expected_measurement(
+        self, observer: Observer, solved: SolvedNames, c: Matrix, name: str, known: NameBindings
     ) -> Expr:
         state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in self.states}
-        parts = solved.row("C", c, name, state)
+        parts = solved.row_products("C", c, name, state)
         if name in observer.g:
-            parts.append(expression(observer.g[name].tree, known))
-        return total(parts)
+            parts.append(lower_expression(observer.g[name].tree, known))
+        return sum_of(parts)

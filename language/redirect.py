@@ -5,115 +5,119 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 
-from language.document import Entry, Scalar, Table
+from language.document import Entry, MappingNode, ScalarNode
 from language.element import outputs_as_mapping
-from language.known import entries_of
-from language.passage import AUTOMATON, Path, changed
+from language.known import formula_entries
+from language.passage import AUTOMATON_SITES, KeyPath, map_formulas
 from language.problem import Span
-from language.rewrite import reads, substituted
+from language.rewrite import names_in_text, substitute_reads
 
-OWNERS = frozenset({"modes", "regions", "templates"})
-Where = Callable[[Path], bool]
+MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
+PathPredicate = Callable[[KeyPath], bool]
 
 
 @dataclasses.dataclass(frozen=True)
-class Part:
+class Redirection:
     """A part of a tree in which reads are redirected: `new` by old name; asked for at `span`."""
 
     paths: tuple[str, ...]
-    excepted: tuple[str, ...]
-    new: Mapping[str, str]
+    exceptions: tuple[str, ...]
+    replacements: Mapping[str, str]
     span: Span
 
 
-def redirected(tree: Table, part: Part) -> tuple[Table, frozenset[str]]:
+def redirect_reads(
+    tree: MappingNode, redirection: Redirection
+) -> tuple[MappingNode, frozenset[str]]:
     """Return a tree with the reads in a part redirected, and the names that were found there.
 
     In an equation the redirection reaches those that it alone reads, too: they are parts of it.
     """
-    found: set[str] = set()
-    where = _where(tree, part)
+    redirected_names: set[str] = set()
+    applies_to = _path_predicate(tree, redirection)
 
-    def change(path: Path, scalar: Scalar) -> Scalar:
-        if not where(path):
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        if not applies_to(path):
             return scalar
-        text, hits = substituted(scalar.text, part.new)
-        found.update(hits)
-        return rewritten(scalar, text, part.span) if hits else scalar
+        text, hits = substitute_reads(scalar.text, redirection.replacements)
+        redirected_names.update(hits)
+        return rewrite_scalar(scalar, text, redirection.span) if hits else scalar
 
-    tree = changed(tree, AUTOMATON, change)
+    tree = map_formulas(tree, AUTOMATON_SITES, change)
     outputs = tree.get("outputs")
-    if outputs is not None and {"outputs", "everywhere"} & set(part.paths):
-        table, hits = _outputs(outputs_as_mapping(outputs), part)
-        found.update(hits)
+    if outputs is not None and {"outputs", "everywhere"} & set(redirection.paths):
+        table, hits = _redirect_outputs(outputs_as_mapping(outputs), redirection)
+        redirected_names.update(hits)
         if hits:
             span = tree.entries["outputs"].span
-            tree = Table({**tree.entries, "outputs": Entry("outputs", span, table)}, tree.span)
-    return tree, frozenset(found)
+            tree = MappingNode(
+                {**tree.entries, "outputs": Entry("outputs", span, table)}, tree.span
+            )
+    return tree, frozenset(redirected_names)
 
 
-def rewritten(scalar: Scalar, text: str, span: Span) -> Scalar:
+def rewrite_scalar(scalar: ScalarNode, text: str, span: Span) -> ScalarNode:
     """Return a scalar with another text, made so by the overlay at `span`."""
     return dataclasses.replace(scalar, text=text, changes=(*scalar.changes, span))
 
 
-def rebuilt(tree: Table, name: str, formula: Scalar) -> Table:
+def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> MappingNode:
     """Return a tree whose equation of a name is a formula; `base` in it is what it was."""
 
-    def change(path: Path, scalar: Scalar) -> Scalar:
-        if not _stands(path, f"equations.{name}"):
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        if not _matches_key(path, f"equations.{name}"):
             return scalar
-        text, _ = substituted(formula.text, {"base": scalar.text})
-        return rewritten(scalar, text, formula.span)
+        text, _ = substitute_reads(formula.text, {"base": scalar.text})
+        return rewrite_scalar(scalar, text, formula.span)
 
-    return changed(tree, AUTOMATON, change)
+    return map_formulas(tree, AUTOMATON_SITES, change)
 
 
-def exists(tree: Table, key: str) -> bool:
+def has_formula_at(tree: MappingNode, key: str) -> bool:
     """Tell whether an expression stands under a key path such as `flow.w_w`."""
     if key in ("everywhere", "outputs"):
         return True
-    found = []
+    matches = []
 
-    def look(path: Path, scalar: Scalar) -> Scalar:
-        found.append(_stands(path, key))
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        matches.append(_matches_key(path, key))
         return scalar
 
-    changed(tree, AUTOMATON, look)
-    return any(found)
+    map_formulas(tree, AUTOMATON_SITES, look)
+    return any(matches)
 
 
-def _where(tree: Table, part: Part) -> Where:
-    if "everywhere" in part.paths:
-        return lambda path: not any(_stands(path, key) for key in part.excepted)
-    keys = [name for path in part.paths for name in _with_parts(tree, path)]
-    return lambda path: any(_stands(path, key) for key in keys)
+def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicate:
+    if "everywhere" in redirection.paths:
+        return lambda path: not any(_matches_key(path, key) for key in redirection.exceptions)
+    keys = [name for path in redirection.paths for name in _equation_keys(tree, path)]
+    return lambda path: any(_matches_key(path, key) for key in keys)
 
 
-def _stands(path: Path, key: str) -> bool:
+def _matches_key(path: KeyPath, key: str) -> bool:
     """Tell whether a path is a key path or below it; `flow.w` is that of the modes, too."""
     wanted = tuple(key.split("."))
     if path[: len(wanted)] == wanted:
         return True
-    return path[0] in OWNERS and path[-len(wanted) :] == wanted
+    return path[0] in MODE_CONTAINERS and path[-len(wanted) :] == wanted
 
 
-def _with_parts(tree: Table, key: str) -> list[str]:
+def _equation_keys(tree: MappingNode, key: str) -> list[str]:
     """Return an equation's key path with those of the equations that only it reads."""
     section, _, name = key.partition(".")
     if section != "equations":
         return [key]
     readers: dict[str, set[str]] = {}
-    equations = {equation for equation, _ in entries_of(tree, "equations")}
+    equations = {equation for equation, _ in formula_entries(tree, "equations")}
 
-    def look(path: Path, scalar: Scalar) -> Scalar:
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
         reader = path[-1] if path[-2:-1] == ("equations",) else ".".join(path)
         if path[0] not in ("elements", "places"):
-            for read in reads(scalar.text):
+            for read in names_in_text(scalar.text):
                 readers.setdefault(read, set()).add(reader)
         return scalar
 
-    changed(tree, AUTOMATON, look)
+    map_formulas(tree, AUTOMATON_SITES, look)
     inside = {name}
     while True:
         more = {e for e in equations - inside if readers.get(e) and readers[e] <= inside}
@@ -122,12 +126,14 @@ def _with_parts(tree: Table, key: str) -> list[str]:
         inside |= more
 
 
-def _outputs(outputs: Table, part: Part) -> tuple[Table, set[str]]:
+def _redirect_outputs(
+    outputs: MappingNode, redirection: Redirection
+) -> tuple[MappingNode, set[str]]:
     entries, hits = {}, set()
     for entry in outputs:
         node = entry.node
-        if isinstance(node, Scalar) and node.text in part.new:
+        if isinstance(node, ScalarNode) and node.text in redirection.replacements:
             hits.add(node.text)
-            node = rewritten(node, part.new[node.text], part.span)
+            node = rewrite_scalar(node, redirection.replacements[node.text], redirection.span)
         entries[entry.key] = Entry(entry.key, entry.span, node)
-    return Table(entries, outputs.span), hits
+    return MappingNode(entries, outputs.span), hits

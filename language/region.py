@@ -13,29 +13,29 @@ from language.activity import is_active
 from language.chart_target import mode_paths
 from language.declaration import Formula
 from language.model import CHART, Automaton, Balance, Mode, Region, Transition
-from language.once import once
-from language.operation import Compare, Expr, Ref, whole
+from language.once import cache_on_owner
+from language.operation import Compare, Expr, Ref, integer
 from language.program import mode_variable
 
 
 def equation_names(mode: Mode) -> list[str]:
     """Return the names of the equations that hold while a mode is active."""
-    return list(sources(mode))
+    return list(equation_formulas(mode))
 
 
-@once
-def sources(mode: Mode) -> dict[str, tuple[Formula, ...]]:
+@cache_on_owner
+def equation_formulas(mode: Mode) -> dict[str, tuple[Formula, ...]]:
     """Return each equation's formulas: one, or those of the modes of a region beside."""
-    found: dict[str, tuple[Formula, ...]] = {}
-    found.update({name: (formula,) for name, formula in mode.equations.items()})
-    for region in mode.beside:
+    formulas: dict[str, tuple[Formula, ...]] = {}
+    formulas.update({name: (formula,) for name, formula in mode.equations.items()})
+    for region in mode.parallel_regions:
         for name in region_equations(region):
             modes = region.modes.values()
-            found[name] = tuple(m.equations[name] for m in modes if name in m.equations)
-    return found
+            formulas[name] = tuple(m.equations[name] for m in modes if name in m.equations)
+    return formulas
 
 
-@once
+@cache_on_owner
 def region_equations(region: Region) -> list[str]:
     """Return the names that the modes of a region define."""
     return list(dict.fromkeys(name for mode in region.modes.values() for name in mode.equations))
@@ -45,73 +45,81 @@ def region_of_equation(mode: Mode, name: str) -> Region | None:
     """Return the region beside a mode that defines an equation, None for the mode's own."""
     if name in mode.equations:
         return None
-    return next(region for region in mode.beside if name in region_equations(region))
+    return next(region for region in mode.parallel_regions if name in region_equations(region))
 
 
 def region_of_balance(mode: Mode, state: str) -> Region | None:
     """Return the region beside a mode that balances a state, None for the mode's own."""
     if state in mode.flow:
         return None
-    modes_of = {region.name: region.modes.values() for region in mode.beside}
-    return next(r for r in mode.beside if any(state in m.flow for m in modes_of[r.name]))
+    modes_of = {region.name: region.modes.values() for region in mode.parallel_regions}
+    return next(r for r in mode.parallel_regions if any(state in m.flow for m in modes_of[r.name]))
 
 
-def balances(mode: Mode) -> Iterator[Balance]:
+def possible_balances(mode: Mode) -> Iterator[Balance]:
     """Yield every balance that may hold while a mode of the chart is active."""
     yield from mode.flow.values()
-    for region in mode.beside:
+    for region in mode.parallel_regions:
         for other in region.modes.values():
             yield from other.flow.values()
 
 
-def transitions(mode: Mode) -> Iterator[Transition]:
+def watched_transitions(mode: Mode) -> Iterator[Transition]:
     """Yield every transition that may be watched while a mode of the chart is active."""
     yield from mode.transitions
-    for region in mode.beside:
+    for region in mode.parallel_regions:
         for other in region.modes.values():
             yield from other.transitions
 
 
-@once
-def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
+@cache_on_owner
+def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     """Return the transitions of a mode with their index, the smallest priority first (rule 3a)."""
     pairs = list(enumerate(mode.transitions))
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 
 
-def slot(region: str, index: int) -> str:
+def guard_slot(region: str, index: int) -> str:
     """Return the ending of the variables of a mode's guard: `guard_0`, `guard_gap_0`."""
     return str(index) if region == CHART else f"{region.replace('.', '_')}_{index}"
 
 
-@once
-def slots(mode: Mode) -> list[str]:
+@cache_on_owner
+def guard_slots(mode: Mode) -> list[str]:
     """Return the endings of all guards that are watched while a mode of the chart is active."""
-    own = [slot(CHART, index) for index in range(len(mode.transitions))]
-    return own + [slot(r.name, index) for r in mode.beside for index in range(r.widest)]
+    own = [guard_slot(CHART, index) for index in range(len(mode.transitions))]
+    return own + [
+        guard_slot(r.name, index)
+        for r in mode.parallel_regions
+        for index in range(r.max_transitions)
+    ]
 
 
-@once
-def all_slots(automaton: Automaton) -> list[str]:
+@cache_on_owner
+def all_guard_slots(automaton: Automaton) -> list[str]:
     """Return the endings of the guard variables of an automaton."""
-    return [slot(r.name, index) for r in automaton.all_regions for index in range(r.widest)]
+    return [
+        guard_slot(r.name, index)
+        for r in automaton.all_regions
+        for index in range(r.max_transitions)
+    ]
 
 
-def in_modes(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:
+def mode_bindings(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:
     """Return what `in(region.mode)` is, and under `mode region` the variable that says it."""
-    found: dict[str, Expr] = {}
-    if automaton.tree:
-        for path, node in mode_paths(automaton.tree).items():
-            found[f"in {prefix}{path}"] = is_active(automaton.tree, node, base)
+    bindings: dict[str, Expr] = {}
+    if automaton.statechart:
+        for path, node in mode_paths(automaton.statechart).items():
+            bindings[f"in {prefix}{path}"] = is_active(automaton.statechart, node, base)
     for region in automaton.all_regions:
         variable = Ref(mode_variable(base, region.name))
-        found[f"mode {prefix}{region.name}"] = variable
-        if automaton.tree:
+        bindings[f"mode {prefix}{region.name}"] = variable
+        if automaton.statechart:
             continue
         for mode in region.modes.values():
-            is_in = Compare("==", variable, whole(mode.number))
-            found[f"in {prefix}{region.name}.{mode.name}"] = is_in
-    return found
+            is_in = Compare("==", variable, integer(mode.number))
+            bindings[f"in {prefix}{region.name}.{mode.name}"] = is_in
+    return bindings
 
 
 def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
@@ -119,25 +127,27 @@ def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
 
     Of another region its initial mode counts; for a search of witnesses, which prove nothing.
     """
-    source = automaton.source(transition)
+    source = automaton.source_mode(transition)
     found: dict[str, Formula] = {}
     for region in automaton.all_regions:
         own = region.name == transition.region
         mode = source if own else region.modes[region.initial]
         found.update(mode.equations)
-    return dataclasses.replace(source, equations=found, beside=())
+    return dataclasses.replace(source, equations=found, parallel_regions=())
 
 
-def with_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
+def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
     """Return the modes of the chart with the regions that run beside them."""
-    return {name: dataclasses.replace(mode, beside=regions) for name, mode in modes.items()}
+    return {
+        name: dataclasses.replace(mode, parallel_regions=regions) for name, mode in modes.items()
+    }
 
 
-def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
+def equation_closure(mode: Mode, names: Iterable[str]) -> set[str]:
     """Return the equations of a mode that the wanted names need."""
     needed: set[str] = set()
-    known = sources(mode)
-    stack = [name for name in wanted if name in known]
+    known = equation_formulas(mode)
+    stack = [name for name in names if name in known]
     while stack:
         name = stack.pop()
         if name not in needed:

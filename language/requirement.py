@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.document import Items, Node, Scalar, Table
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.problem import Span
 
 
 @dataclass(frozen=True)
-class Named:
+class RequirementUse:
     """A requirement named at a key path, empty for the whole file."""
 
     requirement: str
@@ -18,27 +18,27 @@ class Named:
     span: Span
 
 
-def requirements_of(table: Table) -> tuple[str, ...]:
+def requirements_of(table: MappingNode) -> tuple[str, ...]:
     """Return the names under `req`: one, or a list."""
-    return tuple(item.text for item in _items(table))
+    return tuple(item.text for item in _requirement_scalars(table))
 
 
-def requirements_in(node: Node, path: tuple[str, ...] = ()) -> Iterator[Named]:
+def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[RequirementUse]:
     """Yield every requirement that is named in a tree, in the order of the file."""
-    if not isinstance(node, Table):
+    if not isinstance(node, MappingNode):
         return
-    for item in _items(node):
-        yield Named(item.text, ".".join(path), item.span)
+    for item in _requirement_scalars(node):
+        yield RequirementUse(item.text, ".".join(path), item.span)
     for entry in node:
-        yield from requirements_in(entry.node, (*path, entry.key))
+        yield from find_requirements(entry.node, (*path, entry.key))
 
 
-def all_requirements(*trees: Table) -> tuple[str, ...]:
+def all_requirements(*trees: MappingNode) -> tuple[str, ...]:
     """Return the requirements that are named in trees, each once."""
-    return tuple(dict.fromkeys(each.requirement for t in trees for each in requirements_in(t)))
+    return tuple(dict.fromkeys(each.requirement for t in trees for each in find_requirements(t)))
 
 
-def _items(table: Table) -> Iterator[Scalar]:
+def _requirement_scalars(table: MappingNode) -> Iterator[ScalarNode]:
     node = table.get("req")
-    nodes = node.nodes if isinstance(node, Items) else (node,)
-    yield from (each for each in nodes if isinstance(each, Scalar) and each.text)
+    nodes = node.nodes if isinstance(node, SequenceNode) else (node,)
+    yield from (each for each in nodes if isinstance(each, ScalarNode) and each.text)

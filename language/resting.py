@@ -6,46 +6,48 @@ Nothing of them is computed, so they stay what they are to the last bit.
 from __future__ import annotations
 
 from language.model import Automaton, Mode
-from language.once import once
-from language.region import sources
-from language.syntax import Name, Number, Tree
+from language.once import cache_on_owner
+from language.region import equation_formulas
+from language.syntax import Name, NumberLiteral, SyntaxTree
 
 
-@once
-def resting(mode: Mode) -> frozenset[str]:
+@cache_on_owner
+def constant_states(mode: Mode) -> frozenset[str]:
     """Return the states that rest in a mode of the chart."""
     flow = mode.flow.values()
     return frozenset(balance.state for balance in flow if _is_zero(mode, balance.right))
 
 
-def moving(automaton: Automaton, mode: str) -> tuple[str, ...]:
+def varying_states(automaton: Automaton, mode: str) -> tuple[str, ...]:
     """Return the states that move in a mode, in the order of the file."""
-    still = resting(automaton.modes[mode])
-    return tuple(name for name in automaton.states if name not in still)
+    constant = constant_states(automaton.modes[mode])
+    return tuple(name for name in automaton.states if name not in constant)
 
 
-def movable(automaton: Automaton) -> tuple[str, ...]:
+def ever_varying_states(automaton: Automaton) -> tuple[str, ...]:
     """Return the states that move in one mode at least."""
-    still = frozenset(automaton.states).intersection(*map(resting, automaton.modes.values()))
-    return tuple(name for name in automaton.states if name not in still)
+    constant = frozenset(automaton.states).intersection(
+        *map(constant_states, automaton.modes.values())
+    )
+    return tuple(name for name in automaton.states if name not in constant)
 
 
-def never_moving(automaton: Automaton) -> frozenset[str]:
+def never_varying_states(automaton: Automaton) -> frozenset[str]:
     """Return the states that rest in all modes."""
-    return frozenset(automaton.states).difference(movable(automaton))
+    return frozenset(automaton.states).difference(ever_varying_states(automaton))
 
 
-def carried_on(automaton: Automaton) -> tuple[str, ...]:
+def written_states(automaton: Automaton) -> tuple[str, ...]:
     """Return the states that a run writes: those that move, and those that a transition resets."""
     reset = {n for mode in automaton.all_modes for one in mode.transitions for n in one.reset}
-    return tuple(n for n in automaton.states if n in movable(automaton) or n in reset)
+    return tuple(n for n in automaton.states if n in ever_varying_states(automaton) or n in reset)
 
 
-def _is_zero(mode: Mode, tree: Tree) -> bool:
+def _is_zero(mode: Mode, tree: SyntaxTree) -> bool:
     match tree:
-        case Number(value):
+        case NumberLiteral(value):
             return value == 0
         case Name(name):
-            formulas = sources(mode).get(name, ())
+            formulas = equation_formulas(mode).get(name, ())
             return bool(formulas) and all(_is_zero(mode, one.tree) for one in formulas)
     return False

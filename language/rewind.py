@@ -10,9 +10,9 @@ is set.
 
 from __future__ import annotations
 
-from language.lower import Names, equations, expression
+from language.lower import NameBindings, lower_equations, lower_expression
 from language.model import Automaton, Mode
-from language.motion import RUN_HALVINGS
+from language.motion import RUN_BISECTIONS
 from language.operation import (
     Assign,
     Binary,
@@ -24,51 +24,51 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Unary,
     add,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.past import (
-    KEPT,
-    Rewinding,
-    entered_late,
-    find_place,
-    input_at,
-    inputs_as_now,
-    inputs_at_place,
-    kept_inputs,
-    past_variables,
-    rewinds_from,
+    HISTORY_LENGTH,
+    Rollback,
+    load_current_inputs,
+    load_current_states,
+    load_recorded_inputs,
+    load_recorded_run_inputs,
+    load_recorded_states,
+    recorded_input_ref,
+    recorded_inputs,
+    rollback_targets,
+    rollbacks_from,
+    rolled_back_states,
     run_inputs,
-    run_inputs_at_place,
-    states_as_now,
-    states_at_place,
-    taken_back,
+    set_history_index,
+    tick_history_variables,
 )
 from language.program import Variable
-from language.region import closure, sources
-from language.resting import moving
-from language.run import holding, run_block
+from language.region import equation_closure, equation_formulas
+from language.resting import varying_states
+from language.run import run_block, saturate_moved_states
 from language.wiring import equation_variables
 
 REWIND_LIMIT = "rewind_limit"
-BACK = Ref("work.back", whole=True)
+TICKS_BACK = Ref("work.back", is_integer=True)
 """How many ticks before now `until` was false, 0: not found."""
-LOOK = Ref("work.look", whole=True)
-UNTIL = Ref("work.until")
-REST = Ref("work.rest")
+LOOKBACK_INDEX = Ref("work.look", is_integer=True)
+IS_UNTIL_TRUE = Ref("work.until")
+REMAINING_TIME = Ref("work.rest")
 
 
-def rewind_blocks(automaton: Automaton, mode: Mode, now: Names) -> dict[str, Block]:
+def rollback_blocks(automaton: Automaton, mode: Mode, now: NameBindings) -> dict[str, Block]:
     """Return the blocks of the transitions of a mode that go back; `now` has no equations."""
     found: dict[str, Block] = {}
-    for rewinding in rewinds_from(automaton, mode):
-        found[f"until_{rewinding.label}"] = _until(rewinding, now)
-        found[f"back_{rewinding.label}"] = _back(rewinding, now)
+    for rewinding in rollbacks_from(automaton, mode):
+        found[f"until_{rewinding.block_suffix}"] = _until_block(rewinding, now)
+        found[f"back_{rewinding.block_suffix}"] = _rollback_block(rewinding, now)
     return found
 
 
@@ -76,175 +76,204 @@ def advance_blocks(automaton: Automaton, mode: Mode) -> dict[str, Block]:
     """Return `run_<mode>`: its period; of what a rewind enters also `rest_<mode>`, a part of it."""
     if mode.run is None:
         return {}
-    if mode.name not in entered_late(automaton):
+    if mode.name not in rollback_targets(automaton):
         return {f"run_{mode.name}": run_block(automaton, mode.run)}
     assert automaton.period is not None
-    period = Assign(REST.name, real(automaton.period), f"{automaton.name} {mode.run.key}")
+    period = Assign(REMAINING_TIME.name, real(automaton.period), f"{automaton.name} {mode.run.key}")
     return {
-        f"rest_{mode.name}": run_block(automaton, mode.run, REST),
-        f"run_{mode.name}": (period, Run(f"rest_{mode.name}")),
+        f"rest_{mode.name}": run_block(automaton, mode.run, REMAINING_TIME),
+        f"run_{mode.name}": (period, RunBlock(f"rest_{mode.name}")),
     }
 
 
-def known_there(automaton: Automaton, now: Names) -> dict[str, Expr]:
+def rollback_bindings(automaton: Automaton, now: NameBindings) -> dict[str, Expr]:
     """Return what names are where the micro-step is made, apart from equations."""
-    return {**now, **{name: input_at(automaton, name) for name in kept_inputs(automaton)}}
+    return {
+        **now,
+        **{name: recorded_input_ref(automaton, name) for name in recorded_inputs(automaton)},
+    }
 
 
-def equations_there(rewinding: Rewinding) -> dict[str, Expr]:
+def rollback_equation_bindings(rollback: Rollback) -> dict[str, Expr]:
     """Return the equations that exit and reset read, as they are there."""
-    known = sources(rewinding.source)
-    names = closure(rewinding.source, rewinding.read_by_jump)
-    return {name: Ref(f"work.past_{name}", known[name][0].whole) for name in names}
+    known = equation_formulas(rollback.source)
+    names = equation_closure(rollback.source, rollback.names_read_by_jump)
+    return {name: Ref(f"work.past_{name}", known[name][0].is_integer) for name in names}
 
 
-def carry_on(rewinding: Rewinding) -> Block:
+def advance_from_crossing(rollback: Rollback) -> Block:
     """Return what the target's run does from the crossing to now."""
-    automaton = rewinding.automaton
-    target = automaton.target(rewinding.transition)
+    automaton = rollback.automaton
+    target = automaton.target_mode(rollback.transition)
     ops: list[Op] = []
-    if rewinding.flow is not None:
-        ops.append(Branch(Compare(">", REST, real(0.0)), (Run(f"rest_{target.name}"),)))
-    place = find_place(automaton, subtract(subtract(BACK, whole(2)), LOOK))
-    inputs = run_inputs_at_place(automaton)
+    if rollback.flow_mode is not None:
+        ops.append(
+            Branch(Compare(">", REMAINING_TIME, real(0.0)), (RunBlock(f"rest_{target.name}"),))
+        )
+    place = set_history_index(automaton, subtract(subtract(TICKS_BACK, integer(2)), LOOKBACK_INDEX))
+    inputs = load_recorded_run_inputs(automaton)
     later: Block = (
         *((*place, *inputs) if inputs else ()),
-        Run(f"run_{target.name}"),
+        RunBlock(f"run_{target.name}"),
     )
-    is_later = Compare("<", add(LOOK, whole(1)), BACK)
-    if rewinding.ticks > 1:
-        ops.append(Loop(rewinding.ticks - 1, LOOK.name, (Branch(is_later, later),)))
-    return (Branch(Compare(">", BACK, whole(0)), tuple(ops)),) if ops else ()
+    is_later = Compare("<", add(LOOKBACK_INDEX, integer(1)), TICKS_BACK)
+    if rollback.max_ticks > 1:
+        ops.append(Loop(rollback.max_ticks - 1, LOOKBACK_INDEX.name, (Branch(is_later, later),)))
+    return (Branch(Compare(">", TICKS_BACK, integer(0)), tuple(ops)),) if ops else ()
 
 
-def rewind_variables(automaton: Automaton) -> list[Variable]:
+def rollback_variables(automaton: Automaton) -> list[Variable]:
     """Return the variables of all of it; `finished` leaves out what is not used."""
     return [
-        *past_variables(automaton),
-        Variable(BACK.name, "whole"),
-        Variable(LOOK.name, "whole"),
-        Variable(UNTIL.name, "truth"),
-        Variable(REST.name, "real", "s", about="from the crossing to the end of its tick"),
+        *tick_history_variables(automaton),
+        Variable(TICKS_BACK.name, "whole"),
+        Variable(LOOKBACK_INDEX.name, "whole"),
+        Variable(IS_UNTIL_TRUE.name, "truth"),
+        Variable(
+            REMAINING_TIME.name, "real", "s", about="from the crossing to the end of its tick"
+        ),
         *equation_variables(automaton, "work.past_"),
     ]
 
 
-def _until(rewinding: Rewinding, now: Names) -> Block:
+def _until_block(rollback: Rollback, now: NameBindings) -> Block:
     """Whether `until` holds at `work.at_<state>` with the inputs `work.past_<input>`."""
-    known = known_there(rewinding.automaton, now)
-    known.update({name: Ref(f"work.at_{name}") for name in taken_back(rewinding.automaton)})
-    until, prefix = rewinding.rewind.until, f"{rewinding.automaton.name} "
-    ops = equations(rewinding.source, known, "work.past_", prefix, until.reads)
-    return (*ops, Assign(UNTIL.name, expression(until.tree, known), prefix + until.key))
-
-
-def _back(rewinding: Rewinding, now: Names) -> Block:
-    """Go back to where the micro-step is made, and evaluate what its exit and reset read there."""
-    automaton = rewinding.automaton
-    told: Block = (FaultBit(REWIND_LIMIT),) if rewinding.rewind.is_fault else ()
-    limit: Block = (*told, *inputs_as_now(automaton, "past"))
-    known, prefix = known_there(automaton, now), f"{automaton.name} "
-    there = equations(rewinding.source, known, "work.past_", prefix, rewinding.read_by_jump)
+    known = rollback_bindings(rollback.automaton, now)
+    known.update({name: Ref(f"work.at_{name}") for name in rolled_back_states(rollback.automaton)})
+    until, prefix = rollback.rewind.until, f"{rollback.automaton.name} "
+    ops = lower_equations(rollback.source, known, "work.past_", prefix, until.reads)
     return (
-        *_search(rewinding),
-        Branch(Compare(">", BACK, whole(0)), _located(rewinding), limit),
+        *ops,
+        Assign(IS_UNTIL_TRUE.name, lower_expression(until.tree, known), prefix + until.key),
+    )
+
+
+def _rollback_block(rollback: Rollback, now: NameBindings) -> Block:
+    """Go back to where the micro-step is made, and evaluate what its exit and reset read there."""
+    automaton = rollback.automaton
+    fault: Block = (FaultBit(REWIND_LIMIT),) if rollback.rewind.is_fault else ()
+    limit: Block = (*fault, *load_current_inputs(automaton, "past"))
+    known, prefix = rollback_bindings(automaton, now), f"{automaton.name} "
+    there = lower_equations(
+        rollback.source, known, "work.past_", prefix, rollback.names_read_by_jump
+    )
+    return (
+        *_search_crossing_tick(rollback),
+        Branch(Compare(">", TICKS_BACK, integer(0)), _locate_crossing(rollback), limit),
         *there,
     )
 
 
-def _search(rewinding: Rewinding) -> Block:
+def _search_crossing_tick(rollback: Rollback) -> Block:
     """From now backwards to the latest tick at which `until` is false."""
-    automaton, until = rewinding.automaton, Run(f"until_{rewinding.label}")
-    is_wanted = Binary("and", Compare("==", BACK, whole(0)), Compare("<", LOOK, KEPT))
+    automaton, until = rollback.automaton, RunBlock(f"until_{rollback.block_suffix}")
+    is_wanted = Binary(
+        "and", Compare("==", TICKS_BACK, integer(0)), Compare("<", LOOKBACK_INDEX, HISTORY_LENGTH)
+    )
     look: Block = (
-        *find_place(automaton, LOOK),
-        *states_at_place(automaton, "at"),
-        *inputs_at_place(automaton, "past"),
+        *set_history_index(automaton, LOOKBACK_INDEX),
+        *load_recorded_states(automaton, "at"),
+        *load_recorded_inputs(automaton, "past"),
         until,
-        Branch(Unary("not", UNTIL), (Assign(BACK.name, add(LOOK, whole(1))),)),
+        Branch(
+            Unary("not", IS_UNTIL_TRUE), (Assign(TICKS_BACK.name, add(LOOKBACK_INDEX, integer(1))),)
+        ),
     )
-    search = Loop(rewinding.ticks, LOOK.name, (Branch(is_wanted, look),))
-    now = (*states_as_now(automaton, "at"), *inputs_as_now(automaton, "past"))
-    return (*now, until, Assign(BACK.name, whole(0)), Branch(UNTIL, (search,)))
+    search = Loop(rollback.max_ticks, LOOKBACK_INDEX.name, (Branch(is_wanted, look),))
+    now = (*load_current_states(automaton, "at"), *load_current_inputs(automaton, "past"))
+    return (*now, until, Assign(TICKS_BACK.name, integer(0)), Branch(IS_UNTIL_TRUE, (search,)))
 
 
-def _located(rewinding: Rewinding) -> Block:
+def _locate_crossing(rollback: Rollback) -> Block:
     """The point is at the tick before the crossing: put the states at the crossing."""
-    automaton = rewinding.automaton
+    automaton = rollback.automaton
     ring = (
-        *find_place(automaton, subtract(BACK, whole(2))),
-        *states_at_place(automaton, "after"),
-        *inputs_at_place(automaton, "after"),
+        *set_history_index(automaton, subtract(TICKS_BACK, integer(2))),
+        *load_recorded_states(automaton, "after"),
+        *load_recorded_inputs(automaton, "after"),
     )
-    now = (*states_as_now(automaton, "after"), *inputs_as_now(automaton, "after"))
-    ops: list[Op] = [Branch(Compare("==", BACK, whole(1)), now, ring)]
-    there = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in taken_back(automaton)]
-    if rewinding.flow is None:
-        return (*ops, *_tick_after(automaton), *there)
-    before, held = _held_there(rewinding, rewinding.flow)
-    return (*ops, *_along(rewinding), *before, *there, *held)
+    now = (*load_current_states(automaton, "after"), *load_current_inputs(automaton, "after"))
+    ops: list[Op] = [Branch(Compare("==", TICKS_BACK, integer(1)), now, ring)]
+    there = [
+        Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in rolled_back_states(automaton)
+    ]
+    if rollback.flow_mode is None:
+        return (*ops, *_use_tick_after(automaton), *there)
+    before, held = _saturate_at_crossing(rollback, rollback.flow_mode)
+    return (*ops, *_flow_to_crossing(rollback), *before, *there, *held)
 
 
-def _held_there(rewinding: Rewinding, flow: str) -> tuple[Block, Block]:
+def _saturate_at_crossing(rollback: Rollback, flow: str) -> tuple[Block, Block]:
     """Return what stands before and after the states are put at the crossing: what moves there is
     held as after a segment of a run (rule 18), what rests is what it was at a tick.
     """
-    automaton = rewinding.automaton
-    run = automaton.target(rewinding.transition).run
+    automaton = rollback.automaton
+    run = automaton.target_mode(rollback.transition).run
     assert automaton.model and run
-    return holding(automaton, run.method, moving(automaton.model, flow))
+    return saturate_moved_states(automaton, run.method, varying_states(automaton.model, flow))
 
 
-def _tick_after(automaton: Automaton) -> list[Op]:
+def _use_tick_after(automaton: Automaton) -> list[Op]:
     """The crossing is the tick itself: no flow leads to it, or a correction made it."""
     ops: list[Op] = [
-        Assign(f"work.at_{name}", Ref(f"work.after_{name}")) for name in taken_back(automaton)
+        Assign(f"work.at_{name}", Ref(f"work.after_{name}"))
+        for name in rolled_back_states(automaton)
     ]
-    for name in kept_inputs(automaton):
-        ops.append(Assign(input_at(automaton, name).name, input_at(automaton, name, "after")))
-    return [*ops, Assign(REST.name, real(0.0))]
+    for name in recorded_inputs(automaton):
+        ops.append(
+            Assign(
+                recorded_input_ref(automaton, name).name,
+                recorded_input_ref(automaton, name, "after"),
+            )
+        )
+    return [*ops, Assign(REMAINING_TIME.name, real(0.0))]
 
 
-def _along(rewinding: Rewinding) -> list[Op]:
+def _flow_to_crossing(rollback: Rollback) -> list[Op]:
     """One step of the flow of the source from the tick before; where it crosses, halve it."""
-    automaton = rewinding.automaton
+    automaton = rollback.automaton
     assert automaton.period is not None
-    names = taken_back(automaton)
+    names = rolled_back_states(automaton)
     ends = [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in names]
-    crossing: Block = (Run(f"series_{rewinding.flow}"), *_halved(rewinding), *ends)
+    crossing: Block = (RunBlock(f"series_{rollback.flow_mode}"), *_bisect_crossing(rollback), *ends)
     return [
         *(Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in names),
-        *_inputs_of_run(automaton),
+        *_set_run_inputs(automaton),
         Assign("work.h", real(automaton.period)),
-        Run(f"step_{rewinding.flow}"),
+        RunBlock(f"step_{rollback.flow_mode}"),
         *ends,
-        Run(f"until_{rewinding.label}"),
-        Branch(UNTIL, crossing, tuple(_tick_after(automaton))),
+        RunBlock(f"until_{rollback.block_suffix}"),
+        Branch(IS_UNTIL_TRUE, crossing, tuple(_use_tick_after(automaton))),
     ]
 
 
-def _halved(rewinding: Rewinding) -> list[Op]:
+def _bisect_crossing(rollback: Rollback) -> list[Op]:
     """Halve (low, high]: `until` holds at high, not at low; the upper end is kept."""
     low, high = Ref("work.low"), Ref("work.high")
-    names = taken_back(rewinding.automaton)
+    names = rolled_back_states(rollback.automaton)
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in names]
     middle = add(low, multiply(real(0.5), subtract(high, low)))
     body: Block = (
         Assign("work.s", middle),
-        Run("point"),
-        Run(f"until_{rewinding.label}"),
+        RunBlock("point"),
+        RunBlock(f"until_{rollback.block_suffix}"),
         Branch(
-            UNTIL, (Assign(high.name, Ref("work.s")), *keep), (Assign(low.name, Ref("work.s")),)
+            IS_UNTIL_TRUE,
+            (Assign(high.name, Ref("work.s")), *keep),
+            (Assign(low.name, Ref("work.s")),),
         ),
     )
     return [
         Assign(low.name, real(0.0)),
         Assign(high.name, Ref("work.h")),
-        Loop(RUN_HALVINGS, "work.halving", body),
-        Assign(REST.name, subtract(Ref("work.h"), high)),
+        Loop(RUN_BISECTIONS, "work.halving", body),
+        Assign(REMAINING_TIME.name, subtract(Ref("work.h"), high)),
     ]
 
 
-def _inputs_of_run(automaton: Automaton) -> list[Op]:
+def _set_run_inputs(automaton: Automaton) -> list[Op]:
     """Put the inputs of the point where runs read those of the tick before."""
-    return [Assign(f"before.{name}", input_at(automaton, name)) for name in run_inputs(automaton)]
+    return [
+        Assign(f"before.{name}", recorded_input_ref(automaton, name))
+        for name in run_inputs(automaton)
+    ]

@@ -5,85 +5,93 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 
-NUMBER = r"\d(?:[eE][-+]\d|[0-9A-Za-z_.])*"
-UNIT = r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*"
-WORDS = frozenset(["if", "then", "else", "and", "or", "not", "true", "false"])
-TOKEN = re.compile(
-    rf"(?P<number>{NUMBER}(?: (?!(?:{'|'.join(sorted(WORDS))})\b){UNIT})?)"
+NUMBER_PATTERN = r"\d(?:[eE][-+]\d|[0-9A-Za-z_.])*"
+UNIT_PATTERN = r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*"
+KEYWORDS = frozenset(["if", "then", "else", "and", "or", "not", "true", "false"])
+TOKEN_PATTERN = re.compile(
+    rf"(?P<number>{NUMBER_PATTERN}(?: (?!(?:{'|'.join(sorted(KEYWORDS))})\b){UNIT_PATTERN})?)"
     r"|(?P<name>\$?[A-Za-z]\w*(?: *\. *[A-Za-z]\w*)*)"
     r"|(?P<mark><=|>=|==|!=|[-+*/^()<>=,])"
     r"|(?P<blank>\s+)|(?P<other>.)"
 )
 """The tokens of `expression.lark`, and holes such as `$speed`."""
-ATOM = re.compile(r"\$?[A-Za-z]\w*|\d+(\.\d+)?")
+ATOM_PATTERN = re.compile(r"\$?[A-Za-z]\w*|\d+(\.\d+)?")
 """What can stand for a name as it is; anything else gets parentheses."""
 
 
-def substituted(text: str, new: Mapping[str, str]) -> tuple[str, frozenset[str]]:
+def substitute_reads(text: str, replacements: Mapping[str, str]) -> tuple[str, frozenset[str]]:
     """Return an expression in which names are replaced, and the names that were found.
 
     A name is replaced where it is read: not as a function, nor as a part of a path, a unit or
     another name, nor in `der(x)`, which says whose balance it is. What is put for a name is one
     operand: an expression gets parentheses.
     """
-    tokens = list(_tokens(text))
-    return _replaced(tokens, new, lambda position: _is_read(tokens, position))
+    tokens = list(_tokenise(text))
+    return _replace_tokens(tokens, replacements, lambda position: _is_read(tokens, position))
 
 
-def renamed(text: str, new: Mapping[str, str]) -> str:
+def rename_names(text: str, replacements: Mapping[str, str]) -> str:
     """Return an expression in which names are replaced, in `der(x)` too."""
-    tokens = list(_tokens(text))
-    return _replaced(tokens, new, lambda position: not _is_function(tokens, position))[0]
+    tokens = list(_tokenise(text))
+    return _replace_tokens(
+        tokens, replacements, lambda position: not _is_function(tokens, position)
+    )[0]
 
 
-def _replaced(
-    tokens: list[tuple[str, str]], new: Mapping[str, str], where: Callable[[int], bool]
+def _replace_tokens(
+    tokens: list[tuple[str, str]],
+    replacements: Mapping[str, str],
+    is_replaced: Callable[[int], bool],
 ) -> tuple[str, frozenset[str]]:
     found: set[str] = set()
     parts = []
     for position, (kind, part) in enumerate(tokens):
-        if kind == "name" and part in new and where(position):
+        if kind == "name" and part in replacements and is_replaced(position):
             found.add(part)
-            part = new[part] if ATOM.fullmatch(new[part]) else f"({new[part]})"
+            part = (
+                replacements[part]
+                if ATOM_PATTERN.fullmatch(replacements[part])
+                else f"({replacements[part]})"
+            )
         parts.append(part)
     return "".join(parts), frozenset(found)
 
 
-def reads(text: str) -> list[str]:
+def names_in_text(text: str) -> list[str]:
     """Return the names that an expression reads, as written, from left to right."""
-    tokens = list(_tokens(text))
+    tokens = list(_tokenise(text))
     return [
         part
         for position, (kind, part) in enumerate(tokens)
-        if kind == "name" and part not in WORDS and _is_read(tokens, position)
+        if kind == "name" and part not in KEYWORDS and _is_read(tokens, position)
     ]
 
 
-def sides(balance: str) -> tuple[str, str]:
+def split_balance(balance: str) -> tuple[str, str]:
     """Return the left and the right side of a balance; the right one is empty without a `=`."""
     left, _, right = balance.partition("=")
     return left.strip(), right.strip()
 
 
-def summands(text: str) -> list[tuple[str, str]]:
+def split_summands(text: str) -> list[tuple[str, str]]:
     """Return the top-level summands of an expression with their signs, `+` or `-`."""
-    found: list[tuple[str, str]] = []
+    result: list[tuple[str, str]] = []
     sign, part, depth, operand = "+", "", 0, False
     if text.split(" ", 1)[0] == "if":
         return [("+", text)]
-    for kind, token in _tokens(text):
+    for kind, token in _tokenise(text):
         depth += (token == "(") - (token == ")")
         if depth == 0 and kind == "mark" and token in "+-" and operand:
-            found.append((sign, part.strip()))
+            result.append((sign, part.strip()))
             sign, part, operand = token, "", False
             continue
         if kind != "blank":
             operand = kind != "mark" or token == ")"
         part += token
-    return [*found, (sign, part.strip())]
+    return [*result, (sign, part.strip())]
 
 
-def joined(parts: list[tuple[str, str]]) -> str:
+def join_summands(parts: list[tuple[str, str]]) -> str:
     """Return summands with their signs as one expression; `0` where there are none."""
     text = ""
     for sign, part in parts:
@@ -94,8 +102,8 @@ def joined(parts: list[tuple[str, str]]) -> str:
     return text or "0"
 
 
-def _tokens(text: str) -> Iterator[tuple[str, str]]:
-    for match in TOKEN.finditer(text):
+def _tokenise(text: str) -> Iterator[tuple[str, str]]:
+    for match in TOKEN_PATTERN.finditer(text):
         yield str(match.lastgroup), match.group()
 
 

@@ -8,33 +8,33 @@ from __future__ import annotations
 import math
 
 from language.matrix import (
-    TERMS,
+    SERIES_TERMS,
     Matrix,
+    abs_sum,
     add,
-    balancing,
-    exponential,
+    balance_and_scale,
+    balancing_exponents,
+    expm,
+    format_shape,
     identity,
-    ldexp,
+    ldexp_or_inf,
     multiply,
     require_finite,
     scale,
-    shape,
-    shift,
-    short_step,
+    scale_by_powers,
     solve,
     subtract,
-    sum_of_sizes,
     symmetrise,
     transpose,
 )
 
-DOUBLINGS = 32
+MAX_DOUBLINGS = 32
 """Bound of the doublings: 2^32 periods, five days at 10 kHz; an observer that slow is a mistake."""
-DECAYED = math.ldexp(1.0, -54)
+DECAY_TOLERANCE = math.ldexp(1.0, -54)
 """Row sums of A_k at which doubling stops: the next one would add 2^-108 of P's largest entry."""
 
 
-def discrete_noise(a: Matrix, q: Matrix, h: float) -> Matrix:
+def discretise_noise(a: Matrix, q: Matrix, h: float) -> Matrix:
     """Return Qd, integral of e^(A s) Q e^(A' s) over s from 0 to h [s], (n, n): noise of a period.
 
     dx = A x dt + w, w white of spectral density Q (n, n) [unit_i unit_j/s], exactly symmetric; so
@@ -45,23 +45,25 @@ def discrete_noise(a: Matrix, q: Matrix, h: float) -> Matrix:
     """
     require_covariance("discrete_noise: Q", q)
     if len(q) != len(a) or not h > 0.0:
-        raise ValueError(f"discrete_noise: A is {shape(a)}, Q is {shape(q)}, h is {h!r}")
-    x, exponents, halvings = short_step("discrete_noise", a, h)
+        raise ValueError(
+            f"discrete_noise: A is {format_shape(a)}, Q is {format_shape(q)}, h is {h!r}"
+        )
+    x, exponents, halvings = balance_and_scale("discrete_noise", a, h)
     down = tuple(-e for e in exponents)
-    rate = scale(ldexp(h, -halvings), shift(q, down, down))
+    rate = scale(ldexp_or_inf(h, -halvings), scale_by_powers(q, down, down))
     noise = rate
-    for k in range(TERMS, 1, -1):
+    for k in range(SERIES_TERMS, 1, -1):
         half = multiply(x, noise)
         noise = add(rate, scale(1.0 / k, add(half, transpose(half))))
-    phi = exponential(x, 1.0)
+    phi = expm(x, 1.0)
     for _ in range(halvings):
-        carried = multiply(multiply(phi, noise), transpose(phi))
-        noise = add(noise, symmetrise(carried))
+        propagated = multiply(multiply(phi, noise), transpose(phi))
+        noise = add(noise, symmetrise(propagated))
         phi = multiply(phi, phi)
-    return require_finite("discrete_noise: result", shift(noise, exponents, exponents))
+    return require_finite("discrete_noise: result", scale_by_powers(noise, exponents, exponents))
 
 
-def steady_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[Matrix, Matrix]:
+def steady_kalman_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[Matrix, Matrix]:
     """Return gain L = P C'(C P C' + R)^-1, (n, m), and a-priori covariance P, (n, n), symmetric.
 
     x(k+1) = Phi x(k) + w, y = C x + v; Phi (n, n) per period, Qd (n, n) [unit_i unit_j] of w, C
@@ -71,20 +73,22 @@ def steady_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[Matrix, 
     ValueError: shapes, a non-finite entry, Qd no covariance, R not positive definite, no steady
     gain because a mode that does not decay is not seen by C or not driven by Qd.
     """
-    _check(phi, qd, c, r)
+    _check_shapes(phi, qd, c, r)
     information = symmetrise(multiply(transpose(c), solve(r, c)))
-    exponents = balancing(_coupling(phi, multiply(qd, information)))
+    exponents = balancing_exponents(_coupling(phi, multiply(qd, information)))
     down = tuple(-e for e in exponents)
-    phi_b, qd_b = shift(phi, down, exponents), shift(qd, down, down)
-    c_b = shift(c, (0,) * len(r), exponents)
-    memory, p = _doubled(transpose(phi_b), shift(information, exponents, exponents), qd_b)
-    _require_settled(memory, shift(p, exponents, exponents))
-    memory, p = _improved(phi_b, qd_b, c_b, r, _gain(p, c_b, r))
-    _require_settled(memory, shift(p, exponents, exponents))
-    gain = shift(_gain(p, c_b, r), exponents, (0,) * len(r))
+    phi_b, qd_b = scale_by_powers(phi, down, exponents), scale_by_powers(qd, down, down)
+    c_b = scale_by_powers(c, (0,) * len(r), exponents)
+    memory, p = _solve_by_doubling(
+        transpose(phi_b), scale_by_powers(information, exponents, exponents), qd_b
+    )
+    _require_converged(memory, scale_by_powers(p, exponents, exponents))
+    memory, p = _refine_covariance(phi_b, qd_b, c_b, r, _kalman_gain(p, c_b, r))
+    _require_converged(memory, scale_by_powers(p, exponents, exponents))
+    gain = scale_by_powers(_kalman_gain(p, c_b, r), exponents, (0,) * len(r))
     return (
         require_finite("steady_gain: L", gain),
-        require_finite("steady_gain: P", shift(p, exponents, exponents)),
+        require_finite("steady_gain: P", scale_by_powers(p, exponents, exponents)),
     )
 
 
@@ -92,7 +96,7 @@ def require_covariance(name: str, a: Matrix) -> Matrix:
     """Return A; ValueError unless finite, square, symmetric to the last bit, diagonal >= 0."""
     require_finite(name, a)
     if len(a[0]) != len(a):
-        raise ValueError(f"{name} is {shape(a)}, not square")
+        raise ValueError(f"{name} is {format_shape(a)}, not square")
     for i, row in enumerate(a):
         if row[i] < 0.0:
             raise ValueError(f"{name}[{i}][{i}] is {row[i]!r}, a negative variance")
@@ -103,19 +107,19 @@ def require_covariance(name: str, a: Matrix) -> Matrix:
     return a
 
 
-def _check(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> None:
+def _check_shapes(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> None:
     require_finite("steady_gain: Phi", phi)
     require_finite("steady_gain: C", c)
     require_covariance("steady_gain: Qd", qd)
     require_covariance("steady_gain: R", r)
     n, m = len(qd), len(r)
-    if (shape(phi), shape(c)) != (f"({n}, {n})", f"({m}, {n})"):
-        shapes = f"Phi {shape(phi)}, Qd {shape(qd)}, C {shape(c)}, R {shape(r)}"
+    if (format_shape(phi), format_shape(c)) != (f"({n}, {n})", f"({m}, {n})"):
+        shapes = f"Phi {format_shape(phi)}, Qd {format_shape(qd)}, C {format_shape(c)}, R {format_shape(r)}"
         raise ValueError(f"steady_gain: {shapes}")
-    _require_positive("steady_gain: R", r)
+    _require_positive_definite("steady_gain: R", r)
 
 
-def _require_positive(name: str, a: Matrix) -> None:
+def _require_positive_definite(name: str, a: Matrix) -> None:
     """Raise ValueError unless A (n, n), symmetric, is positive definite: no pivot is <= 0."""
     rows = [list(row) for row in a]
     for k, row in enumerate(rows):
@@ -127,10 +131,10 @@ def _require_positive(name: str, a: Matrix) -> None:
                 below[j] -= factor * row[j]
 
 
-def _require_settled(memory: float, p: Matrix) -> None:
-    if not memory <= DECAYED:
+def _require_converged(memory: float, p: Matrix) -> None:
+    if not memory <= DECAY_TOLERANCE:
         raise ValueError(
-            f"steady_gain: not settled within 2^{DOUBLINGS} periods, memory {memory!r}, variances "
+            f"steady_gain: not settled within 2^{MAX_DOUBLINGS} periods, memory {memory!r}, variances "
             f"{[row[i] for i, row in enumerate(p)]}: a mode that does not decay is not seen by C "
             "(not detectable) or not driven by Qd"
         )
@@ -143,7 +147,7 @@ def _coupling(a: Matrix, b: Matrix) -> Matrix:
     )
 
 
-def _doubled(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
+def _solve_by_doubling(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
     """Return the memory left and H_k, (n, n), from A_0 = Phi', G_0 = G, H_0 = Qd.
 
     Chu, Fan, Lin and Wang 2004 (Int. J. Control 77, 767-788, "SDA algorithm"; the recursion of
@@ -154,7 +158,7 @@ def _doubled(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
     """
     unit = identity(len(a))
     memory = math.inf
-    for _ in range(DOUBLINGS):
+    for _ in range(MAX_DOUBLINGS):
         try:
             both = solve(add(unit, multiply(g, h)), tuple(p + q for p, q in zip(a, g, strict=True)))
         except ValueError:
@@ -164,13 +168,15 @@ def _doubled(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
         g = add(g, symmetrise(multiply(multiply(a, wg), transpose(a))))
         h = add(h, symmetrise(multiply(multiply(transpose(a), h), wa)))
         a = multiply(a, wa)
-        memory = max(sum_of_sizes(row) for row in a)
-        if memory <= DECAYED:
+        memory = max(abs_sum(row) for row in a)
+        if memory <= DECAY_TOLERANCE:
             break
     return memory, h
 
 
-def _improved(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix) -> tuple[float, Matrix]:
+def _refine_covariance(
+    phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix
+) -> tuple[float, Matrix]:
     """Return the memory left and the covariance, (n, n), that an observer with this gain reaches.
 
     Newton's method on the Riccati equation, one step (Hewer 1971, IEEE Trans. Autom. Control 16,
@@ -181,16 +187,18 @@ def _improved(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix) -> tu
     s = subtract(phi, multiply(k, c))
     p = add(qd, symmetrise(multiply(multiply(k, r), transpose(k))))
     memory = math.inf
-    for _ in range(DOUBLINGS):
+    for _ in range(MAX_DOUBLINGS):
         p = add(p, symmetrise(multiply(multiply(s, p), transpose(s))))
         s = multiply(s, s)
-        memory = max(sum_of_sizes(row) for row in s)
-        if memory <= DECAYED:
+        memory = max(abs_sum(row) for row in s)
+        if memory <= DECAY_TOLERANCE:
             break
     return memory, p
 
 
-def _gain(p: Matrix, c: Matrix, r: Matrix) -> Matrix:
+def _kalman_gain(p: Matrix, c: Matrix, r: Matrix) -> Matrix:
     """Return L = P C'(C P C' + R)^-1, (n, m), for symmetric P (n, n), C (m, n), R (m, m)."""
-    seen = multiply(c, p)
-    return transpose(solve(symmetrise(add(multiply(seen, transpose(c)), r)), seen))
+    output_covariance = multiply(c, p)
+    return transpose(
+        solve(symmetrise(add(multiply(output_covariance, transpose(c)), r)), output_covariance)
+    )

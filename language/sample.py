@@ -8,59 +8,65 @@ from collections.abc import Iterator, Mapping
 
 from language.evaluate import Scalar, evaluate
 from language.operation import Compare, Ref
-from language.question import Extent, Point, Question
-from language.traversal import parts
+from language.question import SolverQuery, Valuation, VariableDomain
+from language.traversal import subexpressions
 
-SAMPLES = 8
+SAMPLE_COUNT = 8
 """Points that are tried before z3 is asked: most guards hold at one of them."""
-MOST_SAMPLES = 64
+MAX_SAMPLE_COUNT = 64
 """Points that are tried where z3 knows nothing."""
 DEFAULT_RANGE = (-10.0, 10.0)
 """Sampled where a state or input gives no range, in SI."""
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
 
-def few_points(question: Question, narrower: Mapping[str, Extent]) -> Iterator[Point]:
+def first_sample_points(
+    query: SolverQuery, narrowed_domains: Mapping[str, VariableDomain]
+) -> Iterator[Valuation]:
     """Yield a few sample points within narrower bounds."""
-    extents = {**question.extents, **narrower}
-    for index in range(1, SAMPLES):
-        yield _sampled_point(question, extents, index)
+    extents = {**query.domains, **narrowed_domains}
+    for index in range(1, SAMPLE_COUNT):
+        yield _sample_point(query, extents, index)
 
 
-def many_points(question: Question) -> Iterator[Point]:
+def all_sample_points(query: SolverQuery) -> Iterator[Valuation]:
     """Yield many sample points, each also moved onto the boundaries that conditions name."""
-    found = [part for condition in question.conditions for part in parts(condition)]
+    found = [part for condition in query.conditions for part in subexpressions(condition)]
     relations = [part for part in found if isinstance(part, Compare)]
-    for index in range(1, MOST_SAMPLES):
-        point = _sampled_point(question, question.extents, index)
+    for index in range(1, MAX_SAMPLE_COUNT):
+        point = _sample_point(query, query.domains, index)
         yield point
         for relation in relations:
-            yield from _on_boundary(relation, point, question)
+            yield from _boundary_points(relation, point, query)
 
 
-def _sampled_point(question: Question, extents: Mapping[str, Extent], index: int) -> Point:
+def _sample_point(
+    query: SolverQuery, domains: Mapping[str, VariableDomain], index: int
+) -> Valuation:
     return {
-        name: _sample(extents[name], index, position)
-        for position, name in enumerate(question.variables)
+        name: _sample_value(domains[name], index, position)
+        for position, name in enumerate(query.variables)
     }
 
 
-def _on_boundary(relation: Compare, point: Point, question: Question) -> Iterator[Point]:
+def _boundary_points(
+    relation: Compare, point: Valuation, query: SolverQuery
+) -> Iterator[Valuation]:
     for side, other in ((relation.left, relation.right), (relation.right, relation.left)):
-        if isinstance(side, Ref) and side.name in point and not side.whole:
+        if isinstance(side, Ref) and side.name in point and not side.is_integer:
             try:
-                value = evaluate(other, ChainMap(point, dict(question.values)))
+                value = evaluate(other, ChainMap(point, dict(query.parameter_values)))
             except (KeyError, OverflowError):
                 continue
             yield {**point, side.name: value}
 
 
-def near(point: Point, question: Question) -> Iterator[Point]:
+def neighbouring_points(point: Valuation, query: SolverQuery) -> Iterator[Valuation]:
     """Yield a point of z3 and, since it is rounded, neighbours of it along each variable."""
     default = {
         name: extent.default
         for name in point
-        if (extent := question.extents[name]).default is not None
+        if (extent := query.domains[name]).default is not None
     }
     yield {**point, **default}
     yield point
@@ -68,25 +74,25 @@ def near(point: Point, question: Question) -> Iterator[Point]:
         if isinstance(value, float):
             for towards in (-math.inf, math.inf):
                 yield {**point, name: math.nextafter(value, towards)}
-    for index in range(1, SAMPLES):
+    for index in range(1, SAMPLE_COUNT):
         for position, name in enumerate(point):
-            yield {**point, name: _sample(question.extents[name], index, position)}
+            yield {**point, name: _sample_value(query.domains[name], index, position)}
 
 
-def _sample(extent: Extent, index: int, position: int) -> Scalar:
-    if extent.default is not None:
-        return extent.default
-    if extent.type == "truth":
+def _sample_value(domain: VariableDomain, index: int, position: int) -> Scalar:
+    if domain.default is not None:
+        return domain.default
+    if domain.type == "truth":
         return bool(index >> position % 6 & 1)
-    if extent.numbers:
-        inside = [number for number in extent.numbers if extent.holds(number)]
-        return inside[index % len(inside)] if inside else extent.numbers[0]
-    low = DEFAULT_RANGE[0] if extent.low is None else float(extent.low)
-    high = DEFAULT_RANGE[1] if extent.high is None else float(extent.high)
+    if domain.numbers:
+        inside = [number for number in domain.numbers if domain.holds(number)]
+        return inside[index % len(inside)] if inside else domain.numbers[0]
+    low = DEFAULT_RANGE[0] if domain.low is None else float(domain.low)
+    high = DEFAULT_RANGE[1] if domain.high is None else float(domain.high)
     low, high = min(low, high), max(low, high)
     fraction = _radical_inverse(index, PRIMES[position % len(PRIMES)])
     value = low + fraction * (high - low)
-    return math.floor(value) if extent.type == "whole" else value
+    return math.floor(value) if domain.type == "whole" else value
 
 
 def _radical_inverse(index: int, base: int) -> float:

@@ -11,174 +11,197 @@ from __future__ import annotations
 import dataclasses
 
 from language.action import (
-    committing,
-    entry,
-    first_entry,
-    reading,
+    commit_stage,
+    initial_entry_assignments,
+    lower_entry,
+    read_stage,
 )
-from language.activation import elapse
-from language.constants import derive_block, parameter_constants, values_of
+from language.activation import count_ticks
+from language.constants import constant_values, derive_block, parameter_constants
 from language.covariance import COVARIANCE_RANGE
-from language.decision import decision_block
+from language.decision import truth_table_block
 from language.evaluate import Scalar
-from language.fault import fault_names, with_fault_transitions
-from language.invariant import INVARIANTS, invariant_block
-from language.kalman import Kalman, kalman
+from language.fault import add_fault_transitions, fault_names
+from language.invariant import INVARIANTS, invariant_blocks
+from language.kalman import LoweredObserver, lower_steady_observer
 from language.limit import (
-    MICRO_STEP_LIMIT,
-    first_latched,
-    latch,
+    MICRO_STEP_LIMIT_FAULT,
+    initialise_latched_inputs,
+    latch_inputs,
 )
-from language.lower import equation_names, equations, variable_names
-from language.memory import delays_of, keep_block
-from language.micro_step import chart_blocks, chart_variables, first_entries, nothing_left
+from language.lower import equation_bindings, lower_equations, variable_bindings
+from language.memory import record_delays_block, sampled_delays_of
+from language.micro_step import (
+    chart_blocks,
+    chart_variables,
+    clear_histories,
+    lower_initial_entries,
+)
 from language.model import CHART, Automaton, Mode
 from language.operation import (
     Assign,
     Block,
     Op,
-    Run,
+    RunBlock,
     Value,
-    whole,
+    integer,
 )
-from language.past import keep_past
+from language.past import record_tick_history
 from language.problem import Problems
 from language.program import (
     Constant,
+    IntegrationInfo,
     ModeInfo,
-    MotionInfo,
     Program,
 )
-from language.recursive import recursive
-from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks
-from language.run import EVENT_LIMIT, run_motion, start_regions
+from language.recursive import lower_recursive_observer
+from language.rewind import REWIND_LIMIT, advance_blocks, rollback_blocks
+from language.run import EVENT_LIMIT, build_run_step, start_run_regions
 from language.sampled_variable import sampled_variables
-from language.situation import charting_of, names_now, names_of
-from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
-from language.tick import by_mode, silence, tick_block
-from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
+from language.situation import base_bindings, chart_context_of, current_bindings
+from language.stamp import (
+    COMPARE_STAMPS,
+    STALE_CALIBRATION,
+    calibration_stamps,
+    compare_stamps_block,
+)
+from language.tick import reset_innovations, run_region_block_by_mode, tick_block
+from language.transition import (
+    lower_sampled_commit,
+    lower_sampled_jump,
+    start_run,
+    transition_infos,
+)
 from language.wiring import (
-    assembled,
-    enter_initial,
-    finished,
-    initial_ops,
+    assemble_program,
+    enter_initial_modes,
+    finalise_program,
+    lower_initial_values,
 )
 
-STARTED = Assign("memory.started", Value(True))
+SET_STARTED = Assign("memory.started", Value(True))
 
 
-def sampled_program(automaton: Automaton, problems: Problems) -> Program:
+def lower_sampled_automaton(automaton: Automaton, problems: Problems) -> Program:
     """Return the Program of a checked sampled automaton. Raises SpecError."""
-    builder = _Sampled(automaton, problems)
-    program = builder.program()
-    problems.stop_if_any()
+    builder = _SampledLowering(automaton, problems)
+    program = builder.build()
+    problems.raise_if_errors()
     return program
 
 
-class _Sampled:
+class _SampledLowering:
     """Builds the blocks; one method per phase of the tick."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
-        automaton = with_fault_transitions(automaton)
+        automaton = add_fault_transitions(automaton)
         self.automaton = automaton
         self.problems = problems
         self.prefix = f"{automaton.name} "
         self.parameters = parameter_constants(automaton, problems)
-        self.values: dict[str, Scalar] = values_of(self.parameters)
+        self.values: dict[str, Scalar] = constant_values(self.parameters)
         self.constants: list[Constant] = list(self.parameters.values())
         self.transitions = transition_infos(automaton, problems)
-        self.observers: dict[str, Kalman] = {}
+        self.observers: dict[str, LoweredObserver] = {}
         self.faults: list[str] = []
-        self.motion: MotionInfo | None = None
-        self.before = names_of(automaton, "before")
-        self.delays = delays_of(automaton)
-        self.all, self.now = names_now(automaton)
-        self.charting = charting_of(automaton, self.transitions)
-        if self.charting and MICRO_STEP_LIMIT not in self.faults and self.charting.may_fault:
-            self.faults.append(MICRO_STEP_LIMIT)
+        self.motion_info: IntegrationInfo | None = None
+        self.previous_bindings = base_bindings(automaton, "before")
+        self.delays = sampled_delays_of(automaton)
+        self.bindings, self.base_bindings = current_bindings(automaton)
+        self.chart_context = chart_context_of(automaton, self.transitions)
+        if (
+            self.chart_context
+            and MICRO_STEP_LIMIT_FAULT not in self.faults
+            and self.chart_context.may_reach_limit
+        ):
+            self.faults.append(MICRO_STEP_LIMIT_FAULT)
 
-    def program(self) -> Program:
+    def build(self) -> Program:
         automaton = self.automaton
         modes = automaton.modes.values()
         blocks: dict[str, Block] = {}
-        of_chart = chart_variables(self.charting) if self.charting else []
+        of_chart = chart_variables(self.chart_context) if self.chart_context else []
         variables = sampled_variables(automaton, self.transitions, self.delays, of_chart)
         runs = [mode.run for mode in modes if mode.run]
         if runs:
-            motion = run_motion(automaton, runs, self.values, self.problems)
+            motion = build_run_step(automaton, runs, self.values, self.problems)
             blocks.update(motion.blocks)
             variables += motion.variables
             self.constants += motion.constants
-            self.motion = motion.info
+            self.motion_info = motion.info
         for mode in modes:
-            blocks.update(self._advance(mode))
+            blocks.update(self._advance_blocks(mode))
         for region in automaton.all_regions:
             for mode in region.modes.values():
-                blocks.update(self._phases(mode))
-        again = by_mode(automaton.chart, "equations")
-        if self.charting:
-            blocks.update(chart_blocks(self.charting, again))
+                blocks.update(self._mode_blocks(mode))
+        again = run_region_block_by_mode(automaton.root_region, "equations")
+        if self.chart_context:
+            blocks.update(chart_blocks(self.chart_context, again))
         elif automaton.regions:
-            blocks["commit"] = sampled_commit(automaton, self.transitions, self.now, again)
-        blocks.update(self._entries())
-        blocks.update(invariant_block(automaton, self.now))
-        self.problems.stop_if_any()
-        program = assembled(automaton, blocks, self.constants, variables, self.transitions)
+            blocks["commit"] = lower_sampled_commit(
+                automaton, self.transitions, self.base_bindings, again
+            )
+        blocks.update(self._entry_point_blocks())
+        blocks.update(invariant_blocks(automaton, self.base_bindings))
+        self.problems.raise_if_errors()
+        program = assemble_program(automaton, blocks, self.constants, variables, self.transitions)
         program = dataclasses.replace(
             program,
             faults=fault_names(automaton, blocks, self.faults, self.problems),
-            run_modes=self._run_modes() if runs else (),
+            run_modes=self._run_mode_infos() if runs else (),
             observers=tuple(observer.info for observer in self.observers.values()),
-            motion=self.motion,
+            integration=self.motion_info,
         )
-        return finished(program, entries=("init", "derive", STAMPS, "step", INVARIANTS))
+        return finalise_program(
+            program, entries=("init", "derive", COMPARE_STAMPS, "step", INVARIANTS)
+        )
 
-    def _phases(self, mode: Mode) -> dict[str, Block]:
+    def _mode_blocks(self, mode: Mode) -> dict[str, Block]:
         """Equations, jump and update of one mode."""
         found: dict[str, Block] = {}
         if mode.region == CHART:
-            ops = equations(mode, dict(self.now), "equation.", self.prefix)
+            ops = lower_equations(mode, dict(self.base_bindings), "equation.", self.prefix)
             found[f"equations_{mode.label}"] = tuple(ops)
-        back = rewind_blocks(self.automaton, mode, self.now)
+        back = rollback_blocks(self.automaton, mode, self.base_bindings)
         if back and REWIND_LIMIT not in self.faults:
             self.faults.append(REWIND_LIMIT)
         found.update(back)
-        if self.charting is None:
-            jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
+        if self.chart_context is None:
+            jump = lower_sampled_jump(self.automaton, mode, self.transitions, self.base_bindings)
             found[f"jump_{mode.label}"] = jump
         if mode.update:
-            found[f"update_{mode.label}"] = self._update(mode)
-            found[f"store_{mode.label}"] = self._store(mode)
+            found[f"update_{mode.label}"] = self._update_block(mode)
+            found[f"store_{mode.label}"] = self._store_block(mode)
         return found
 
-    def _entries(self) -> dict[str, Block]:
+    def _entry_point_blocks(self) -> dict[str, Block]:
         """What is run from outside, and what these run whatever the mode."""
         inputs = self.automaton.inputs
-        stamps = stamps_of(self.automaton, self.constants, self.parameters, self.problems)
+        stamps = calibration_stamps(self.automaton, self.constants, self.parameters, self.problems)
         self.constants += stamps
         if stamps and STALE_CALIBRATION not in self.faults:
             self.faults.append(STALE_CALIBRATION)
-        found: dict[str, Block] = {STAMPS: stamps_block(stamps)} if stamps else {}
+        found: dict[str, Block] = {COMPARE_STAMPS: compare_stamps_block(stamps)} if stamps else {}
         return found | {
-            "latch": latch(self.automaton),
+            "latch": latch_inputs(self.automaton),
             "remember": tuple(
                 Assign(f"before.{n}", ref)
-                for n, ref in variable_names(self.automaton, "input").items()
+                for n, ref in variable_bindings(self.automaton, "input").items()
                 if n in inputs
             ),
-            "decide": decision_block(self.automaton, self.all),
-            "keep": self._keep(),
-            "start": self._start(),
+            "decide": truth_table_block(self.automaton, self.bindings),
+            "keep": self._keep_block(),
+            "start": self._start_block(),
             "derive": derive_block(self.automaton),
-            "init": self._init(bool(stamps)),
-            "step": self._step(),
+            "init": self._init_block(bool(stamps)),
+            "step": self._step_block(),
         }
 
-    def _run_modes(self) -> tuple[ModeInfo, ...]:
+    def _run_mode_infos(self) -> tuple[ModeInfo, ...]:
         assert self.automaton.model
         return tuple(ModeInfo(m.name, m.number) for m in self.automaton.model.modes.values())
 
-    def _advance(self, mode: Mode) -> dict[str, Block]:
+    def _advance_blocks(self, mode: Mode) -> dict[str, Block]:
         """What carries the states from the tick before to this one."""
         found: dict[str, Block] = {}
         if mode.run:
@@ -186,84 +209,107 @@ class _Sampled:
                 self.faults.append(EVENT_LIMIT)
             found.update(advance_blocks(self.automaton, mode))
         if mode.observer:
-            make = recursive if mode.observer.gain == "recursive" else kalman
-            made = make(self.automaton, mode, self.before, self.now, self.values, self.problems)
+            make = (
+                lower_recursive_observer
+                if mode.observer.gain == "recursive"
+                else lower_steady_observer
+            )
+            made = make(
+                self.automaton,
+                mode,
+                self.previous_bindings,
+                self.base_bindings,
+                self.values,
+                self.problems,
+            )
             if made is None:
                 return {}
             self.observers[mode.name] = made
             self.constants += made.constants
-            found.update(made.spreads)
+            found.update(made.covariance_blocks)
             found[f"predict_{mode.name}"] = made.predict
             found[f"correct_{mode.name}"] = made.correct
-            if made.enter:
-                found[f"cover_{mode.name}"] = made.enter
-            if mode.observer.limits and COVARIANCE_RANGE not in self.faults:
+            if made.entry_covariance:
+                found[f"cover_{mode.name}"] = made.entry_covariance
+            if mode.observer.variance_limits and COVARIANCE_RANGE not in self.faults:
                 self.faults.append(COVARIANCE_RANGE)
         return found
 
-    def _update(self, mode: Mode) -> Block:
+    def _update_block(self, mode: Mode) -> Block:
         """The assignments of an update read the values of before this tick's updates."""
-        known = {**self.now, **equation_names(self.automaton, "equation.")}
-        ops = reading(self.automaton, mode.update, known, "next")
-        return (*ops, *(() if self.automaton.regions else self._store(mode)))
+        known = {**self.base_bindings, **equation_bindings(self.automaton, "equation.")}
+        ops = read_stage(self.automaton, mode.update, known, "next")
+        return (*ops, *(() if self.automaton.regions else self._store_block(mode)))
 
-    def _store(self, mode: Mode) -> Block:
+    def _store_block(self, mode: Mode) -> Block:
         """What an update computed, committed together."""
-        return tuple(committing(self.automaton, mode.update, "next"))
+        return tuple(commit_stage(self.automaton, mode.update, "next"))
 
-    def _start(self) -> Block:
+    def _start_block(self) -> Block:
         """The first tick: start values, the initial mode, no advance, only the correction."""
         initial = self.automaton.modes[self.automaton.initial]
-        ops = initial_ops(self.automaton, self.now, self.prefix)
-        ops += enter_initial(self.automaton, "memory.mode")
-        ops += nothing_left(self.charting) if self.charting else ()
+        ops = lower_initial_values(self.automaton, self.base_bindings, self.prefix)
+        ops += enter_initial_modes(self.automaton, "memory.mode")
+        ops += clear_histories(self.chart_context) if self.chart_context else ()
         if self.automaton.model and any(mode.run for mode in self.automaton.modes.values()):
-            ops += start_regions(self.automaton.model)
-        ops.append(STARTED)
-        ops += enter_run(self.automaton, initial)
-        ops += self._first_entries(initial)
-        starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
-        starts += [observer.start for observer in self.observers.values() if observer.start]
+            ops += start_run_regions(self.automaton.model)
+        ops.append(SET_STARTED)
+        ops += start_run(self.automaton, initial)
+        ops += self._initial_entries(initial)
+        starts = [
+            o.initial_covariance
+            for name, o in self.observers.items()
+            if name == initial.name and o.initial_covariance
+        ]
+        starts += [
+            observer.initial_covariance
+            for observer in self.observers.values()
+            if observer.initial_covariance
+        ]
         ops += starts[0] if starts else ()
-        ops += silence(self.observers, initial.name)
+        ops += reset_innovations(self.observers, initial.name)
         if initial.name in self.observers:
-            ops.append(Run(f"correct_{initial.name}"))
+            ops.append(RunBlock(f"correct_{initial.name}"))
         return tuple(ops)
 
-    def _first_entries(self, initial: Mode) -> Block:
+    def _initial_entries(self, initial: Mode) -> Block:
         automaton = self.automaton
-        if automaton.tree:
-            return first_entries(automaton, automaton.tree, self.now)
-        return entry(automaton, initial, first_entry(automaton), self.now)
+        if automaton.statechart:
+            return lower_initial_entries(automaton, automaton.statechart, self.base_bindings)
+        return lower_entry(
+            automaton, initial, initial_entry_assignments(automaton), self.base_bindings
+        )
 
-    def _init(self, stamps: bool) -> Block:
+    def _init_block(self, has_stamps: bool) -> Block:
         """Before the first tick: nothing has started (rule 16a)."""
         ops: list[Op] = [
-            *((Assign("memory.started", Value(False)),) if self._starts() else ()),
-            *enter_initial(self.automaton, "memory.mode"),
-            *(nothing_left(self.charting) if self.charting else ()),
-            Assign("memory.faults", whole(0)),
-            *first_latched(self.automaton),
+            *((Assign("memory.started", Value(False)),) if self._has_start_block() else ()),
+            *enter_initial_modes(self.automaton, "memory.mode"),
+            *(clear_histories(self.chart_context) if self.chart_context else ()),
+            Assign("memory.faults", integer(0)),
+            *initialise_latched_inputs(self.automaton),
         ]
-        return (*ops, Run(STAMPS)) if stamps else tuple(ops)
+        return (*ops, RunBlock(COMPARE_STAMPS)) if has_stamps else tuple(ops)
 
-    def _step(self) -> Block:
-        carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}
-        silent = {name: silence(self.observers, name) for name in self.automaton.modes}
-        keeps = bool(self._keep())
-        return tick_block(self.automaton, carried, silent, keeps, self._starts())
+    def _step_block(self) -> Block:
+        carried = {mode.name: self._advance_of_mode(mode) for mode in self.automaton.modes.values()}
+        silent = {name: reset_innovations(self.observers, name) for name in self.automaton.modes}
+        keeps = bool(self._keep_block())
+        return tick_block(self.automaton, carried, silent, keeps, self._has_start_block())
 
-    def _starts(self) -> bool:
+    def _has_start_block(self) -> bool:
         """Tell whether the first tick does more than `init` has done, or later ones advance."""
-        entered = (*enter_initial(self.automaton, "memory.mode"), STARTED)
-        return self._start() != entered or any(map(self._carried, self.automaton.modes.values()))
+        entered = (*enter_initial_modes(self.automaton, "memory.mode"), SET_STARTED)
+        return self._start_block() != entered or any(
+            map(self._advance_of_mode, self.automaton.modes.values())
+        )
 
-    def _keep(self) -> Block:
+    def _keep_block(self) -> Block:
         """What is kept of a tick once it has jumped."""
-        delayed = keep_block(self.automaton, self.delays, self.all)
-        return (*delayed, *elapse(self.automaton), *keep_past(self.automaton))
+        delayed = record_delays_block(self.automaton, self.delays, self.bindings)
+        return (*delayed, *count_ticks(self.automaton), *record_tick_history(self.automaton))
 
-    def _carried(self, mode: Mode) -> Block:
+    def _advance_of_mode(self, mode: Mode) -> Block:
         if mode.name in self.observers:
-            return (Run(f"predict_{mode.name}"), Run(f"correct_{mode.name}"))
-        return (Run(f"run_{mode.name}"),) if mode.run else ()
+            return (RunBlock(f"predict_{mode.name}"), RunBlock(f"correct_{mode.name}"))
+        return (RunBlock(f"run_{mode.name}"),) if mode.run else ()

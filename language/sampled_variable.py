@@ -8,23 +8,23 @@ from language.action import (
 )
 from language.activation import activation_variables
 from language.covariance import covariance_variables
-from language.decision import decision_variables
-from language.instant import instant_variables
+from language.decision import truth_table_variables
+from language.instant import input_change_variables
 from language.invariant import invariant_variables
 from language.kalman import observer_variables
 from language.limit import (
-    limit_variables,
+    saturation_variables,
 )
-from language.memory import Delay, memory_variables
+from language.memory import SampledDelay, sampled_delay_variables
 from language.model import Automaton
 from language.program import (
     TransitionInfo,
     Variable,
 )
-from language.rewind import rewind_variables
+from language.rewind import rollback_variables
 from language.wiring import (
     input_variables,
-    mode_and_fired,
+    region_variables,
     state_variables,
 )
 
@@ -32,8 +32,8 @@ from language.wiring import (
 def sampled_variables(
     automaton: Automaton,
     transitions: tuple[TransitionInfo, ...],
-    delays: tuple[Delay, ...],
-    of_chart: list[Variable],
+    delays: tuple[SampledDelay, ...],
+    chart_variables: list[Variable],
 ) -> list[Variable]:
     """Return the variables of a sampled automaton; `finished` leaves out what is not used."""
     found = input_variables(automaton, "input")
@@ -46,20 +46,20 @@ def sampled_variables(
     found += input_variables(automaton, "before")
     for info in transitions:
         if info.timer:
-            about = f"ticks that the guard has been true, at most {info.most}"
+            about = f"ticks that the guard has been true, at most {info.timer_limit}"
             found.append(Variable(info.timer, "whole", about=about))
     found += observer_variables(automaton)
     found += covariance_variables(automaton)
-    found += instant_variables(automaton)
-    found += memory_variables(automaton, delays)
+    found += input_change_variables(automaton)
+    found += sampled_delay_variables(automaton, delays)
     found += activation_variables(automaton)
-    found += rewind_variables(automaton)
-    found += mode_and_fired(automaton, "tick")
-    found += of_chart
+    found += rollback_variables(automaton)
+    found += region_variables(automaton, "tick")
+    found += chart_variables
     found.append(Variable("memory.started", "truth", about="the first tick is done"))
     found.append(Variable("memory.faults", "whole", about="latched fault bits"))
     found += action_variables(automaton)
-    found += decision_variables(automaton)
-    found += limit_variables(automaton)
+    found += truth_table_variables(automaton)
+    found += saturation_variables(automaton)
     found += invariant_variables(automaton)
     return list({variable.name: variable for variable in found}.values())

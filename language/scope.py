@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from language.declaration import LookupTable
-from language.kind import Kind
+from language.kind import ExprType
 from language.units import Unit
 
 
 @dataclass(frozen=True)
-class Scope:
+class NameEnvironment:
     """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
 
     `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
@@ -20,12 +20,12 @@ class Scope:
     of a chart, which are no values.
     """
 
-    names: Mapping[str, Kind | None]
+    types: Mapping[str, ExprType | None]
     modes: frozenset[str] = frozenset()
-    place: str = "here"
-    angles: Mapping[str, Unit] = field(default_factory=dict)
-    memory: frozenset[str] = frozenset()
+    location: str = "here"
+    angle_units: Mapping[str, Unit] = field(default_factory=dict)
+    memory_functions: frozenset[str] = frozenset()
     tables: Mapping[str, LookupTable] = field(default_factory=dict)
     mode: str = ""
-    owners: Mapping[str, str] = field(default_factory=dict)
+    equation_owners: Mapping[str, str] = field(default_factory=dict)
     events: frozenset[str] = frozenset()

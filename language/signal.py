@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Piece:
+class StimulusPiece:
     """An input from `start` [s] on: value + slope * (t - start), or a formula of `time` (SI)."""
 
     start: Fraction
@@ -37,9 +37,9 @@ class Stimulus:
     `column` names the column of the scenario's recording that gives the pieces instead.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[StimulusPiece, ...]
     column: str | None = None
-    truth: bool = False
+    is_bool: bool = False
 
     @property
     def steps(self) -> tuple[tuple[Fraction, Fraction], ...]:
@@ -72,7 +72,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Line:
+class DelayedSignal:
     """A delayed signal in a connection: `source` as it was `delay` [s] ago."""
 
     name: str
@@ -81,7 +81,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class RecordingUse:
+class RecordingSource:
     """The recording that a scenario takes inputs from, and how its columns become signals."""
 
     path: Path

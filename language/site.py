@@ -8,7 +8,7 @@ from language.model import Mode
 
 
 @dataclass(frozen=True)
-class Site:
+class ModeContext:
     """Where a mode stands.
 
     `position` counts the modes of the region before it; `above` is the mode around it, if any;
@@ -18,5 +18,5 @@ class Site:
     key: str
     region: str
     position: int
-    above: Mode | None = None
-    holds_modes: bool = False
+    parent: Mode | None = None
+    has_inner_modes: bool = False

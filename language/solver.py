@@ -18,15 +18,15 @@ from typing import Any, Literal
 from language.evaluate import Scalar
 from language.operation import Binary, Call, Compare, Expr, Ref, Select, Unary, Value
 from language.operators import ARITHMETIC, RELATIONS
-from language.question import Extent, Point, Question
+from language.question import SolverQuery, Valuation, VariableDomain
 
-EFFORT = 200_000
+RESOURCE_LIMIT = 200_000
 """Units of z3's own count for a proof without which a spec is refused: seconds at most."""
-SMALL_EFFORT = 10_000
+SMALL_RESOURCE_LIMIT = 10_000
 """For a warning: a tenth of a second at most; what is linear takes a tenth of that."""
-DIGITS = 20
+IRRATIONAL_DIGITS = 20
 """Decimal digits of an irrational number: more than a double has."""
-BOUNDS: Mapping[str, tuple[float, float]] = {
+FUNCTION_BOUNDS: Mapping[str, tuple[float, float]] = {
     "sin": (-1.0, 1.0),
     "cos": (-1.0, 1.0),
     "tanh": (-1.0, 1.0),
@@ -40,7 +40,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 Verdict = Literal["never", "open"]
 
 
-class Unknown(Exception):
+class UnsupportedExpressionError(Exception):
     """An expression that has no counterpart in z3."""
 
 
@@ -49,7 +49,7 @@ class Solver:
 
     def __init__(self) -> None:
         """Nothing is asked yet."""
-        self._one_at_a_time = threading.Lock()
+        self._lock = threading.Lock()
 
     @cached_property
     def z3(self) -> Any:
@@ -59,23 +59,25 @@ class Solver:
         return z3
 
     @cached_property
-    def made(self) -> dict[object, Any]:
+    def term_cache(self) -> dict[object, Any]:
         """Literals and variables that are made already: these are what takes longest."""
         return {}
 
-    def ask(self, question: Question, effort: int = EFFORT) -> Point | Verdict:
+    def solve(
+        self, query: SolverQuery, resource_limit: int = RESOURCE_LIMIT
+    ) -> Valuation | Verdict:
         """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
-        with self._one_at_a_time:
-            return self._answer(question, effort)
+        with self._lock:
+            return self._solve_locked(query, resource_limit)
 
-    def _answer(self, question: Question, effort: int) -> Point | Verdict:
+    def _solve_locked(self, query: SolverQuery, resource_limit: int) -> Valuation | Verdict:
         """Return an answer; its terms are given back to z3 before another thread has its turn."""
         solver = self.z3.Solver()
-        solver.set("rlimit", effort)
+        solver.set("rlimit", resource_limit)
         try:
-            terms = _Terms(self.z3, question, self.made)
-            wanted = [terms.of(condition) for condition in question.conditions]
-        except (Unknown, self.z3.Z3Exception):
+            terms = _TermBuilder(self.z3, query, self.term_cache)
+            wanted = [terms.build(condition) for condition in query.conditions]
+        except (UnsupportedExpressionError, self.z3.Z3Exception):
             return "open"
         solver.add(*wanted, *terms.facts)
         answer = solver.check()
@@ -84,61 +86,61 @@ class Solver:
         if answer != self.z3.sat:
             return "open"
         model = solver.model()
-        return {name: _value(model, terms.variables[name]) for name in terms.variables}
+        return {name: _model_value(model, terms.variables[name]) for name in terms.variables}
 
 
-def _value(model: Any, variable: Any) -> Scalar:
+def _model_value(model: Any, variable: Any) -> Scalar:
     """Return the value of a variable in a model, rounded once."""
     found = model.eval(variable, model_completion=True)
     if variable.sort().name() == "Bool":
         return str(found) == "True"
     if variable.is_int():
         return int(found.as_long())
-    exact = found if hasattr(found, "numerator_as_long") else found.approx(DIGITS)
+    exact = found if hasattr(found, "numerator_as_long") else found.approx(IRRATIONAL_DIGITS)
     return float(Fraction(exact.numerator_as_long(), exact.denominator_as_long()))
 
 
-class _Terms:
+class _TermBuilder:
     """The expressions of one question as terms of z3; `facts` is what holds of them anyway."""
 
-    def __init__(self, z3: Any, question: Question, made: dict[object, Any]) -> None:
+    def __init__(self, z3: Any, query: SolverQuery, term_cache: dict[object, Any]) -> None:
         self.z3 = z3
-        self.made = made
-        self.question = question
+        self.term_cache = term_cache
+        self.query = query
         self.variables: dict[str, Any] = {}
         self.facts: list[Any] = []
-        self.known: dict[str, Any] = {}
+        self.terms_by_name: dict[str, Any] = {}
         self.roots: dict[int, Any] = {}
-        read = question.read
-        for target, value in question.steps:
+        read = query.names_read
+        for target, value in query.assignments:
             if target in read:
-                self.known[target] = self.of(value)
+                self.terms_by_name[target] = self.build(value)
 
-    def of(self, expr: Expr) -> Any:
+    def build(self, expr: Expr) -> Any:
         """Return the term of an expression."""
         z3 = self.z3
         match expr:
             case Value(value):
                 return self._literal(value)
             case Ref(name):
-                return self._named(name)
+                return self._term_of_name(name)
             case Unary("-", operand):
-                return -self.of(operand)
+                return -self.build(operand)
             case Unary("not", operand):
-                return z3.Not(self.of(operand))
+                return z3.Not(self.build(operand))
             case Binary("and", left, right):
-                return z3.And(self.of(left), self.of(right))
+                return z3.And(self.build(left), self.build(right))
             case Binary("or", left, right):
-                return z3.Or(self.of(left), self.of(right))
+                return z3.Or(self.build(left), self.build(right))
             case Binary(operator, left, right):
-                return ARITHMETIC[operator](self.of(left), self.of(right))
+                return ARITHMETIC[operator](self.build(left), self.build(right))
             case Compare(operator, left, right):
-                return RELATIONS[operator](self.of(left), self.of(right))
+                return RELATIONS[operator](self.build(left), self.build(right))
             case Select(condition, then, other):
-                return z3.If(self.of(condition), self.of(then), self.of(other))
+                return z3.If(self.build(condition), self.build(then), self.build(other))
             case Call(function, arguments):
-                return self._call(function, arguments)
-        raise Unknown
+                return self._build_call(function, arguments)
+        raise UnsupportedExpressionError
 
     def _literal(self, value: Scalar) -> Any:
         if isinstance(value, bool):
@@ -146,51 +148,51 @@ class _Terms:
         if isinstance(value, int):
             return self.z3.IntVal(value)
         if not math.isfinite(value):
-            raise Unknown
+            raise UnsupportedExpressionError
         return self._exact(Fraction(value))
 
     def _exact(self, value: Fraction) -> Any:
-        if value not in self.made:
-            self.made[value] = self.z3.RealVal(f"{value.numerator}/{value.denominator}")
-        return self.made[value]
+        if value not in self.term_cache:
+            self.term_cache[value] = self.z3.RealVal(f"{value.numerator}/{value.denominator}")
+        return self.term_cache[value]
 
-    def _named(self, name: str) -> Any:
-        if name not in self.known:
-            if name in self.question.extents:
-                self.known[name] = self._variable(name, self.question.extents[name])
-            elif isinstance(self.question.values.get(name), float | int | bool):
-                self.known[name] = self._literal(self.question.values[name])
+    def _term_of_name(self, name: str) -> Any:
+        if name not in self.terms_by_name:
+            if name in self.query.domains:
+                self.terms_by_name[name] = self._variable(name, self.query.domains[name])
+            elif isinstance(self.query.parameter_values.get(name), float | int | bool):
+                self.terms_by_name[name] = self._literal(self.query.parameter_values[name])
             else:
-                raise Unknown
-        return self.known[name]
+                raise UnsupportedExpressionError
+        return self.terms_by_name[name]
 
-    def _variable(self, name: str, extent: Extent) -> Any:
-        key = name, extent
-        if key not in self.made:
-            self.made[key] = self._made(name, extent)
-        self.variables[name], facts = self.made[key]
+    def _variable(self, name: str, domain: VariableDomain) -> Any:
+        key = name, domain
+        if key not in self.term_cache:
+            self.term_cache[key] = self._declare_variable(name, domain)
+        self.variables[name], facts = self.term_cache[key]
         self.facts += facts
         return self.variables[name]
 
-    def _made(self, name: str, extent: Extent) -> tuple[Any, list[Any]]:
+    def _declare_variable(self, name: str, domain: VariableDomain) -> tuple[Any, list[Any]]:
         """Return a variable and what its extent says of it."""
         z3 = self.z3
-        term = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[extent.type](name)
+        term = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[domain.type](name)
         facts = []
-        if extent.low is not None:
-            facts.append(term >= self._exact(extent.low))
-        if extent.high is not None:
-            facts.append(term <= self._exact(extent.high))
-        if extent.numbers:
-            facts.append(z3.Or(*(term == number for number in extent.numbers)))
+        if domain.low is not None:
+            facts.append(term >= self._exact(domain.low))
+        if domain.high is not None:
+            facts.append(term <= self._exact(domain.high))
+        if domain.numbers:
+            facts.append(z3.Or(*(term == number for number in domain.numbers)))
         return term, facts
 
-    def _call(self, function: str, arguments: tuple[Expr, ...]) -> Any:
+    def _build_call(self, function: str, arguments: tuple[Expr, ...]) -> Any:
         z3 = self.z3
         if function in ("lookup", "lookup2"):
             count = 1 if function == "lookup" else 2
             return self._lookup(arguments[-1 - count], arguments[-count:])
-        terms = [self.of(argument) for argument in arguments]
+        terms = [self.build(argument) for argument in arguments]
         first = terms[0]
         match function:
             case "real":
@@ -211,11 +213,11 @@ class _Terms:
                 low, high = terms[1:]
                 return z3.If(first > low, z3.If(first < high, first, high), low)
             case "sqrt":
-                return self._root(first)
-        low, high = BOUNDS.get(function, (-math.inf, math.inf))
-        return self._any(function, terms, low, high)
+                return self._square_root(first)
+        low, high = FUNCTION_BOUNDS.get(function, (-math.inf, math.inf))
+        return self._uninterpreted(function, terms, low, high)
 
-    def _root(self, square: Any) -> Any:
+    def _square_root(self, square: Any) -> Any:
         """Return a number that is not negative and gives the square, where there is one."""
         if square.get_id() not in self.roots:
             root = self.z3.FreshReal("sqrt")
@@ -224,13 +226,13 @@ class _Terms:
         return self.roots[square.get_id()]
 
     def _lookup(self, table: Expr, arguments: tuple[Expr, ...]) -> Any:
-        items = self.question.values.get(table.name) if isinstance(table, Ref) else None
+        items = self.query.parameter_values.get(table.name) if isinstance(table, Ref) else None
         if not isinstance(table, Ref) or not isinstance(items, tuple):
-            raise Unknown
+            raise UnsupportedExpressionError
         terms = [self.of(argument) for argument in arguments]
         return self._any(f"lookup {table.name}", terms, min(items), max(items))
 
-    def _any(self, function: str, terms: list[Any], low: float, high: float) -> Any:
+    def _uninterpreted(self, function: str, terms: list[Any], low: float, high: float) -> Any:
         """Return what any function within bounds gives: equal arguments have equal values."""
         z3 = self.z3
         made = z3.Function(function, *[z3.RealSort()] * (len(terms) + 1))(*terms)

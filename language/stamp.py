@@ -10,11 +10,11 @@ from language.problem import Problems
 from language.program import Constant
 
 STALE_CALIBRATION = "stale_calibration"
-STAMPS = "compare_stamps"
+COMPARE_STAMPS = "compare_stamps"
 """The block that compares: run before the first tick and after a change of the page (rule C15)."""
 
 
-def stamps_of(
+def calibration_stamps(
     automaton: Automaton,
     constants: Iterable[Constant],
     parameters: Mapping[str, Constant],
@@ -34,7 +34,7 @@ def stamps_of(
     return tuple(found)
 
 
-def stamps_block(stamps: Iterable[Constant]) -> Block:
+def compare_stamps_block(stamps: Iterable[Constant]) -> Block:
     """Return what compares the calibration with the stamps."""
     ops: list[Op] = []
     for stamp in stamps:

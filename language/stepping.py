@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.field import Field, by_mode
+from language.field import VectorField, run_block_by_mode
 from language.lower import WHOLE_TYPES
 from language.model import Mode
 from language.motion import merge_time
@@ -26,14 +26,14 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Expr,
     FaultBit,
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
+    Switch,
     Unary,
     Value,
     add,
@@ -42,50 +42,50 @@ from language.operation import (
     subtract,
 )
 from language.program import Alarm, TransitionInfo, Variable
-from language.traversal import reached, reads
-from language.wiring import any_fired, none_fired
+from language.traversal import names_used, reachable_blocks
+from language.wiring import any_fired_condition, clear_fired
 
-EVENTS_PER_STEP = 100
+MAX_EVENTS_PER_STEP = 100
 """More located events than this within one major step are Zeno behaviour (rule 12)."""
 ZENO = "zeno"
 LIVELOCK = "livelock"
-BETWEEN = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
+STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
 """What an engine sets before these blocks and reads after them."""
 
 
 @dataclass(frozen=True)
-class Wait:
+class WaitTimer:
     """Something that is due a time after it began, while a mode of a region is active.
 
     That of a transition begins when its guard turns true; `after` and `every` begin on entry.
     """
 
     timer: str
-    time: Fraction
+    duration: Fraction
     region: str
     mode: int
     is_running: Expr
-    end: Block
-    begin: Block
+    on_end: Block
+    on_begin: Block
     is_restarted: bool
 
     @property
-    def load(self) -> Assign:
+    def restart(self) -> Assign:
         """What puts the timer at its start."""
-        return Assign(self.timer, real(self.time))
+        return Assign(self.timer, real(self.duration))
 
 
-Waits = tuple[Wait, ...]
+WaitTimers = tuple[WaitTimer, ...]
 
 
-def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Waits:
+def wait_timers_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> WaitTimers:
     """Return the waits of transitions, and those of `after`."""
     found = []
     for info in infos:
         if info.timer:
             armed = Ref(f"memory.armed_{info.slot}")
             place = (info.timer, info.wait, info.region, info.source)
-            found.append(Wait(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
+            found.append(WaitTimer(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
     for number, alarm in enumerate(alarms, start=1):
         rings, silent = Assign(alarm.variable, Value(True)), Assign(alarm.variable, Value(False))
         timer = f"timer.after_{number}"
@@ -93,7 +93,7 @@ def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Wa
         if alarm.repeats:
             end = (rings, Assign(timer, add(Ref(timer), real(alarm.time))))
         place = (timer, alarm.time, alarm.region, alarm.mode)
-        found.append(Wait(*place, Unary("not", Ref(alarm.variable)), end, (silent,), False))
+        found.append(WaitTimer(*place, Unary("not", Ref(alarm.variable)), end, (silent,), False))
     return tuple(found)
 
 
@@ -101,42 +101,44 @@ BlocksByMode = Mapping[tuple[str, int], Block]
 """Blocks by the region and the number of the mode."""
 
 
-def begun(waits: Waits) -> BlocksByMode:
+def begin_blocks(waits: WaitTimers) -> BlocksByMode:
     """Return what begins when a mode is entered; waits of transitions are at their start."""
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
-        found.setdefault((wait.region, wait.mode), []).extend((*wait.begin, wait.load))
+        found.setdefault((wait.region, wait.mode), []).extend((*wait.on_begin, wait.restart))
     return {place: tuple(ops) for place, ops in found.items()}
 
 
-def ended(waits: Waits) -> BlocksByMode:
+def end_blocks(waits: WaitTimers) -> BlocksByMode:
     """Return what puts the waits of a mode that is left back to their start (rule 4)."""
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
         if wait.is_restarted:
-            found.setdefault((wait.region, wait.mode), []).append(wait.load)
+            found.setdefault((wait.region, wait.mode), []).append(wait.restart)
     return {place: tuple(ops) for place, ops in found.items()}
 
 
-def of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
+def block_of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
     """Return the block of a mode, empty where it has none."""
     return blocks.get((mode.region, mode.number), ())
 
 
-def stepping_blocks(field: Field, waits: Waits, ages: tuple[str, ...]) -> dict[str, Block]:
-    """Return the blocks of the module's text; `ages` [s] are times since a major step's record."""
+def major_step_blocks(
+    field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]
+) -> dict[str, Block]:
+    """Return the blocks of the module's text; `age_variables` [s] are times since a major step's record."""
     inputs = field.automaton.inputs
     return {
         "latch": tuple(Assign(f"before.{name}", Ref(f"input.{name}")) for name in inputs),
-        "limit": _limit(field, waits),
-        "elapse": _elapse(field, waits, ages),
-        "load": _each_wait(field, tuple(w for w in waits if w.is_restarted), _load),
-        "settle": _settle(field),
-        "segment": _segment(field),
+        "limit": _limit_block(field, waits),
+        "elapse": _elapse_block(field, waits, age_variables),
+        "load": _for_each_wait(field, tuple(w for w in waits if w.is_restarted), _restart_if_idle),
+        "settle": _settle_block(field),
+        "segment": _segment_block(field),
     }
 
 
-def stepping_variables(field: Field, waits: Waits) -> list[Variable]:
+def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable]:
     """Return the variables of these blocks."""
     return [
         *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),
@@ -152,16 +154,16 @@ def stepping_variables(field: Field, waits: Waits) -> list[Variable]:
     ]
 
 
-def is_over(info: TransitionInfo) -> Expr:
+def is_wait_over(info: TransitionInfo) -> Expr:
     """Whether the wait of a transition is over."""
     assert info.timer
     return Compare("<=", Ref(info.timer), real(0.0))
 
 
-def _limit(field: Field, waits: Waits) -> Block:
+def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
     h = Ref("work.h")
 
-    def shorter(wait: Wait) -> Block:
+    def shorter(wait: WaitTimer) -> Block:
         timer = Ref(wait.timer)
         near = Compare("<=", timer, add(h, Ref("work.merge")))
         ends = Binary("and", wait.is_running, near)
@@ -170,13 +172,13 @@ def _limit(field: Field, waits: Waits) -> Block:
 
     return (
         Assign(h.name, Ref("work.left")),
-        Assign("work.merge", _merge(field)),
+        Assign("work.merge", _merge_window(field)),
         Assign("work.is_wait", Value(False)),
-        *_each_wait(field, waits, shorter),
+        *_for_each_wait(field, waits, shorter),
     )
 
 
-def _merge(field: Field) -> Expr:
+def _merge_window(field: VectorField) -> Expr:
     """What is one instant (language/motion.py): of a float32 it is a part of the step."""
     step, numbers = field.automaton.step, field.automaton.numbers
     if numbers == "float32":
@@ -186,15 +188,17 @@ def _merge(field: Field) -> Expr:
     return multiply(per_second, Call("max", (end, real(step))))
 
 
-def _elapse(field: Field, waits: Waits, ages: tuple[str, ...]) -> Block:
+def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]) -> Block:
     """Time passes; what is nearer than `work.merge` is at the same instant (rule 10)."""
     elapsed, left = Ref("work.elapsed"), Ref("work.left")
     h, merge = Ref("work.h"), Ref("work.merge")
     near = Binary("and", Ref("work.crossed"), Compare("<=", subtract(h, elapsed), merge))
 
-    def passes(wait: Wait) -> Block:
+    def passes(wait: WaitTimer) -> Block:
         timer = Ref(wait.timer)
-        over = Branch(Compare("<=", timer, merge), (*wait.end, Assign("work.event", Value(True))))
+        over = Branch(
+            Compare("<=", timer, merge), (*wait.on_end, Assign("work.event", Value(True)))
+        )
         return (Branch(wait.is_running, (Assign(timer.name, subtract(timer, elapsed)), over)),)
 
     return (
@@ -203,68 +207,70 @@ def _elapse(field: Field, waits: Waits, ages: tuple[str, ...]) -> Block:
         Assign(left.name, subtract(left, elapsed)),
         Branch(Compare("<=", left, merge), (Assign(left.name, real(0.0)),)),
         Assign("memory.time", add(Ref("memory.time"), elapsed)),
-        *(Assign(name, add(Ref(name), elapsed)) for name in ages),
-        *_each_wait(field, waits, passes),
+        *(Assign(name, add(Ref(name), elapsed)) for name in age_variables),
+        *_for_each_wait(field, waits, passes),
     )
 
 
-def _load(wait: Wait) -> Block:
+def _restart_if_idle(wait: WaitTimer) -> Block:
     """A wait is at its start while its guard is false (rule 4)."""
-    return (Branch(wait.is_running, (), (wait.load,)),)
+    return (Branch(wait.is_running, (), (wait.restart,)),)
 
 
-def _settle(field: Field) -> Block:
+def _settle_block(field: VectorField) -> Block:
     regions = field.automaton.all_regions
     bound = sum(len(region.modes) for region in regions)
     going = Ref("work.is_settling")
-    fired = any_fired(field.automaton)
-    micro_step: Block = (Branch(going, (Run("jump"), Assign(going.name, fired))),)
+    fired = any_fired_condition(field.automaton)
+    micro_step: Block = (Branch(going, (RunBlock("jump"), Assign(going.name, fired))),)
     return (
         Assign(going.name, Value(True)),
         Loop(bound + 1, "work.micro_step", micro_step),
-        Branch(going, (FaultBit(LIVELOCK), *none_fired(field.automaton))),
-        Run("watch"),
+        Branch(going, (FaultBit(LIVELOCK), *clear_fired(field.automaton))),
+        RunBlock("watch"),
     )
 
 
-def _segment(field: Field) -> Block:
+def _segment_block(field: VectorField) -> Block:
     inside = Binary("and", Ref("work.event"), Compare(">", Ref("work.left"), real(0.0)))
     return (
-        Run("limit"),
-        by_mode(field, "move"),
-        Run("elapse"),
-        Branch(inside, (Run("settle"),)),
+        RunBlock("limit"),
+        run_block_by_mode(field, "move"),
+        RunBlock("elapse"),
+        Branch(inside, (RunBlock("settle"),)),
     )
 
 
-def step_block(field: Field, has_record: bool, blocks: Mapping[str, Block]) -> Block:
+def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, Block]) -> Block:
     """Return the block of one major step; `blocks` are those that it runs."""
     left, event = Ref("work.left"), Ref("work.event")
     is_left = Compare(">", left, real(0.0))
-    segments = Loop(EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (Run("segment"),)),))
+    segments = Loop(
+        MAX_EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (RunBlock("segment"),)),)
+    )
     flow: Block = (
-        *((Run("record"),) if has_record else ()),
+        *((RunBlock("record"),) if has_record else ()),
         Assign(left.name, real(field.automaton.step)),
         Assign(event.name, Value(False)),
         segments,
         Branch(is_left, (FaultBit(ZENO),)),
-        *_due(field, event, blocks),
-        Run("latch"),
+        *_detect_input_change(field, event, blocks),
+        RunBlock("latch"),
     )
-    enter: Block = (Run("latch"), Run("start"), Assign(event.name, Value(True)))
+    enter: Block = (RunBlock("latch"), RunBlock("start"), Assign(event.name, Value(True)))
     return (
         Branch(Ref("memory.started"), flow, enter),
-        Branch(event, (Run("settle"),)),
-        Run("equations"),
+        Branch(event, (RunBlock("settle"),)),
+        RunBlock("equations"),
     )
 
 
-def _due(field: Field, event: Ref, blocks: Mapping[str, Block]) -> Block:
+def _detect_input_change(field: VectorField, event: Ref, blocks: Mapping[str, Block]) -> Block:
     """Guards are read again if something happened at the end of the step, or if an input that is
     read there is another one.
     """
     due: Expr = event
-    read = reads(blocks[name] for name in reached("settle", blocks))
+    read = names_used(blocks[name] for name in reachable_blocks("settle", blocks))
     for name, thing in field.automaton.inputs.items():
         if f"before.{name}" not in read:
             continue
@@ -274,14 +280,16 @@ def _due(field: Field, event: Ref, blocks: Mapping[str, Block]) -> Block:
     return () if due == event else (Assign(event.name, due),)
 
 
-def _each_wait(field: Field, waits: Waits, block: Callable[[Wait], Block]) -> tuple[Choose, ...]:
+def _for_each_wait(
+    field: VectorField, waits: WaitTimers, block_of: Callable[[WaitTimer], Block]
+) -> tuple[Switch, ...]:
     """Return a block for each wait of the active modes: one choice for each region that waits."""
     found = []
     for region in field.automaton.all_regions:
         cases: dict[int, Block] = {}
         for wait in waits:
             if wait.region == region.name:
-                cases[wait.mode] = (*cases.get(wait.mode, ()), *block(wait))
+                cases[wait.mode] = (*cases.get(wait.mode, ()), *block_of(wait))
         if cases:
-            found.append(Choose(field.mode_of(region.name), tuple(cases.items())))
+            found.append(Switch(field.mode_variable_of(region.name), tuple(cases.items())))
     return tuple(found)

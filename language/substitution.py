@@ -10,7 +10,6 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -19,13 +18,14 @@ from language.operation import (
     Op,
     Select,
     Store,
+    Switch,
     Unary,
 )
 
-Change = Callable[[Expr], Expr]
+ExprTransform = Callable[[Expr], Expr]
 
 
-def parts(expr: Expr) -> tuple[Expr, ...]:
+def operands(expr: Expr) -> tuple[Expr, ...]:
     """Return the direct operands of an expression."""
     if isinstance(expr, (Binary, Compare)):
         return expr.left, expr.right
@@ -38,36 +38,40 @@ def parts(expr: Expr) -> tuple[Expr, ...]:
     return (expr.index,) if isinstance(expr, Item) else ()
 
 
-def with_parts(expr: Expr, change: Change) -> Expr:
+def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
     """Return an expression with its direct operands changed: itself where none is another one."""
     if isinstance(expr, (Binary, Compare)):
-        left, right = change(expr.left), change(expr.right)
+        left, right = transform(expr.left), transform(expr.right)
         is_same = left is expr.left and right is expr.right
         return expr if is_same else type(expr)(expr.operator, left, right)  # type: ignore[arg-type]
     if isinstance(expr, Call):
-        arguments = tuple(change(argument) for argument in expr.arguments)
+        arguments = tuple(transform(argument) for argument in expr.arguments)
         is_same = all(new is old for new, old in zip(arguments, expr.arguments, strict=True))
         return expr if is_same else Call(expr.function, arguments)
     if isinstance(expr, Unary):
-        operand = change(expr.operand)
+        operand = transform(expr.operand)
         return expr if operand is expr.operand else Unary(expr.operator, operand)
     if isinstance(expr, Select):
-        condition, then, other = change(expr.condition), change(expr.then), change(expr.other)
+        condition, then, other = (
+            transform(expr.condition),
+            transform(expr.then),
+            transform(expr.other),
+        )
         old = expr.condition, expr.then, expr.other
         is_same = condition is old[0] and then is old[1] and other is old[2]
         return expr if is_same else Select(condition, then, other)
     if isinstance(expr, Item):
-        index = change(expr.index)
-        return expr if index is expr.index else Item(expr.name, index, expr.whole)
+        index = transform(expr.index)
+        return expr if index is expr.index else Item(expr.name, index, expr.is_integer)
     return expr
 
 
-def with_expressions(block: Block, change: Change) -> Block:
+def map_expressions(block: Block, transform: ExprTransform) -> Block:
     """Return a block with every expression that an operation reads changed."""
-    return tuple(_op(op, change) for op in block)
+    return tuple(_map_op(op, transform) for op in block)
 
 
-def own_expressions(op: Op) -> tuple[Expr, ...]:
+def direct_expressions(op: Op) -> tuple[Expr, ...]:
     """Return the expressions that an operation reads itself, not those of blocks inside it."""
     match op:
         case Assign(_, value, _):
@@ -80,27 +84,27 @@ def own_expressions(op: Op) -> tuple[Expr, ...]:
             return ()
 
 
-def subexpressions(expr: Expr) -> Iterator[Expr]:
+def walk_post_order(expr: Expr) -> Iterator[Expr]:
     """Yield an expression and all inside it, the innermost first."""
-    for part in parts(expr):
-        yield from subexpressions(part)
+    for part in operands(expr):
+        yield from walk_post_order(part)
     yield expr
 
 
-def _op(op: Op, change: Change) -> Op:
+def _map_op(op: Op, transform: ExprTransform) -> Op:
     match op:
         case Assign(target, value, key):
-            return Assign(target, change(value), key)
+            return Assign(target, transform(value), key)
         case Store(array, index, value):
-            return Store(array, change(index), change(value))
+            return Store(array, transform(index), transform(value))
         case Branch(condition, then, other):
-            inner = (with_expressions(block, change) for block in (then, other))
-            return Branch(change(condition), *inner)
-        case Choose(selector, cases):
-            return Choose(selector, tuple((k, with_expressions(b, change)) for k, b in cases))
+            inner = (map_expressions(block, transform) for block in (then, other))
+            return Branch(transform(condition), *inner)
+        case Switch(selector, cases):
+            return Switch(selector, tuple((k, map_expressions(b, transform)) for k, b in cases))
         case Loop(count, index, body):
-            return Loop(count, index, with_expressions(body, change))
+            return Loop(count, index, map_expressions(body, transform))
         case Count(timer, condition, limit, key):
-            return Count(timer, change(condition), limit, key)
+            return Count(timer, transform(condition), limit, key)
         case _:
             return op

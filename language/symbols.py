@@ -22,7 +22,7 @@ PREFIXES = {
     "u": Fraction(1, 10**6),
     "n": Fraction(1, 10**9),
 }
-PREFIXED: Mapping[str, tuple[Powers, str]] = {
+PREFIXED_SYMBOLS: Mapping[str, tuple[Powers, str]] = {
     # symbol: powers of m, kg, s, A, K, prefixes that are known
     "m": ((1, 0, 0, 0, 0), "kcm"),
     "A": ((0, 0, 0, 1, 0), "m"),
@@ -40,15 +40,15 @@ PREFIXED: Mapping[str, tuple[Powers, str]] = {
 }
 TIME: Powers = (0, 0, 1, 0, 0)
 MASS: Powers = (0, 1, 0, 0, 0)
-WORK: Powers = (2, 1, -2, 0, 0)
+ENERGY: Powers = (2, 1, -2, 0, 0)
 CHARGE: Powers = (0, 0, 1, 1, 0)
 TEMPERATURE: Powers = (0, 0, 0, 0, 1)
-NOTHING: Powers = (0, 0, 0, 0, 0)
+DIMENSIONLESS: Powers = (0, 0, 0, 0, 0)
 
 SYMBOLS: Mapping[str, Symbol] = {
     **{
         prefix + symbol: (PREFIXES[prefix], powers, 0)
-        for symbol, (powers, prefixes) in PREFIXED.items()
+        for symbol, (powers, prefixes) in PREFIXED_SYMBOLS.items()
         for prefix in ("", *prefixes)
     },
     "kg": (Fraction(1), MASS, 0),
@@ -58,23 +58,23 @@ SYMBOLS: Mapping[str, Symbol] = {
     "us": (Fraction(1, 10**6), TIME, 0),
     "min": (Fraction(60), TIME, 0),
     "h": (Fraction(3600), TIME, 0),
-    "Wh": (Fraction(3600), WORK, 0),
-    "kWh": (Fraction(3600 * 1000), WORK, 0),
+    "Wh": (Fraction(3600), ENERGY, 0),
+    "kWh": (Fraction(3600 * 1000), ENERGY, 0),
     "Ah": (Fraction(3600), CHARGE, 0),
     "mAh": (Fraction(3600, 1000), CHARGE, 0),
     "bar": (Fraction(10**5), (-1, 1, -2, 0, 0), 0),
     "L": (Fraction(1, 1000), (3, 0, 0, 0, 0), 0),
     "K": (Fraction(1), TEMPERATURE, 0),
     "degC": (Fraction(1), TEMPERATURE, 0),
-    "percent": (Fraction(1, 100), NOTHING, 0),
-    "rad": (Fraction(1), NOTHING, 1),
-    "mrad": (Fraction(1, 1000), NOTHING, 1),
-    "deg": (PI / 180, NOTHING, 1),
-    "rev": (2 * PI, NOTHING, 1),
+    "percent": (Fraction(1, 100), DIMENSIONLESS, 0),
+    "rad": (Fraction(1), DIMENSIONLESS, 1),
+    "mrad": (Fraction(1, 1000), DIMENSIONLESS, 1),
+    "deg": (PI / 180, DIMENSIONLESS, 1),
+    "rev": (2 * PI, DIMENSIONLESS, 1),
     "rpm": (2 * PI / 60, (0, 0, -1, 0, 0), 1),
 }
 
-OFTEN_WRITTEN: Mapping[str, str] = {
+MISSPELLED_UNITS: Mapping[str, str] = {
     **dict.fromkeys(("Nm", "NM"), "N*m"),
     **dict.fromkeys(("Nms", "Nm*s"), "N*m*s"),
     **dict.fromkeys(("kmh", "kmph", "kph", "km/hr"), "km/h"),

@@ -13,7 +13,7 @@ from language.units import NO_UNIT, Unit
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class NumberLiteral:
     """A literal: its exact value in SI and its unit. A bare 0 goes with any dimension."""
 
     value: Fraction
@@ -27,7 +27,7 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class BoolLiteral:
     """`true` or `false`."""
 
     value: bool
@@ -43,10 +43,10 @@ class Name:
 
 
 @dataclass(frozen=True, slots=True)
-class Negative:
+class Negation:
     """Unary minus."""
 
-    operand: Tree
+    operand: SyntaxTree
     span: Span
 
 
@@ -54,7 +54,7 @@ class Negative:
 class Not:
     """Logical negation."""
 
-    operand: Tree
+    operand: SyntaxTree
     span: Span
 
 
@@ -63,8 +63,8 @@ class Arithmetic:
     """`+ - * /` of two operands."""
 
     operator: str
-    left: Tree
-    right: Tree
+    left: SyntaxTree
+    right: SyntaxTree
     span: Span
 
 
@@ -73,8 +73,8 @@ class Logic:
     """`and`, `or`; both sides are evaluated."""
 
     operator: str
-    left: Tree
-    right: Tree
+    left: SyntaxTree
+    right: SyntaxTree
     span: Span
 
 
@@ -83,8 +83,8 @@ class Relation:
     """One relation of two sums."""
 
     operator: str
-    left: Tree
-    right: Tree
+    left: SyntaxTree
+    right: SyntaxTree
     span: Span
 
 
@@ -92,125 +92,125 @@ class Relation:
 class Power:
     """`x^n` with a literal integer n."""
 
-    base: Tree
+    base: SyntaxTree
     exponent: int
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Conditional:
     """`if c then a else b`."""
 
-    condition: Tree
-    then: Tree
-    other: Tree
+    condition: SyntaxTree
+    then: SyntaxTree
+    other: SyntaxTree
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
-class Application:
+class FunctionCall:
     """A function applied to arguments."""
 
     function: str
-    arguments: tuple[Tree, ...]
+    arguments: tuple[SyntaxTree, ...]
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
-class Broken:
+class ErrorNode:
     """An expression that could not be read; its problem is reported already."""
 
     span: Span
 
 
-Tree = (
-    Broken
-    | Number
-    | Truth
+SyntaxTree = (
+    ErrorNode
+    | NumberLiteral
+    | BoolLiteral
     | Name
-    | Negative
+    | Negation
     | Not
     | Arithmetic
     | Logic
     | Relation
     | Power
-    | Choice
-    | Application
+    | Conditional
+    | FunctionCall
 )
 
 
-KEPT = ("previous", "delay")
-EDGES = ("rising", "falling", "changed")
-TIMES = ("after", "every")
-MEMORY = (*KEPT, *EDGES, *TIMES)
+DELAY_FUNCTIONS = ("previous", "delay")
+EDGE_FUNCTIONS = ("rising", "falling", "changed")
+TIME_FUNCTIONS = ("after", "every")
+MEMORY_FUNCTIONS = (*DELAY_FUNCTIONS, *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
 """Functions with memory."""
 
 
-def memory_key(tree: Application) -> str:
+def memory_key(tree: FunctionCall) -> str:
     """Return the name under which the value of a function with memory is known."""
-    return f"{tree.function} {form(tree.arguments)}"
+    return f"{tree.function} {structural_key(tree.arguments)}"
 
 
-def names(tree: Tree) -> list[Name]:
+def names(tree: SyntaxTree) -> list[Name]:
     """Return every name read in the tree, from left to right."""
     return [part for part in walk(tree) if isinstance(part, Name)]
 
 
-def walk(tree: Tree) -> list[Tree]:
+def walk(tree: SyntaxTree) -> list[SyntaxTree]:
     """Return every part of the tree, parents first, from left to right."""
-    found: list[Tree] = []
+    result: list[SyntaxTree] = []
     stack = [tree]
     while stack:
         part = stack.pop()
-        found.append(part)
-        parts = PARTS.get(type(part))
+        result.append(part)
+        parts = CHILDREN_BY_TYPE.get(type(part))
         if parts is not None:
             stack += parts(part)[::-1]
-    return found
+    return result
 
 
-def children(tree: Tree) -> tuple[Tree, ...]:
+def children(tree: SyntaxTree) -> tuple[SyntaxTree, ...]:
     """Return the direct parts of a tree."""
-    parts = PARTS.get(type(tree))
+    parts = CHILDREN_BY_TYPE.get(type(tree))
     return () if parts is None else parts(tree)
 
 
-PARTS: Mapping[type, Callable[[Any], tuple[Tree, ...]]] = {
-    Negative: lambda tree: (tree.operand,),
+CHILDREN_BY_TYPE: Mapping[type, Callable[[Any], tuple[SyntaxTree, ...]]] = {
+    Negation: lambda tree: (tree.operand,),
     Not: lambda tree: (tree.operand,),
     Arithmetic: lambda tree: (tree.left, tree.right),
     Logic: lambda tree: (tree.left, tree.right),
     Relation: lambda tree: (tree.left, tree.right),
     Power: lambda tree: (tree.base,),
-    Choice: lambda tree: (tree.condition, tree.then, tree.other),
-    Application: lambda tree: tree.arguments,
+    Conditional: lambda tree: (tree.condition, tree.then, tree.other),
+    FunctionCall: lambda tree: tree.arguments,
 }
 """The direct parts of each kind of tree that has some."""
 
 
-def whole_literal(tree: Tree) -> int | None:
+def integer_literal(tree: SyntaxTree) -> int | None:
     """Return the value of a literal like `2` or `-3`: a whole number without a unit, else None."""
     match tree:
-        case Number(value, unit, _) if unit is NO_UNIT and value.denominator == 1:
+        case NumberLiteral(value, unit, _) if unit is NO_UNIT and value.denominator == 1:
             return int(value)
-        case Negative(Number() as literal, _):
-            number = whole_literal(literal)
+        case Negation(NumberLiteral() as literal, _):
+            number = integer_literal(literal)
             return None if number is None else -number
         case _:
             return None
 
 
-def form(part: object) -> object:
+def structural_key(part: object) -> object:
     """Return what a tree says without its places: two trees written alike have equal forms."""
     if isinstance(part, tuple):
-        return tuple(form(item) for item in part)
+        return tuple(structural_key(item) for item in part)
     if dataclasses.is_dataclass(part):
-        kept = [item.name for item in dataclasses.fields(part) if item.name != "span"]
-        return (type(part).__name__, *(form(getattr(part, name)) for name in kept))
+        field_names = [item.name for item in dataclasses.fields(part) if item.name != "span"]
+        return (type(part).__name__, *(structural_key(getattr(part, name)) for name in field_names))
     return part
 
 
-def alike(first: Tree, second: Tree) -> bool:
+def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
     """Tell whether two trees are written alike: equal but for their places."""
     stack = [(first, second)]
     while stack:
@@ -218,18 +218,18 @@ def alike(first: Tree, second: Tree) -> bool:
         if a is b:
             continue
         parts, others = children(a), children(b)
-        if type(a) is not type(b) or said(a) != said(b) or len(parts) != len(others):
+        if type(a) is not type(b) or node_label(a) != node_label(b) or len(parts) != len(others):
             return False
         stack += zip(parts, others, strict=True)
     return True
 
 
-def said(tree: Tree) -> object:
+def node_label(tree: SyntaxTree) -> object:
     """Return what a tree says itself, besides its parts."""
     match tree:
-        case Number(value, unit, _):
+        case NumberLiteral(value, unit, _):
             return (value.numerator, value.denominator, unit.text)
-        case Truth(value, _):
+        case BoolLiteral(value, _):
             return value
         case Name(path, _):
             return path
@@ -237,31 +237,31 @@ def said(tree: Tree) -> object:
             return operator
         case Power(_, exponent, _):
             return exponent
-        case Application(function, _, _):
+        case FunctionCall(function, _, _):
             return function
         case _:
             return None
 
 
-class Likeness:
+class TreeNumbering:
     """Numbers trees: two have one number if they are written alike. Each part is read once."""
 
     def __init__(self) -> None:
         """Know no tree."""
-        self.numbers: dict[object, int] = {}
-        self.known: dict[int, tuple[Tree, int]] = {}
+        self.numbers_by_key: dict[object, int] = {}
+        self.numbered_trees: dict[int, tuple[SyntaxTree, int]] = {}
 
-    def number(self, tree: Tree) -> int:
+    def number_of(self, tree: SyntaxTree) -> int:
         """Return the number of a tree."""
-        found = self.known.get(id(tree))
+        found = self.numbered_trees.get(id(tree))
         if found is None:
-            key = (type(tree), said(tree), *map(self.number, children(tree)))
-            found = tree, self.numbers.setdefault(key, len(self.numbers))
-            self.known[id(tree)] = found
+            key = (type(tree), node_label(tree), *map(self.number_of, children(tree)))
+            found = tree, self.numbers_by_key.setdefault(key, len(self.numbers_by_key))
+            self.numbered_trees[id(tree)] = found
         return found[1]
 
 
-def depth(tree: Tree) -> int:
+def depth(tree: SyntaxTree) -> int:
     """Return the length of the longest way from a tree to a leaf."""
     level, deepest = [tree], 0
     while level:
@@ -270,6 +270,6 @@ def depth(tree: Tree) -> int:
     return deepest
 
 
-def is_zero(tree: Tree) -> bool:
+def is_bare_zero(tree: SyntaxTree) -> bool:
     """Tell whether an expression is a bare 0: it goes with any dimension."""
-    return isinstance(tree, Number) and tree.is_bare_zero
+    return isinstance(tree, NumberLiteral) and tree.is_bare_zero

@@ -6,7 +6,14 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.elementary import CIRCLE, Body, Circle, X, by_quadrant, pieced
+from language.elementary import (
+    TRIG_FLOAT64,
+    FunctionBuilder,
+    TrigConstants,
+    X,
+    horner_in_pieces,
+    select_by_quadrant,
+)
 from language.operation import (
     Call,
     Compare,
@@ -41,7 +48,7 @@ ATAN_SERIES = (
 Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight r^2; the lowest coefficient
 rounded to double and fixed, the rest fitted anew, and so on upwards.
 """
-BASES = {
+ATAN_BASES = {
     "ahead": (
         (0.0, 0.0),
         (0.4636476090008061, 2.2698777452961687e-17),
@@ -67,7 +74,7 @@ BASES = {
 
 
 @dataclass(frozen=True)
-class ArcNumbers:
+class Atan2Constants:
     """The numbers of atan2 in one type; above `largest` are only infinities.
 
     Sizes above `huge` are made smaller by the factor `smaller`: then they may be added up.
@@ -76,26 +83,28 @@ class ArcNumbers:
     series: tuple[float, ...]
     bases: Mapping[str, tuple[tuple[float, float], ...]]
     huge: float
-    smaller: float
+    scale: float
     largest: float
 
 
-DOUBLE = ArcNumbers(ATAN_SERIES, BASES, 2.0**1000, 2.0**-100, sys.float_info.max)
+ATAN2_FLOAT64 = Atan2Constants(ATAN_SERIES, ATAN_BASES, 2.0**1000, 2.0**-100, sys.float_info.max)
 RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
-def tangent(circle: Circle = CIRCLE) -> Function:
+def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     """tan x = sin / cos of the reduced argument, -cos / sin in odd quadrants."""
-    body = Body()
-    quadrant, head, tail = circle.reduced(body)
-    sin, cos = circle.kernels(body, head, tail)
+    body = FunctionBuilder()
+    quadrant, head, tail = constants.reduce_angle(body)
+    sin, cos = constants.kernels(body, head, tail)
     even, odd = divide(sin, cos), Unary("-", divide(cos, sin))
-    turned = by_quadrant(quadrant, even, odd, even, odd)
-    body.let("y", Select(Compare("<", Call("abs", (X,)), circle.tiny), X, turned))
-    return body.function("tan", f"tangent; |x| <= {circle.bound} rad, clamped; error < 2.4 ULP")
+    turned = select_by_quadrant(quadrant, even, odd, even, odd)
+    body.let("y", Select(Compare("<", Call("abs", (X,)), constants.tiny), X, turned))
+    return body.build(
+        "tan", f"tangent; |x| <= {constants.bound_text} rad, clamped; error < 2.4 ULP"
+    )
 
 
-def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
+def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.5") -> Function:
     """atan2(rise, run) by atan t, t in [0, 1], about 0, 1/2 or 1 (Cody & Waite 1980, chapter 11).
 
     t is the smaller size over the larger. For a whole a, atan t = atan a + atan r with
@@ -103,10 +112,10 @@ def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     scaled down where their sum would be infinite. The value is in (-pi, pi]: the sign of a zero
     counts only where it is the value, atan2(-0.0, 1) = -0.0.
     """
-    body = Body()
+    body = FunctionBuilder()
     up, along = body.let("up", Call("abs", (RISE,))), body.let("along", Call("abs", (RUN,)))
     steep, behind = Compare(">", up, along), Compare("<", RUN, real(0.0))
-    low, high = scaled(body, numbers, Select(steep, along, up), Select(steep, up, along))
+    low, high = scale_pair(body, constants, Select(steep, along, up), Select(steep, up, along))
     near = Compare("<", multiply(real(16.0), low), multiply(real(7.0), high))
     middle = Compare("<", multiply(real(16.0), low), multiply(real(11.0), high))
     half = subtract(add(low, low), high), add(add(high, high), low)
@@ -117,7 +126,7 @@ def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     safe = Select(Compare("<=", high, real(0.0)), real(1.0), below)
     r = body.let("r", divide(top, safe))
     square = body.let("square", multiply(r, r))
-    series = pieced(body, numbers.series, square)
+    series = horner_in_pieces(body, constants.series, square)
     core = body.let("core", add(r, multiply(multiply(r, square), series)))
     turn = body.let("turn", Select(steep, Unary("-", core), core))
     arc = body.let("arc", Select(behind, Unary("-", turn), turn))
@@ -125,7 +134,7 @@ def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     def base(part: int) -> Expr:
         by_bracket = {
             name: Select(near, real(a[part]), Select(middle, real(b[part]), real(c[part])))
-            for name, (a, b, c) in numbers.bases.items()
+            for name, (a, b, c) in constants.bases.items()
         }
         level = Select(behind, by_bracket["behind"], by_bracket["ahead"])
         return Select(steep, Select(behind, by_bracket["steep behind"], by_bracket["steep"]), level)
@@ -135,17 +144,19 @@ def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     flat = Select(Compare(">=", RUN, real(0.0)), RISE, size)
     half_turn = Select(Compare("<", RISE, real(0.0)), Unary("-", size), size)
     body.let("y", Select(Compare("<=", up, real(0.0)), flat, half_turn))
-    about = f"angle of (run, rise), in (-pi, pi] rad; error < {error} ULP"
-    return body.function("atan2", about, ("rise", "run"))
+    about = f"angle of (run, rise), in (-pi, pi] rad; error < {error_text} ULP"
+    return body.build("atan2", about, ("rise", "run"))
 
 
-def scaled(body: Body, numbers: ArcNumbers, smaller: Expr, larger: Expr) -> tuple[Ref, Ref]:
+def scale_pair(
+    body: FunctionBuilder, constants: Atan2Constants, smaller: Expr, larger: Expr
+) -> tuple[Ref, Ref]:
     """Return two sizes of the same quotient that may be added up; infinite ones become 1."""
     least, most = body.let("least", smaller), body.let("most", larger)
     factor = body.let(
-        "factor", Select(Compare(">", most, real(numbers.huge)), real(numbers.smaller), real(1.0))
+        "factor", Select(Compare(">", most, real(constants.huge)), real(constants.scale), real(1.0))
     )
-    largest = real(numbers.largest)
+    largest = real(constants.largest)
     endless = Compare(">", most, largest)
     at_limit = Select(Compare(">", least, largest), real(1.0), multiply(least, real(0.0)))
     low = Select(endless, at_limit, multiply(least, factor))

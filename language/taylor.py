@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from language.field import Field
-from language.matrix import Matrix, sum_of_sizes
-from language.number import DIGITS, NumberType
+from language.field import VectorField
+from language.matrix import Matrix, abs_sum
+from language.number import SIGNIFICAND_BITS, NumberType
 
 
-def in_ranges(field: Field, a: Matrix, h: float) -> Matrix:
+def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
     """Return A h (n, n), each state in units of its range's width."""
     widths = []
     for state in field.automaton.states.values():
@@ -23,10 +23,10 @@ def in_ranges(field: Field, a: Matrix, h: float) -> Matrix:
 
 def row_sum_norm(a: Matrix) -> float:
     """Return the largest sum of sizes of a row."""
-    return largest(sum_of_sizes(row) for row in a)
+    return max_or_nan(abs_sum(row) for row in a)
 
 
-def largest(values: Iterable[float]) -> float:
+def max_or_nan(values: Iterable[float]) -> float:
     """Return the largest of sizes; NaN if one is."""
     found = 0.0
     for value in values:
@@ -34,22 +34,20 @@ def largest(values: Iterable[float]) -> float:
     return found
 
 
-def taylor_terms(step: Matrix, number: NumberType = "float64") -> int:
+def taylor_term_count(step: Matrix, number: NumberType = "float64") -> int:
     """Return the number of terms of a Taylor sum after which none counts, for z = A h (n, n).
 
     The sum is that of z^k (d0 h) / (k + 1)!, and d0 h is at most |z|. From K on
     | |z|^K 1 | |z| / (K + 1)! <= 2^-53, 2^-24 in float32: powers of sizes see what the norm does
     not, that what turns into another quantity is gone, such as speed into angle.
     """
-    norm, tiny = row_sum_norm(step), 2.0 ** -DIGITS[number]
+    norm, tiny = row_sum_norm(step), 2.0 ** -SIGNIFICAND_BITS[number]
     reach = [1.0 for _ in step]
     terms, bound, order = 1, norm, 1
     while bound > tiny:
-        if largest(reach) * norm > tiny:
+        if max_or_nan(reach) * norm > tiny:
             terms = order
         order += 1
         bound = bound * norm / order
-        reach = [
-            sum_of_sizes(x * y for x, y in zip(row, reach, strict=True)) / order for row in step
-        ]
+        reach = [abs_sum(x * y for x, y in zip(row, reach, strict=True)) / order for row in step]
     return terms

@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.affine import Affine, affine
-from language.derivative import derivative
-from language.field import Field, all_known_at
-from language.linear import Point, inlined, is_too_large
-from language.lower import expression
+from language.affine import AffineForm, to_affine_form
+from language.derivative import differentiate
+from language.field import VectorField, all_bindings_at_point
+from language.linear import LinearisationPoint, exceeds_inlining_limit, inline_equations
+from language.lower import lower_expression
 from language.model import Automaton, Mode
 from language.problem import SpecError
-from language.simplify import replaced
-from language.syntax import Arithmetic, Name, Negative, Tree, names
+from language.simplify import substitute_names
+from language.syntax import Arithmetic, Name, Negation, SyntaxTree, names
 
 
 @dataclass(frozen=True)
-class Term:
+class RateTerm:
     """A summand of a state's rate: as written, and in states, inputs and parameters."""
 
-    written: Tree
-    full: Tree
+    source_tree: SyntaxTree
+    expanded_tree: SyntaxTree
 
 
-def written(tree: Tree) -> str:
+def source_text(tree: SyntaxTree) -> str:
     """Return the text of an expression in its file, with the brackets that its ends lack."""
     span = tree.span
     line = span.source.lines[span.line - 1]
@@ -36,18 +36,18 @@ def written(tree: Tree) -> str:
     return line[start:end]
 
 
-def terms_of(mode: Mode, state: str) -> list[Term]:
+def rate_terms_of(mode: Mode, state: str) -> list[RateTerm]:
     """Return the summands of a state's balance, with all equations put in. Raises SpecError."""
-    known = inlined(mode, {})
-    return [Term(tree, replaced(tree, known)) for tree in _summands(mode, state)]
+    known = inline_equations(mode, {})
+    return [RateTerm(tree, substitute_names(tree, known)) for tree in _summands(mode, state)]
 
 
-def _summands(mode: Mode, state: str) -> Iterator[Tree]:
+def _summands(mode: Mode, state: str) -> Iterator[SyntaxTree]:
     """Yield the summands of a state's balance; an equation is taken apart where it is read."""
     stack = [mode.flow[state].right]
     while stack:
         match stack.pop():
-            case Negative(operand, _):
+            case Negation(operand, _):
                 stack.append(operand)
             case Arithmetic("+" | "-", left, right, _):
                 stack += [right, left]
@@ -57,45 +57,49 @@ def _summands(mode: Mode, state: str) -> Iterator[Tree]:
                 yield tree
 
 
-def other_terms(automaton: Automaton, mode: Mode, point: Point) -> list[str]:
+def non_affine_terms(automaton: Automaton, mode: Mode, point: LinearisationPoint) -> list[str]:
     """Return the terms that are not linear in the states with constant coefficients, as texts."""
     found: dict[str, None] = {}
     for state in automaton.states:
         if state not in mode.flow:
             found[f"der({state})"] = None  # chosen by a region beside
             continue
-        for term in terms_of(mode, state):
+        for term in rate_terms_of(mode, state):
             if not _is_affine(term, automaton, point):
-                found[written(term.written)] = None
+                found[source_text(term.source_tree)] = None
     return list(found)
 
 
-def strongest(field: Field, mode: Mode, row: str, column: str, parts: Mapping[str, Affine]) -> str:
+def steepest_term(
+    field: VectorField, mode: Mode, row: str, column: str, parts: Mapping[str, AffineForm]
+) -> str:
     """Return the term of a state's rate that is steepest in another state, as it is written.
 
     `parts` is what the names of the block of rates are in the states; an empty text where no term
     is linear with a constant coefficient, or where there are too many.
     """
-    if row not in mode.flow or is_too_large(mode):
+    if row not in mode.flow or exceeds_inlining_limit(mode):
         return ""
-    known = all_known_at(field)
-    best: Tree | None = None
+    known = all_bindings_at_point(field)
+    best: SyntaxTree | None = None
     largest = 0.0
     for tree in _summands(mode, row):
-        size = abs(affine(expression(tree, known), parts).slopes.get(column, 0.0))
+        size = abs(
+            to_affine_form(lower_expression(tree, known), parts).coefficients.get(column, 0.0)
+        )
         if size > largest:
             best, largest = tree, size
-    return written(best) if best else ""
+    return source_text(best) if best else ""
 
 
-def _is_affine(term: Term, automaton: Automaton, point: Point) -> bool:
+def _is_affine(term: RateTerm, automaton: Automaton, point: LinearisationPoint) -> bool:
     parameters = point.automaton.parameters
     known = {*parameters, *automaton.inputs, *automaton.states}
-    if any(read.path not in known for read in names(term.full)):
+    if any(read.path not in known for read in names(term.expanded_tree)):
         return False
     for column in automaton.states:
         try:
-            slope = derivative(term.full, column, point.value)
+            slope = differentiate(term.expanded_tree, column, point.evaluator)
         except SpecError:
             return False
         if any(read.path not in parameters for read in names(slope)):

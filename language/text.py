@@ -4,37 +4,41 @@ from __future__ import annotations
 
 import unicodedata
 
-UNSEEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
+INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 """Categories of Unicode that draw nothing, turn the direction of text or end a line."""
-LONGEST_LINE = 160
+MAX_LINE_LENGTH = 160
 """Characters of a line shown to a person; longer ones are cut around what is meant."""
 
 
-def visible(text: str) -> str:
+def escape_invisible(text: str) -> str:
     """Return a text in which every character that is not seen is written as an escape."""
-    return "".join(_escaped(c) if unicodedata.category(c) in UNSEEN else c for c in text)
+    return "".join(
+        _escape(c) if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in text
+    )
 
 
-def one_for_one(text: str) -> str:
+def mask_invisible(text: str) -> str:
     """Return a text of equal length without characters that are not seen, for carets below it."""
-    kept = (" " if c == "\t" else c for c in text)
-    return "".join("\ufffd" if unicodedata.category(c) in UNSEEN else c for c in kept)
+    characters = (" " if c == "\t" else c for c in text)
+    return "".join(
+        "\ufffd" if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in characters
+    )
 
 
-def shortened(text: str, longest: int = LONGEST_LINE) -> str:
+def truncate(text: str, max_length: int = MAX_LINE_LENGTH) -> str:
     """Return a text of at most so many characters."""
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+    return text if len(text) <= max_length else text[: max_length - 3] + "..."
 
 
-def around(text: str, column: int, width: int) -> tuple[str, int, int]:
+def crop_line(text: str, column: int, width: int) -> tuple[str, int, int]:
     """Return the part of a long line around a place, and the place's column and width in it."""
-    if len(text) <= LONGEST_LINE:
+    if len(text) <= MAX_LINE_LENGTH:
         return text, column, width
-    start = max(0, column - 1 - LONGEST_LINE // 4)
-    part = text[start : start + LONGEST_LINE]
+    start = max(0, column - 1 - MAX_LINE_LENGTH // 4)
+    part = text[start : start + MAX_LINE_LENGTH]
     return part, column - start, min(width, len(part) - (column - start) + 1)
 
 
-def _escaped(character: str) -> str:
+def _escape(character: str) -> str:
     code = ord(character)
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"

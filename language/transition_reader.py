@@ -6,20 +6,20 @@ import re
 from collections.abc import Iterator
 from typing import Literal, cast
 
-from language.aliases import heard_with_guard, known_as
-from language.chart import Keeping
+from language.aliases import event_guard_hint, key_alias_hint
+from language.chart import HistoryKind
 from language.declaration import Formula
-from language.document import Entry, Items, Node, Scalar, Table
+from language.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.model import Rewind, Transition
 from language.names import check_name
-from language.problem import Problems, nearest
+from language.problem import Problems, suggest_name
 from language.reader import Reader
-from language.site import Site
-from language.syntax import Truth
+from language.site import ModeContext
+from language.syntax import BoolLiteral
 
 TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory", "rewind")
-CHART_WAY_KEYS = ("event", "raise", "history", "internal")
-Remembering = Literal["reset", "continue"]
+CHART_TRANSITION_KEYS = ("event", "raise", "history", "internal")
+MemoryOption = Literal["reset", "continue"]
 
 
 class TransitionReader(Reader):
@@ -30,11 +30,13 @@ class TransitionReader(Reader):
         super().__init__(problems)
         self.events = events
 
-    def transitions(self, node: Node | None, source: str, site: Site) -> Iterator[Transition]:
+    def read_transitions(
+        self, node: YamlNode | None, source: str, context: ModeContext
+    ) -> Iterator[Transition]:
         """Iterate over the transitions of the mode `source`; one without a guard is reported."""
-        for entry in self.table(node, "transitions"):
+        for entry in self.read_mapping(node, "transitions"):
             self._check_name(entry)
-            transition = self._transition(entry, source, site)
+            transition = self._read_transition(entry, source, context)
             if transition:
                 yield transition
 
@@ -49,18 +51,20 @@ class TransitionReader(Reader):
         else:
             check_name(entry.key, entry.span, self.problems)
 
-    def _transition(self, entry: Entry, source: str, site: Site) -> Transition | None:
-        key = f"{site.key}.transitions.{entry.key}"
-        table = self.table(entry.node, key, (*TRANSITION_KEYS, *CHART_WAY_KEYS))
+    def _read_transition(
+        self, entry: Entry, source: str, context: ModeContext
+    ) -> Transition | None:
+        key = f"{context.key}.transitions.{entry.key}"
+        table = self.read_mapping(entry.node, key, (*TRANSITION_KEYS, *CHART_TRANSITION_KEYS))
         to, wait, priority = (table.get(part) for part in ("to", "wait", "priority"))
-        targets = self._targets(to, entry)
-        events = self._events(table, "event")
-        when = self._guard(table, key, entry, bool(events) or site.holds_modes)
-        waited = self.expression(wait, f"{key}.wait", entry.span) if wait else None
-        rank = self.whole(priority, "priority", 0, 0, 1000) if priority else None
-        memory = self.choice(table.get("memory"), "memory", ("reset", "continue"), "reset")
-        history = self.choice(table.get("history"), "history", ("shallow", "deep"), "")
-        internal = self.choice(table.get("internal"), "internal", ("true", "false"), "false")
+        targets = self._read_targets(to, entry)
+        events = self._read_events(table, "event")
+        when = self._read_guard(table, key, entry, bool(events) or context.has_inner_modes)
+        waited = self.read_expression(wait, f"{key}.wait", entry.span) if wait else None
+        rank = self.read_integer(priority, "priority", 0, 0, 1000) if priority else None
+        memory = self.read_choice(table.get("memory"), "memory", ("reset", "continue"), "reset")
+        history = self.read_choice(table.get("history"), "history", ("shallow", "deep"), "")
+        internal = self.read_choice(table.get("internal"), "internal", ("true", "false"), "false")
         if when is None:
             return None
         return Transition(
@@ -70,85 +74,89 @@ class TransitionReader(Reader):
             when=when,
             wait=waited,
             priority=rank,
-            reset=self.formulas(table.get("reset"), f"{key}.reset"),
+            reset=self.read_formulas(table.get("reset"), f"{key}.reset"),
             key=key,
             span=to.span if to else entry.span,
-            region=site.region,
-            memory=cast(Remembering, memory),
-            rewind=self._rewind(table.get("rewind"), f"{key}.rewind"),
+            region=context.region,
+            memory=cast(MemoryOption, memory),
+            rewind=self._read_rewind(table.get("rewind"), f"{key}.rewind"),
             targets=targets,
             events=events,
-            raises=self._events(table, "raise"),
-            history=cast(Keeping, history),
+            raises=self._read_events(table, "raise"),
+            history=cast(HistoryKind, history),
             internal=internal == "true",
-            completes="when" not in table.entries and not events,
-            in_cell=to is not None and to.span == entry.span,
+            is_completion="when" not in table.entries and not events,
+            is_table_cell=to is not None and to.span == entry.span,
         )
 
-    def _targets(self, node: Node | None, entry: Entry) -> tuple[str, ...]:
+    def _read_targets(self, node: YamlNode | None, entry: Entry) -> tuple[str, ...]:
         """Return the names of the modes that a transition leads to: by default its own name."""
         if node is None:
             return (entry.key,)
-        if isinstance(node, Scalar) and not node.text:
+        if isinstance(node, ScalarNode) and not node.text:
             label = "`to` has no target"
             hint = f"`to: []` for none, or leave it out to go to `{entry.key}`"
             self.problems.error("missing", node.span, label, hint)
-        return self._words(node, "to")
+        return self._read_names(node, "to")
 
-    def _words(self, node: Node | None, what: str) -> tuple[str, ...]:
+    def _read_names(self, node: YamlNode | None, what: str) -> tuple[str, ...]:
         """Return the names of a list, or the only one."""
-        if isinstance(node, Items):
-            return tuple(item.text for item in self.items(node, what))
-        word = self.text(node, what, node.span) if node else ""
+        if isinstance(node, SequenceNode):
+            return tuple(item.text for item in self.read_list(node, what))
+        word = self.read_string(node, what, node.span) if node else ""
         return (word,) if word else ()
 
-    def _events(self, table: Table, what: str) -> tuple[str, ...]:
+    def _read_events(self, table: MappingNode, what: str) -> tuple[str, ...]:
         """Return the names of events, which are declared."""
         node = table.get(what)
-        found = self._words(node, what)
-        for item in node.nodes if isinstance(node, Items) else (node,):
-            if isinstance(item, Scalar) and item.text not in self.events:
+        names = self._read_names(node, what)
+        for item in node.nodes if isinstance(node, SequenceNode) else (node,):
+            if isinstance(item, ScalarNode) and item.text not in self.events:
                 label = f"there is no event `{item.text}`"
-                hint = heard_with_guard(item.text, self.events)
-                hint = hint or nearest(item.text, self.events)
+                hint = event_guard_hint(item.text, self.events)
+                hint = hint or suggest_name(item.text, self.events)
                 hint = hint or "events are declared under `events`"
                 words = [word for word in re.findall(r"\w+", item.text) if word in self.events]
                 if len(words) > 1:
                     hint = f"several are a list: `{what}: [{', '.join(words)}]`"
                 self.problems.error("name", item.span, label, hint)
-        return found
+        return names
 
-    def _guard(self, table: Table, key: str, entry: Entry, optional: bool) -> Formula | None:
+    def _read_guard(
+        self, table: MappingNode, key: str, entry: Entry, is_optional: bool
+    ) -> Formula | None:
         """Return the guard; an event needs none, nor does the end of a mode with modes inside."""
         node = table.get("when")
-        if node is None and optional:
-            return Formula(Truth(True, entry.span), f"{key}.when")
-        keys = entry.node.entries if isinstance(entry.node, Table) else ()
-        if node is None and any(known_as(key, ("when", "event")) for key in keys):
+        if node is None and is_optional:
+            return Formula(BoolLiteral(True, entry.span), f"{key}.when")
+        keys = entry.node.entries if isinstance(entry.node, MappingNode) else ()
+        if node is None and any(key_alias_hint(key, ("when", "event")) for key in keys):
             return None  # told as an unknown key
-        if isinstance(entry.node, Items) or (isinstance(entry.node, Scalar) and entry.node.text):
+        if isinstance(entry.node, SequenceNode) or (
+            isinstance(entry.node, ScalarNode) and entry.node.text
+        ):
             return None  # told as no mapping
         if node is None:
             hint = "`when: true` with the largest `priority` for what the others leave"
             self.problems.error("missing", entry.span, "`when` is missing", hint)
             return None
-        if isinstance(node, Scalar) and node.text in ("else", "otherwise"):
+        if isinstance(node, ScalarNode) and node.text in ("else", "otherwise"):
             label = f"`{node.text}` is no condition"
             hint = "`when: true` with the largest `priority` for what the others leave"
             self.problems.error("expression", node.span, label, hint)
             return None
-        return self.expression(node, f"{key}.when", entry.span)
+        return self.read_expression(node, f"{key}.when", entry.span)
 
-    def _rewind(self, node: Node | None, key: str) -> Rewind | None:
+    def _read_rewind(self, node: YamlNode | None, key: str) -> Rewind | None:
         """Read how far back a transition reaches, and to what."""
         if node is None:
             return None
-        table = self.table(node, key, ("until", "within", "beyond"))
+        table = self.read_mapping(node, key, ("until", "within", "beyond"))
         parts = [
-            self.expression(table.get(part), f"{key}.{part}", node.span)
+            self.read_expression(table.get(part), f"{key}.{part}", node.span)
             for part in ("until", "within")
         ]
-        beyond = self.choice(table.get("beyond"), "beyond", ("fault", "fire"), "fault")
+        beyond = self.read_choice(table.get("beyond"), "beyond", ("fault", "fire"), "fault")
         if not (parts[0] and parts[1]):
             return None
         return Rewind(parts[0], parts[1], node.span, is_fault=beyond == "fault")

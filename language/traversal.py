@@ -13,7 +13,6 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -22,15 +21,16 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
 )
 
 
-def walk(block: Block) -> Iterator[Op]:
+def walk_ops(block: Block) -> Iterator[Op]:
     """Yield every operation of a block, those inside others too."""
     stack = list(reversed(block))
     while stack:
@@ -39,7 +39,7 @@ def walk(block: Block) -> Iterator[Op]:
         if isinstance(op, Branch):
             stack += op.other[::-1]
             stack += op.then[::-1]
-        elif isinstance(op, Choose):
+        elif isinstance(op, Switch):
             for _, case_block in reversed(op.cases):
                 stack += case_block[::-1]
         elif isinstance(op, Loop):
@@ -53,55 +53,55 @@ def block_names(block: Block) -> list[str]:
 
 def block_reads(block: Block) -> list[str]:
     """Return the variables that a block reads."""
-    found: list[str] = []
-    for op in walk(block):
+    names: list[str] = []
+    for op in walk_ops(block):
         if isinstance(op, Assign):
-            found += expr_names(op.value)
+            names += expr_names(op.value)
         elif isinstance(op, (Branch, Count)):
-            found += expr_names(op.condition)
+            names += expr_names(op.condition)
         elif isinstance(op, Store):
-            found += expr_names(op.index)
-            found += expr_names(op.value)
-        elif isinstance(op, Choose):
-            found.append(op.selector)
-    return found
+            names += expr_names(op.index)
+            names += expr_names(op.value)
+        elif isinstance(op, Switch):
+            names.append(op.selector)
+    return names
 
 
 def block_writes(block: Block) -> list[str]:
     """Return the variables that a block writes."""
-    found: list[str] = []
-    for op in walk(block):
+    names: list[str] = []
+    for op in walk_ops(block):
         if isinstance(op, Assign):
-            found.append(op.target)
+            names.append(op.target)
         elif isinstance(op, Store):
-            found.append(op.array)
+            names.append(op.array)
         elif isinstance(op, Count):
-            found.append(op.timer)
+            names.append(op.timer)
         elif isinstance(op, Loop):
-            found.append(op.index)
+            names.append(op.index)
         elif isinstance(op, FaultBit):
-            found.append("memory.faults")
-    return found
+            names.append("memory.faults")
+    return names
 
 
 def expr_names(expr: Expr) -> list[str]:
     """Return the variables and constants that an expression reads, and `call <function>`."""
-    found: list[str] = []
-    for part in parts(expr):
+    names: list[str] = []
+    for part in subexpressions(expr):
         if isinstance(part, (Ref, Item)):
-            found.append(part.name)
+            names.append(part.name)
         elif isinstance(part, Call):
-            found.append(f"call {part.function}")
-    return found
+            names.append(f"call {part.function}")
+    return names
 
 
-def parts(expr: Expr) -> Sequence[Expr]:
+def subexpressions(expr: Expr) -> Sequence[Expr]:
     """Return every part of an expression, parents first."""
     stack: list[Expr] = [expr]
-    found: list[Expr] = []
+    result: list[Expr] = []
     while stack:
         part = stack.pop()
-        found.append(part)
+        result.append(part)
         if isinstance(part, (Binary, Compare)):
             stack += (part.right, part.left)
         elif isinstance(part, Call):
@@ -112,47 +112,47 @@ def parts(expr: Expr) -> Sequence[Expr]:
             stack += (part.other, part.then, part.condition)
         elif isinstance(part, Item):
             stack.append(part.index)
-    return found
+    return result
 
 
-def reads(blocks: Iterable[Block]) -> set[str]:
+def names_used(blocks: Iterable[Block]) -> set[str]:
     """Return every name that some blocks read or write."""
     return {name for block in blocks for name in block_names(block)}
 
 
-def reached(name: str, blocks: Mapping[str, Block]) -> set[str]:
+def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
     """Return a block's name and those of all that it runs."""
-    found, stack = set[str](), [name]
+    result, stack = set[str](), [name]
     while stack:
-        one = stack.pop()
-        if one not in found:
-            found.add(one)
-            stack += [op.block for op in walk(blocks[one]) if isinstance(op, Run)]
-    return found
+        block_name = stack.pop()
+        if block_name not in result:
+            result.add(block_name)
+            stack += [op.block for op in walk_ops(blocks[block_name]) if isinstance(op, RunBlock)]
+    return result
 
 
-def with_value(block: Block, name: str, number: int) -> Block:
+def substitute_variable(block: Block, name: str, constant: int) -> Block:
     """Return assignments and stores in which a whole-number variable has a value."""
-    found: list[Op] = []
+    ops: list[Op] = []
     for op in block:
         match op:
             case Assign(target, value, key):
-                found.append(Assign(target, _with_value(value, name, number), key))
+                ops.append(Assign(target, _substitute_in_expr(value, name, constant), key))
             case Store(array, index, value):
-                parts = (_with_value(part, name, number) for part in (index, value))
-                found.append(Store(array, *parts))
+                parts = (_substitute_in_expr(part, name, constant) for part in (index, value))
+                ops.append(Store(array, *parts))
             case _:
                 raise TypeError(f"neither an assignment nor a store: {op!r}")
-    return tuple(found)
+    return tuple(ops)
 
 
-def _with_value(expr: Expr, name: str, number: int) -> Expr:
+def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
     def part(inner: Expr) -> Expr:
-        return _with_value(inner, name, number)
+        return _substitute_in_expr(inner, name, constant)
 
     match expr:
         case Ref(variable):
-            return Value(number) if variable == name else expr
+            return Value(constant) if variable == name else expr
         case Item(array, index, is_whole):
             return Item(array, part(index), is_whole)
         case Unary(operator, operand):

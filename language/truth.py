@@ -18,9 +18,9 @@ class TruthRow:
 
     name: str
     marks: tuple[bool | None, ...]
-    results: Mapping[str, Formula]
+    assignments: Mapping[str, Formula]
     span: Span
-    is_rest: bool = False
+    is_else: bool = False
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,15 @@ class TruthTable:
     span: Span
 
     @property
-    def written(self) -> tuple[str, ...]:
+    def assigned_names(self) -> tuple[str, ...]:
         """The discrete variables that some row writes, each once."""
-        return tuple(dict.fromkeys(name for row in self.rows for name in row.results))
+        return tuple(dict.fromkeys(name for row in self.rows for name in row.assignments))
 
 
-def decisions(tables: Iterable[TruthTable]) -> list[Formula]:
+def truth_table_formulas(tables: Iterable[TruthTable]) -> list[Formula]:
     """Return the conditions of truth tables, and what their rows write."""
-    found: list[Formula] = []
+    formulas: list[Formula] = []
     for table in tables:
-        found += table.conditions.values()
-        found += (formula for row in table.rows for formula in row.results.values())
-    return found
+        formulas += table.conditions.values()
+        formulas += (formula for row in table.rows for formula in row.assignments.values())
+    return formulas

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.document import Entry, Table
-from language.problem import nearest
+from language.document import Entry, MappingNode
+from language.problem import suggest_name
 from language.reader import Reader
 from language.truth import TruthRow, TruthTable
 
 MARKS: Mapping[str, bool | None] = {"T": True, "F": False, "-": None}
-REST = "else"
-ALIKE: Mapping[str, str] = {
+ELSE_ROW = "else"
+MARK_ALIASES: Mapping[str, str] = {
     **dict.fromkeys("TtYy1", "T"),
     **dict.fromkeys("FfNn0", "F"),
     **dict.fromkeys("-*Xx", "-"),
 }
 """How other tools write a mark."""
-MOST_CONDITIONS = 16
+MAX_CONDITIONS = 16
 """Conditions of a table: the search for an undecided row looks at 2^16 at most."""
 
 
@@ -26,54 +26,54 @@ class TruthTableReader(Reader):
 
     discrete: tuple[str, ...] = ()
 
-    def tables(self, tree: Table) -> tuple[TruthTable, ...]:
+    def read_truth_tables(self, tree: MappingNode) -> tuple[TruthTable, ...]:
         """Return the tables in the order of the file."""
-        self.discrete = tuple(self.table(tree.get("discrete"), "discrete").entries)
+        self.discrete = tuple(self.read_mapping(tree.get("discrete"), "discrete").entries)
         node = tree.get("tables")
-        return tuple(self._table(entry) for entry in self.named(node, "tables"))
+        return tuple(self._read_table(entry) for entry in self.named_entries(node, "tables"))
 
-    def _table(self, entry: Entry) -> TruthTable:
+    def _read_table(self, entry: Entry) -> TruthTable:
         key = f"tables.{entry.key}"
-        body = self.table(entry.node, key, ("if", "rows"))
-        conditions = self.formulas(body.get("if"), f"{key}.if")
+        body = self.read_mapping(entry.node, key, ("if", "rows"))
+        conditions = self.read_formulas(body.get("if"), f"{key}.if")
         for what in ("if", "rows"):
-            if not self.table(body.get(what), what).entries:
+            if not self.read_mapping(body.get(what), what).entries:
                 label = f"a truth table has at least one entry in `{what}`"
                 self.problems.error("missing", entry.span, label)
-        if len(conditions) > MOST_CONDITIONS:
+        if len(conditions) > MAX_CONDITIONS:
             label = f"`{entry.key}` has {len(conditions)} conditions"
-            hint = f"a truth table has at most {MOST_CONDITIONS}: split it"
+            hint = f"a truth table has at most {MAX_CONDITIONS}: split it"
             self.problems.error("huge", entry.span, label, hint)
-        entries = list(self.table(body.get("rows"), f"{key}.rows"))
-        rows = tuple(self._row(row, key, len(conditions)) for row in entries)
+        entries = list(self.read_mapping(body.get("rows"), f"{key}.rows"))
+        rows = tuple(self._read_row(row, key, len(conditions)) for row in entries)
         for row in rows[:-1]:
-            if row.is_rest:
-                label = f"`{REST}` is not the last row"
+            if row.is_else:
+                label = f"`{ELSE_ROW}` is not the last row"
                 self.problems.error("table", row.span, label, "it is for what the others leave")
         return TruthTable(entry.key, conditions, rows, key, entry.span)
 
-    def _row(self, entry: Entry, key: str, width: int) -> TruthRow:
-        is_rest = entry.key == REST
+    def _read_row(self, entry: Entry, key: str, width: int) -> TruthRow:
+        is_rest = entry.key == ELSE_ROW
         marks = ["-"] * width if is_rest else entry.key.split()
         if len(marks) != width or not all(mark in MARKS for mark in marks):
             label = f"`{entry.key}` is no row of {width} conditions"
-            self.problems.error("table", entry.span, label, _hint(entry.key, width))
+            self.problems.error("table", entry.span, label, _row_hint(entry.key, width))
             marks = []
-        results = self.formulas(entry.node, f"{key}.rows.{entry.key}")
-        for written in self.table(entry.node, entry.key):
+        results = self.read_formulas(entry.node, f"{key}.rows.{entry.key}")
+        for written in self.read_mapping(entry.node, entry.key):
             if written.key not in self.discrete:
                 label = f"`{written.key}` is not a discrete variable"
-                hint = nearest(written.key, self.discrete) or "declare it under `discrete`"
+                hint = suggest_name(written.key, self.discrete) or "declare it under `discrete`"
                 self.problems.error("name", written.span, label, hint)
-        name = REST if is_rest else " ".join(marks)
+        name = ELSE_ROW if is_rest else " ".join(marks)
         return TruthRow(name, tuple(MARKS[mark] for mark in marks), results, entry.span, is_rest)
 
 
-def _hint(key: str, width: int) -> str:
+def _row_hint(key: str, width: int) -> str:
     """Return how a row is written: this one, where its marks can be told."""
-    marks = [ALIKE.get(mark, "") for mark in key if not mark.isspace()]
+    marks = [MARK_ALIASES.get(mark, "") for mark in key if not mark.isspace()]
     if len(marks) == width and all(marks):
         return f'it is written `"{" ".join(marks)}"`'
     if key in ("default", "otherwise", "rest"):
-        return f"the last row is `{REST}`, for what the others leave"
+        return f"the last row is `{ELSE_ROW}`, for what the others leave"
     return "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"

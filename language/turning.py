@@ -11,64 +11,76 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.activation import Edge, edges_by_mode, edges_of, value_of, value_type_of
-from language.lower import Names, expression
+from language.activation import (
+    EdgeDetector,
+    edge_detectors_by_mode,
+    edge_detectors_of,
+    edge_value_ref,
+    edge_value_type,
+)
+from language.lower import NameBindings, lower_expression
 from language.model import Automaton, Mode
 from language.operation import Assign, Binary, Block, Compare, Expr, Op, Ref, Unary, Value
 from language.program import Variable
 from language.syntax import memory_key
 
 
-def edge_names(automaton: Automaton) -> Mapping[str, Names]:
+def edge_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
     """Return, by the key of a mode, what the edges in its guards are."""
     found: dict[str, dict[str, Expr]] = {mode.key: {} for mode in automaton.all_modes}
-    for edge in edges_of(automaton):
-        is_new = _is_other(automaton, edge)
+    for edge in edge_detectors_of(automaton):
+        is_new = _level_differs(automaton, edge)
         if not edge.is_change:
-            is_new = Binary("and", _level(automaton, edge), Unary("not", _last(automaton, edge)))
-        found[edge.mode][memory_key(edge.tree)] = is_new
+            is_new = Binary(
+                "and", _level_ref(automaton, edge), Unary("not", _last_level_ref(automaton, edge))
+            )
+        found[edge.mode_key][memory_key(edge.call)] = is_new
     return found
 
 
-def levels(automaton: Automaton, mode: Mode, known: Names) -> list[Op]:
+def set_levels(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op]:
     """Return what sets the levels of a mode; those of the other modes of its region stay."""
     region = {other.key for other in automaton.region(mode.region).modes.values()}
     ops: list[Op] = []
-    for edge in edges_of(automaton):
-        target = _level(automaton, edge).name
-        if edge.mode == mode.key:
-            level = expression(edge.tree.arguments[0], known)
-            is_fall = edge.tree.function == "falling"
+    for edge in edge_detectors_of(automaton):
+        target = _level_ref(automaton, edge).name
+        if edge.mode_key == mode.key:
+            level = lower_expression(edge.call.arguments[0], known)
+            is_fall = edge.call.function == "falling"
             ops.append(Assign(target, Unary("not", level) if is_fall else level))
-        elif edge.mode in region:
-            ops.append(Assign(target, _last(automaton, edge)))
-        if edge.is_change and edge.mode in region:
-            ops.append(Assign(_here(edge).name, Value(edge.mode == mode.key)))
+        elif edge.mode_key in region:
+            ops.append(Assign(target, _last_level_ref(automaton, edge)))
+        if edge.is_change and edge.mode_key in region:
+            ops.append(Assign(_is_watched_ref(edge).name, Value(edge.mode_key == mode.key)))
     return ops
 
 
-def turned(automaton: Automaton) -> list[Expr]:
+def level_change_conditions(automaton: Automaton) -> list[Expr]:
     """Return, for each edge, whether its level is another than at the last instant."""
-    return [_is_other(automaton, edge) for edge in edges_of(automaton)]
+    return [_level_differs(automaton, edge) for edge in edge_detectors_of(automaton)]
 
 
-def settled(automaton: Automaton) -> Block:
+def store_levels(automaton: Automaton) -> Block:
     """Return what an instant leaves, when everything has happened."""
     found = []
-    for edge in edges_of(automaton):
-        found.append(Assign(_last(automaton, edge).name, _level(automaton, edge)))
+    for edge in edge_detectors_of(automaton):
+        found.append(Assign(_last_level_ref(automaton, edge).name, _level_ref(automaton, edge)))
         if edge.is_change:
-            found.append(Assign(edge.opposite, _here(edge)))
+            found.append(Assign(edge.armed_variable, _is_watched_ref(edge)))
     return tuple(found)
 
 
-def forgotten(automaton: Automaton, mode: Mode | None = None) -> Block:
+def reset_levels(automaton: Automaton, mode: Mode | None = None) -> Block:
     """Return what ends with an activation of a mode; of all modes at the start."""
-    edges = edges_by_mode(automaton).get(mode.key, ()) if mode else edges_of(automaton)
+    edges = (
+        edge_detectors_by_mode(automaton).get(mode.key, ())
+        if mode
+        else edge_detectors_of(automaton)
+    )
     return tuple(
-        Assign(edge.opposite, Value(False))
+        Assign(edge.armed_variable, Value(False))
         if edge.is_change
-        else Assign(_last(automaton, edge).name, Value(True))
+        else Assign(_last_level_ref(automaton, edge).name, Value(True))
         for edge in edges
     )
 
@@ -76,31 +88,31 @@ def forgotten(automaton: Automaton, mode: Mode | None = None) -> Block:
 def level_variables(automaton: Automaton) -> list[Variable]:
     """Return the variables of the edges."""
     found = []
-    for edge in edges_of(automaton):
-        kind = value_type_of(automaton, edge)
-        about = f"level of an edge in `{edge.mode}` at the last instant, true on entry"
+    for edge in edge_detectors_of(automaton):
+        kind = edge_value_type(automaton, edge)
+        about = f"level of an edge in `{edge.mode_key}` at the last instant, true on entry"
         if edge.is_change:
-            about = f"value looked at in `{edge.mode}` at the last instant"
-            seen = f"there was such an instant in `{edge.mode}`"
-            found.append(Variable(edge.opposite, "truth", about=seen))
-            found.append(Variable(_here(edge).name, "truth"))
-        found.append(Variable(_last(automaton, edge).name, kind, about=about))
-        found.append(Variable(_level(automaton, edge).name, kind))
+            about = f"value looked at in `{edge.mode_key}` at the last instant"
+            seen = f"there was such an instant in `{edge.mode_key}`"
+            found.append(Variable(edge.armed_variable, "truth", about=seen))
+            found.append(Variable(_is_watched_ref(edge).name, "truth"))
+        found.append(Variable(_last_level_ref(automaton, edge).name, kind, about=about))
+        found.append(Variable(_level_ref(automaton, edge).name, kind))
     return found
 
 
-def _is_other(automaton: Automaton, edge: Edge) -> Expr:
-    other = Compare("!=", _level(automaton, edge), _last(automaton, edge))
-    return Binary("and", Ref(edge.opposite), other) if edge.is_change else other
+def _level_differs(automaton: Automaton, edge: EdgeDetector) -> Expr:
+    other = Compare("!=", _level_ref(automaton, edge), _last_level_ref(automaton, edge))
+    return Binary("and", Ref(edge.armed_variable), other) if edge.is_change else other
 
 
-def _level(automaton: Automaton, edge: Edge) -> Ref:
-    return value_of(automaton, edge, f"work.level_{edge.number}")
+def _level_ref(automaton: Automaton, edge: EdgeDetector) -> Ref:
+    return edge_value_ref(automaton, edge, f"work.level_{edge.number}")
 
 
-def _last(automaton: Automaton, edge: Edge) -> Ref:
-    return value_of(automaton, edge, f"memory.level_{edge.number}")
+def _last_level_ref(automaton: Automaton, edge: EdgeDetector) -> Ref:
+    return edge_value_ref(automaton, edge, f"memory.level_{edge.number}")
 
 
-def _here(edge: Edge) -> Ref:
+def _is_watched_ref(edge: EdgeDetector) -> Ref:
     return Ref(f"work.here_{edge.number}")

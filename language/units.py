@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
-from language.symbols import BASE_SYMBOLS, OFTEN_WRITTEN, SYMBOLS
+from language.symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
 
 CELSIUS_OFFSET = Fraction(27315, 100)
 """0 degC in kelvin."""
 
-MECHANICAL: dict[tuple[int, ...], str] = {
+MECHANICAL_NAMES: dict[tuple[int, ...], str] = {
     (2, 1, -2): "N*m",
     (2, 1, -1): "N*m*s",
     (1, 1, -2): "N",
@@ -22,7 +22,7 @@ MECHANICAL: dict[tuple[int, ...], str] = {
     (2, 1, 0): "kg*m^2",
 }
 """How dimensions of mechanics are shown: powers of m, kg, s."""
-COMMON: dict[tuple[int, ...], str] = {
+COMMON_NAMES: dict[tuple[int, ...], str] = {
     (2, 1, -3, -1, 0): "V",
     (2, 1, -3, -2, 0): "ohm",
     (-2, -1, 3, 2, 0): "A/V",
@@ -40,8 +40,8 @@ COMMON: dict[tuple[int, ...], str] = {
 }
 """Further common names, for readers alone: powers of m, kg, s, A, K. Programs do without them."""
 
-UNIT = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
-PIECE = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
+UNIT_PATTERN = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
+FACTOR_PATTERN = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
 
 
 @dataclass(frozen=True)
@@ -57,27 +57,27 @@ class Dimension:
         return not any(self.powers) and self.angle == 0
 
     @property
-    def is_bare(self) -> bool:
+    def is_dimensionless(self) -> bool:
         """Tell whether there is no dimension, whatever the angle."""
         return not any(self.powers)
 
     @property
-    def shown(self) -> str:
+    def display_name(self) -> str:
         """The dimension for readers: by its common name where it has one."""
-        return SHOWN.get(str(self), str(self))
+        return DISPLAY_NAMES.get(str(self), str(self))
 
     def __str__(self) -> str:
         """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown."""
         if not self.powers:
             return "?"
-        known = MECHANICAL.get(self.powers[:3])
+        known = MECHANICAL_NAMES.get(self.powers[:3])
         if known and not any(self.powers[3:]):
             angle = self.angle or 0
             return known + {0: "", 1: "*rad", -1: "/rad"}.get(angle, f"*rad^{angle}")
         parts = list(zip(BASE_SYMBOLS, self.powers, strict=True))
         parts.insert(0, ("rad", self.angle or 0))
-        over = [_power(name, power) for name, power in parts if power > 0]
-        under = [_power(name, -power) for name, power in parts if power < 0]
+        over = [_format_power(name, power) for name, power in parts if power > 0]
+        under = [_format_power(name, -power) for name, power in parts if power < 0]
         return "*".join(over or ["1"]) + "".join(f"/{name}" for name in under)
 
 
@@ -95,24 +95,24 @@ class UnitError(ValueError):
     """The text is not a unit; the message says why."""
 
 
-NUMBER = Dimension()
-UNKNOWN = Dimension((), None)
+PURE_NUMBER = Dimension()
+UNKNOWN_DIMENSION = Dimension((), None)
 """What is in a unit that was reported: it fits everything, so that nothing is reported twice."""
 SECOND = Dimension((0, 0, 1, 0, 0))
-NO_UNIT = Unit("1", Fraction(1), NUMBER)
-UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN)
+NO_UNIT = Unit("1", Fraction(1), PURE_NUMBER)
+UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN_DIMENSION)
 
 
-def _power(name: str, power: int) -> str:
+def _format_power(name: str, power: int) -> str:
     return name if power == 1 else f"{name}^{power}"
 
 
-SHOWN = {str(Dimension(powers)): text for powers, text in COMMON.items()}
+DISPLAY_NAMES = {str(Dimension(powers)): text for powers, text in COMMON_NAMES.items()}
 
 
-def shown_unit(text: str) -> str:
+def display_unit(text: str) -> str:
     """Return how a unit of a Program is shown: by its common name where it has one."""
-    return SHOWN.get(text, text)
+    return DISPLAY_NAMES.get(text, text)
 
 
 @cache
@@ -120,12 +120,12 @@ def parse_unit(text: str) -> Unit:
     """Return the unit written as `N*m*s/rad`, `1/s`, `kg*m^2`. Raises UnitError."""
     if text == "1":
         return NO_UNIT
-    if not UNIT.fullmatch(text):
+    if not UNIT_PATTERN.fullmatch(text):
         raise UnitError(f"`{text}` is not written as a unit")
     body = text.removeprefix("1/")
     sign = -1 if body != text else 1
     factor, powers, angle = Fraction(1), [0] * len(BASE_SYMBOLS), 0
-    for operator, symbol, exponent in PIECE.findall(body):
+    for operator, symbol, exponent in FACTOR_PATTERN.findall(body):
         if symbol not in SYMBOLS:
             raise UnitError(f"`{symbol}` is not a unit")
         power = int(exponent or 1) * (-1 if operator == "/" else sign)
@@ -138,70 +138,70 @@ def parse_unit(text: str) -> Unit:
     return Unit(text, factor, Dimension(tuple(powers), angle), offset)
 
 
-def product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
+def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
     """Return the dimension of a * b (sign 1) or a / b (sign -1), with rule 20's angle power.
 
     A factor that is a pure number keeps the power of the other; of two quantities with
     dimensions, or one and an angle, the result is free; angles alone multiply exactly.
     """
-    if UNKNOWN in (a, b):
-        return UNKNOWN
+    if UNKNOWN_DIMENSION in (a, b):
+        return UNKNOWN_DIMENSION
     powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
     if b.is_number:
         return a
     if a.is_number:
         return Dimension(powers, None if b.angle is None else sign * b.angle)
-    if a.is_bare and b.is_bare and a.angle is not None and b.angle is not None:
+    if a.is_dimensionless and b.is_dimensionless and a.angle is not None and b.angle is not None:
         return Dimension(powers, a.angle + sign * b.angle)
     return Dimension(powers, None)
 
 
-def per_second(a: Dimension) -> Dimension:
+def rate_dimension(a: Dimension) -> Dimension:
     """Return the dimension of the rate of a quantity, whose power of the angle stays."""
-    if a == UNKNOWN:
-        return UNKNOWN
+    if a == UNKNOWN_DIMENSION:
+        return UNKNOWN_DIMENSION
     return Dimension(tuple(x - y for x, y in zip(a.powers, SECOND.powers, strict=True)), a.angle)
 
 
-def power(a: Dimension, exponent: int) -> Dimension:
+def dimension_power(a: Dimension, exponent: int) -> Dimension:
     """Return the dimension of a^exponent."""
     if a.is_number or exponent == 1:
         return a
     if exponent == 0:
-        return NUMBER
+        return PURE_NUMBER
     powers = tuple(exponent * x for x in a.powers)
-    exact = a.angle is not None and a.is_bare
+    exact = a.angle is not None and a.is_dimensionless
     return Dimension(powers, exponent * (a.angle or 0) if exact else None)
 
 
-def root(a: Dimension) -> Dimension | None:
+def dimension_sqrt(a: Dimension) -> Dimension | None:
     """Return the dimension of sqrt(a), or None where a power is odd."""
-    if a == UNKNOWN:
-        return UNKNOWN
+    if a == UNKNOWN_DIMENSION:
+        return UNKNOWN_DIMENSION
     odd_angle = a.angle is not None and a.angle % 2 != 0
     if any(x % 2 for x in a.powers) or odd_angle:
         return None
     return Dimension(tuple(x // 2 for x in a.powers), None if a.angle is None else a.angle // 2)
 
 
-def fits(a: Dimension, b: Dimension) -> bool:
+def are_compatible(a: Dimension, b: Dimension) -> bool:
     """Tell whether two quantities may be added, compared, assigned: rule 20."""
-    if UNKNOWN in (a, b):
+    if UNKNOWN_DIMENSION in (a, b):
         return True
     return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
 
 
-def common(a: Dimension, b: Dimension) -> Dimension:
+def common_dimension(a: Dimension, b: Dimension) -> Dimension:
     """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
-    if UNKNOWN in (a, b):
-        return UNKNOWN
+    if UNKNOWN_DIMENSION in (a, b):
+        return UNKNOWN_DIMENSION
     return b if a.angle is None else a
 
 
 def unit_hint(text: str) -> str:
     """Return "did you mean `N*m`?" for a text that is no unit, or an empty text."""
-    if text in OFTEN_WRITTEN:
-        return f"did you mean `{OFTEN_WRITTEN[text]}`?"
+    if text in MISSPELLED_UNITS:
+        return f"did you mean `{MISSPELLED_UNITS[text]}`?"
     changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
     try:
         return f"did you mean `{parse_unit(changed).text}`?"
@@ -209,12 +209,12 @@ def unit_hint(text: str) -> str:
         return "a unit is written like `N*m`, `kg*m^2`, `1/s`" if " " in text else ""
 
 
-def units_hint(want: Dimension) -> str:
+def matching_units_hint(dimension: Dimension) -> str:
     """Return the symbols that fit, like `s`, `ms`, `min`; an empty text where there are none."""
     fitting = [
         f"`{name}`"
         for name, (_, powers, angle) in SYMBOLS.items()
-        if Dimension(powers, angle) == want and not want.is_number
+        if Dimension(powers, angle) == dimension and not dimension.is_number
     ]
     return f"units that fit: {', '.join(fitting)}" if fitting else ""
 
@@ -223,13 +223,13 @@ def _nearest_symbol(symbol: str) -> str:
     if symbol in SYMBOLS:
         return symbol
     found = difflib.get_close_matches(symbol, SYMBOLS, n=1)
-    return OFTEN_WRITTEN.get(symbol, found[0] if found else symbol)
+    return MISSPELLED_UNITS.get(symbol, found[0] if found else symbol)
 
 
 def angle_hint(left: Dimension, right: Dimension) -> str:
     """Return what to do where two dimensions differ in the angle only; else nothing."""
     if left.powers != right.powers:
         return ""
-    if left.is_bare and 0 in (left.angle, right.angle):
+    if left.is_dimensionless and 0 in (left.angle, right.angle):
         return "give the unit of the angle: `0.02 rad`, `3 deg`"
     return "they differ in the power of the angle (rad)"

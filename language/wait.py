@@ -12,13 +12,13 @@ from fractions import Fraction
 
 from language.declaration import Formula, Parameter, Range
 from language.model import Automaton, Transition
-from language.once import once
+from language.once import cache_on_owner
 from language.problem import Problems
-from language.program import MOST_TICKS
-from language.reading import all_names
+from language.program import MAX_TIMER_TICKS
+from language.reading import names_read_by
 from language.syntax import Name
 
-MAX_TICKS = MOST_TICKS - 1
+MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1
 """Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
 
 
@@ -30,23 +30,23 @@ def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
     return parameter.name if parameter and parameter.kind == "tunable" else None
 
 
-@once
+@cache_on_owner
 def tunable_waits(automaton: Automaton) -> frozenset[str]:
     """Return the tunable parameters that are waits."""
-    found = (tunable_wait(automaton, one.wait) for one in _transitions(automaton))
+    found = (tunable_wait(automaton, one.wait) for one in _all_transitions(automaton))
     return frozenset(name for name in found if name)
 
 
-def ticks_of(automaton: Automaton, time: Fraction) -> int:
+def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
     """Return a time [s] in ticks, rounded up, exactly."""
     assert automaton.period
     return math.ceil(time / automaton.period)
 
 
-def range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
+def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
     """Return the ticks that a tunable wait may have: those within its range."""
     if parameter.range is None:
-        return Fraction(0), Fraction(MAX_TICKS)
+        return Fraction(0), Fraction(MAX_WAIT_TICKS)
     assert automaton.period
     low, high = (end / automaton.period for end in parameter.range)
     return Fraction(math.ceil(low)), Fraction(math.floor(high))
@@ -57,7 +57,7 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
     waits = tunable_waits(automaton)
     if not waits:
         return
-    read = set(all_names(automaton, with_waits=False))
+    read = set(names_read_by(automaton, include_waits=False))
     for name in sorted(waits):
         parameter = automaton.parameters[name]
         if automaton.model and name in automaton.model.parameters:
@@ -68,10 +68,10 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
             label = f"`{name}` is a tunable wait, and read elsewhere too"
             hint = "it is kept in ticks: take another parameter beside it"
             problems.error("wait", parameter.span, label, hint)
-        low, high = range_in_ticks(automaton, parameter)
-        ticks = ticks_of(automaton, parameter.value or Fraction(0))
-        if (parameter.range and parameter.range[0] < 0) or high > MAX_TICKS:
-            label = f"`{name}` is a wait: its range is within 0 to {MAX_TICKS} ticks"
+        low, high = wait_range_in_ticks(automaton, parameter)
+        ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))
+        if (parameter.range and parameter.range[0] < 0) or high > MAX_WAIT_TICKS:
+            label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
             problems.error("wait", parameter.span, label)
         elif low > high:
             label = f"`{name}` is a wait: its range has no whole tick of {automaton.period} s"
@@ -82,6 +82,6 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
             problems.error("wait", parameter.span, label, hint)
 
 
-def _transitions(automaton: Automaton) -> Iterator[Transition]:
+def _all_transitions(automaton: Automaton) -> Iterator[Transition]:
     for mode in automaton.all_modes:
         yield from mode.transitions

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from language.kind import Whole
+from language.kind import IntType
 from language.operation import Compare, Expr, Select, Unary, Value
 
 
-def range_of(function: str, ranges: Sequence[Whole]) -> Whole:
+def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
     """Return where the value of a function lies whose arguments lie in some ranges."""
     first = ranges[0]
     match function:
         case "abs":
             low = max(first.low, -first.high, 0)
-            return Whole(low, max(abs(first.low), abs(first.high)))
+            return IntType(low, max(abs(first.low), abs(first.high)))
         case "min":
-            return Whole(min(r.low for r in ranges), min(r.high for r in ranges))
+            return IntType(min(r.low for r in ranges), min(r.high for r in ranges))
         case "max":
-            return Whole(max(r.low for r in ranges), max(r.high for r in ranges))
+            return IntType(max(r.low for r in ranges), max(r.high for r in ranges))
         case _:
             _, bottom, top = ranges
             low = min(max(first.low, bottom.low), top.low)
-            return Whole(low, max(bottom.high, min(first.high, top.high)))
+            return IntType(low, max(bottom.high, min(first.high, top.high)))
 
 
-def of_wholes(function: str, parts: Sequence[Expr]) -> Expr:
+def lower_integer_call(function: str, parts: Sequence[Expr]) -> Expr:
     """Return `abs`, `min`, `max` or `clip` of whole numbers; the order is that of the reals."""
     first = parts[0]
     match function:

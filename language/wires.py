@@ -7,13 +7,13 @@ from fractions import Fraction
 
 from language.declaration import Formula
 from language.experiment import Connection, Scenario, System
-from language.lower import expression
+from language.lower import lower_expression
 from language.operation import Assign, Block, Ref
 from language.program import Program, Variable
 from language.syntax import names
-from language.wiring import finished
+from language.wiring import finalise_program
 
-RESULT = "wire.value"
+WIRE_RESULT = "wire.value"
 
 
 def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
@@ -21,7 +21,7 @@ def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
     found: dict[str, Formula] = {}
     for connection in system.connections.values():
         if isinstance(connection.source, Formula):
-            found[block_of(connection)] = connection.source
+            found[connection_block(connection)] = connection.source
     for name, output in system.outputs.items():
         if isinstance(output, Formula):
             found[output_block(name)] = output
@@ -32,7 +32,7 @@ def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
     return found
 
 
-def block_of(connection: Connection) -> str:
+def connection_block(connection: Connection) -> str:
     """Return the name of the block that evaluates a connection."""
     return "connection." + ".".join(connection.target)
 
@@ -55,7 +55,7 @@ def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Pr
     read = {name.path for formula in formulas.values() for name in names(formula.tree)}
     known = {name: Ref(f"signal.{name}") for name in read}
     blocks: dict[str, Block] = {
-        key: (Assign(RESULT, expression(formula.tree, known), formula.key),)
+        key: (Assign(WIRE_RESULT, lower_expression(formula.tree, known), formula.key),)
         for key, formula in formulas.items()
     }
     variables = [
@@ -63,11 +63,11 @@ def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Pr
     ]
     program = Program(
         name="wires",
-        number="float64",
+        number_type="float64",
         period=None,
         major_step=Fraction(1),
         constants=(),
-        variables=(*variables, Variable(RESULT, "real")),
+        variables=(*variables, Variable(WIRE_RESULT, "real")),
         outputs=(),
         modes=(),
         transitions=(),
@@ -75,4 +75,4 @@ def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Pr
         functions=(),
         blocks=blocks,
     )
-    return finished(program, tuple(blocks), keep=(RESULT,))
+    return finalise_program(program, tuple(blocks), keep=(WIRE_RESULT,))

@@ -8,19 +8,19 @@ from decimal import Context, Decimal
 from fractions import Fraction
 
 from language.declaration import Axis, Parameter, Range
-from language.document import Entry, Scalar, Table
-from language.number import NumberType, rounded
+from language.document import Entry, MappingNode, ScalarNode
+from language.number import NumberType, round_to_type
 from language.problem import Span
 from language.quantity import MAX_EXPONENT
 from language.units import Unit
 
-MOST_DIGITS = 60
+MAX_DIGITS = 60
 """Most digits that are tried; a unit with an offset may need many near its zero."""
-PLAIN = range(-5, 16)
+PLAIN_EXPONENTS = range(-5, 16)
 """Decimal exponents of values that are written without one."""
 
 
-def value_in_unit(parameter: Parameter, value: float, number: NumberType) -> str:
+def format_value_in_unit(parameter: Parameter, value: float, number_type: NumberType) -> str:
     """Return a value [SI] of a number type as a literal in the unit of a parameter.
 
     Where no literal in that unit is near enough it is in SI. Read again it is the same value.
@@ -31,40 +31,46 @@ def value_in_unit(parameter: Parameter, value: float, number: NumberType) -> str
         return parameter.values[int(value)]
     if parameter.type == "int":
         return str(int(value))
-    found, unit = _nearest(parameter, value, number)
-    return _literal(found) if unit.text == "1" else f"{_literal(found)} {unit.text}"
+    found, unit = _shortest_in_any_unit(parameter, value, number_type)
+    return _format_decimal(found) if unit.text == "1" else f"{_format_decimal(found)} {unit.text}"
 
 
-def points_of(parameter: Parameter, values: Sequence[float], number: NumberType, at: Span) -> Table:
+def table_points(
+    parameter: Parameter, values: Sequence[float], number_type: NumberType, span: Span
+) -> MappingNode:
     """Return values [SI] of a table as `{points: {...}}`, in the order that a page has them.
 
     The last axis varies fastest. Values are as `value_in_unit` writes them, points as the spec.
     """
     assert parameter.table
-    texts = iter([value_in_unit(parameter, value, number) for value in values])
+    texts = iter([format_value_in_unit(parameter, value, number_type) for value in values])
 
-    def rows(axes: Sequence[Axis]) -> Table:
+    def rows(axes: Sequence[Axis]) -> MappingNode:
         axis, *inner = axes
         found = {}
-        for key in axis.written:
-            node = rows(inner) if inner else Scalar(next(texts), at)
-            found[key] = Entry(key, at, node)
-        return Table(found, at)
+        for key in axis.point_texts:
+            node = rows(inner) if inner else ScalarNode(next(texts), span)
+            found[key] = Entry(key, span, node)
+        return MappingNode(found, span)
 
-    return Table({"points": Entry("points", at, rows(parameter.table.axes))}, at)
+    return MappingNode({"points": Entry("points", span, rows(parameter.table.axes))}, span)
 
 
-def is_written(parameter: Parameter, number: NumberType) -> bool:
+def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
     """Tell whether the exact value of a real is that of the literal which it would be written as.
 
     Another one has more digits than its type: `0.06000000001` in float32.
     """
     assert parameter.value is not None
-    found, unit = _nearest(parameter, rounded(parameter.value, number), number)
+    found, unit = _shortest_in_any_unit(
+        parameter, round_to_type(parameter.value, number_type), number_type
+    )
     return Fraction(found) * unit.factor + unit.offset == parameter.value
 
 
-def calibration_text(name: str, of: str, origin: str, date: str, values: Mapping[str, str]) -> str:
+def format_calibration(
+    name: str, of: str, origin: str, date: str, values: Mapping[str, str]
+) -> str:
     """Return a calibration file; `values` are literals by parameter, empty texts are left out."""
     lines = ["language: 1", f"calibration: {name}", f"of: {of}"]
     lines += [f"from: {json.dumps(origin, ensure_ascii=False)}"] if origin else []
@@ -74,54 +80,58 @@ def calibration_text(name: str, of: str, origin: str, date: str, values: Mapping
     return "\n".join(lines) + "\n"
 
 
-def exact_text(number: Fraction) -> str:
+def format_exact(number: Fraction) -> str:
     """Return a number that has a finite decimal of `MOST_DIGITS` as the language writes it."""
-    return _literal(_to_digits(number, MOST_DIGITS))
+    return _format_decimal(_round_to_digits(number, MAX_DIGITS))
 
 
-def exact_in_unit(value: Fraction, unit: Unit) -> str:
+def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
     """Return a value [SI] exactly, in a unit, or in SI where it has no decimal there."""
     number = (value - unit.offset) / unit.factor
-    if Fraction(_to_digits(number, MOST_DIGITS)) == number:
-        return f"{exact_text(number)} {unit.text}"
-    return f"{exact_text(value)} {unit.dimension}"
+    if Fraction(_round_to_digits(number, MAX_DIGITS)) == number:
+        return f"{format_exact(number)} {unit.text}"
+    return f"{format_exact(value)} {unit.dimension}"
 
 
-def _nearest(parameter: Parameter, value: float, number: NumberType) -> tuple[Decimal, Unit]:
+def _shortest_in_any_unit(
+    parameter: Parameter, value: float, number_type: NumberType
+) -> tuple[Decimal, Unit]:
     """Return the shortest decimal of a value, and the unit that it is in."""
     own, limits = parameter.unit, parameter.range
     for unit in (own, Unit(str(own.dimension), Fraction(1), own.dimension)):
-        found = _shortest(value, unit, number, limits)
+        found = _shortest_decimal(value, unit, number_type, limits)
         if found is not None:
             return found, unit
     raise ValueError(f"{value!r} of `{parameter.name}` has no literal in {own.text}")
 
 
-def _shortest(value: float, unit: Unit, number: NumberType, limits: Range | None) -> Decimal | None:
+def _shortest_decimal(
+    value: float, unit: Unit, number_type: NumberType, limits: Range | None
+) -> Decimal | None:
     """Return the decimal with fewest digits that is the value again, inside of the limits."""
-    wanted = Fraction(value)
+    target = Fraction(value)
     if limits:
-        wanted = min(max(wanted, limits[0]), limits[1])
-    exact = (wanted - unit.offset) / unit.factor
-    for digits in range(1, MOST_DIGITS):
-        found = _to_digits(exact, digits)
+        target = min(max(target, limits[0]), limits[1])
+    exact = (target - unit.offset) / unit.factor
+    for digits in range(1, MAX_DIGITS):
+        found = _round_to_digits(exact, digits)
         again = Fraction(found) * unit.factor + unit.offset
         is_inside = limits is None or limits[0] <= again <= limits[1]
-        if is_inside and rounded(again, number) == value:
+        if is_inside and round_to_type(again, number_type) == value:
             return found if abs(found.adjusted()) < MAX_EXPONENT else None
     return None
 
 
-def _to_digits(exact: Fraction, digits: int) -> Decimal:
+def _round_to_digits(exact: Fraction, digits: int) -> Decimal:
     """Return a number rounded to so many significant digits."""
     context = Context(prec=digits)
     return context.divide(Decimal(exact.numerator), Decimal(exact.denominator)).normalize(context)
 
 
-def _literal(number: Decimal) -> str:
+def _format_decimal(number: Decimal) -> str:
     """Return a decimal as the language writes it: `0.05`, `1.0e-7`."""
     exponent = number.adjusted() if number else 0
-    if exponent in PLAIN:
+    if exponent in PLAIN_EXPONENTS:
         return f"{number:f}"
     sign, figures, _ = number.as_tuple()
     first, *rest = map(str, figures)

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from language.document import Entry, Items, Node, Scalar, Table, lines_of
+from language.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
 from language.problem import Problems, Source, Span
 
 Mark = Any
@@ -16,34 +16,34 @@ MAX_DEPTH = 64
 """Deepest nesting read; the language needs less than 12."""
 MAX_NODES = 200_000
 """Most keys and values read; a spec of 4 MiB has about as many."""
-MAX_FOUND = 100
+MAX_PROBLEMS = 100
 """Problems of form after which reading ends."""
 
 
-def parse(source: Source, text: str) -> Table:
+def parse_yaml(source: Source, text: str) -> MappingNode:
     """Parse YAML text into a tree. Raises SpecError with every problem of form found."""
     problems = Problems()
-    builder = _Builder(source, problems)
+    builder = _YamlBuilder(source, problems)
     try:
         for event in yaml.parse(text, Loader=yaml.CSafeLoader):
-            builder.take(event)
-            if builder.is_full or len(problems.found) >= MAX_FOUND:
+            builder.handle_event(event)
+            if builder.is_aborted or len(problems.reported) >= MAX_PROBLEMS:
                 break
     except yaml.YAMLError as error:
-        problems.error("yaml", *_describe(source, text, error))
-    problems.stop_if_any()
+        problems.error("yaml", *_describe_error(source, text, error))
+    problems.raise_if_errors()
     if builder.root is None:
         place = Span(source, 1, 1)
         problems.error("empty", place, "the file is empty", "a spec starts with `language: 1`")
-    elif not isinstance(builder.root, Table):
+    elif not isinstance(builder.root, MappingNode):
         label = "a spec is a mapping that starts with `language: 1`"
         problems.error("form", builder.root.span, label)
-    problems.stop_if_any()
-    assert isinstance(builder.root, Table)
+    problems.raise_if_errors()
+    assert isinstance(builder.root, MappingNode)
     return builder.root
 
 
-def _describe(source: Source, text: str, error: yaml.YAMLError) -> tuple[Span, str, str]:
+def _describe_error(source: Source, text: str, error: yaml.YAMLError) -> tuple[Span, str, str]:
     if isinstance(error, yaml.reader.ReaderError):
         before = lines_of(f"{text.encode()[: error.position].decode(errors='ignore')}|")
         label = f"this is not YAML: it has the character U+{error.character:04X}"
@@ -67,65 +67,71 @@ def _describe(source: Source, text: str, error: yaml.YAMLError) -> tuple[Span, s
 
 
 @dataclass
-class _Open:
+class _OpenCollection:
     """A mapping or list that is being read."""
 
     start: Mark
     is_mapping: bool
-    nodes: list[Node] = field(default_factory=list)
+    nodes: list[YamlNode] = field(default_factory=list)
     entries: dict[str, Entry] = field(default_factory=dict)
-    cut: set[str] = field(default_factory=set)
-    key: Scalar | Table | Items | None = None
+    split_keys: set[str] = field(default_factory=set)
+    key: ScalarNode | MappingNode | SequenceNode | None = None
 
 
-class _Builder:
+class _YamlBuilder:
     """Takes events one by one; the levels that are open are a list, so depth costs no stack."""
 
     def __init__(self, source: Source, problems: Problems) -> None:
         self.source = source
         self.problems = problems
-        self.root: Node | None = None
-        self.open: list[_Open] = []
-        self.nodes = 0
-        self.documents = 0
-        self.is_full = False
+        self.root: YamlNode | None = None
+        self.open_levels: list[_OpenCollection] = []
+        self.node_count = 0
+        self.document_count = 0
+        self.is_aborted = False
 
-    def take(self, event: yaml.Event) -> None:
+    def handle_event(self, event: yaml.Event) -> None:
         match event:
             case yaml.ScalarEvent():
-                self._refuse(event)
+                self._reject_anchor_and_tag(event)
                 quoted = event.style in ("'", '"')
-                self._add(Scalar(event.value, self._span(event.start_mark, event.end_mark), quoted))
+                self._add_node(
+                    ScalarNode(
+                        event.value, self._span_between(event.start_mark, event.end_mark), quoted
+                    )
+                )
             case yaml.MappingStartEvent() | yaml.SequenceStartEvent():
-                self._refuse(event)
+                self._reject_anchor_and_tag(event)
                 is_mapping = isinstance(event, yaml.MappingStartEvent)
-                self.open.append(_Open(event.start_mark, is_mapping))
-                if len(self.open) > MAX_DEPTH:
-                    self._end(event.start_mark, f"nested deeper than {MAX_DEPTH} levels", "depth")
+                self.open_levels.append(_OpenCollection(event.start_mark, is_mapping))
+                if len(self.open_levels) > MAX_DEPTH:
+                    self._abort(event.start_mark, f"nested deeper than {MAX_DEPTH} levels", "depth")
             case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
-                level = self.open.pop()
-                for key in level.cut:
-                    self._report_cut(level.entries[key])
-                span = self._span(level.start, event.end_mark)
-                ended: Node = Table(level.entries, span)
-                self._add(ended if level.is_mapping else Items(tuple(level.nodes), span))
+                level = self.open_levels.pop()
+                for key in level.split_keys:
+                    self._report_split_value(level.entries[key])
+                span = self._span_between(level.start, event.end_mark)
+                ended: YamlNode = MappingNode(level.entries, span)
+                self._add_node(
+                    ended if level.is_mapping else SequenceNode(tuple(level.nodes), span)
+                )
             case yaml.AliasEvent():
                 label = "an alias (`*name`) is not part of the language"
-                span = self._span(event.start_mark, event.start_mark)
+                span = self._span_between(event.start_mark, event.start_mark)
                 self.problems.error("yaml-feature", span, label, "write the value itself")
-                self._add(Scalar("", span))
+                self._add_node(ScalarNode("", span))
             case yaml.DocumentStartEvent():
-                self.documents += 1
-                if self.documents > 1:
+                self.document_count += 1
+                if self.document_count > 1:
                     label = "this is not YAML: a second document starts here, and a file holds one"
-                    self._end(event.start_mark, label, "yaml")
+                    self._abort(event.start_mark, label, "yaml")
 
-    def _end(self, mark: Mark, label: str, kind: str) -> None:
-        self.is_full = True
-        self.problems.error(kind, self._span(mark, mark), label)
+    def _abort(self, mark: Mark, label: str, kind: str) -> None:
+        self.is_aborted = True
+        self.problems.error(kind, self._span_between(mark, mark), label)
 
-    def _refuse(self, event: yaml.NodeEvent) -> None:
-        place = self._span(event.start_mark, event.start_mark)
+    def _reject_anchor_and_tag(self, event: yaml.NodeEvent) -> None:
+        place = self._span_between(event.start_mark, event.start_mark)
         if event.anchor is not None:
             label = "an anchor (`&name`) is not part of the language"
             self.problems.error("yaml-feature", place, label, "write the value where it is needed")
@@ -134,50 +140,56 @@ class _Builder:
             hint = "leave it out; the contrary of a condition is written `not a`"
             self.problems.error("yaml-feature", place, label, hint)
 
-    def _add(self, node: Node) -> None:
-        self.nodes += 1
-        if self.nodes > MAX_NODES and self.open:
-            mark = self.open[-1].start
-            self._end(mark, f"a spec has at most {MAX_NODES} keys and values", "huge")
-        if not self.open:
+    def _add_node(self, node: YamlNode) -> None:
+        self.node_count += 1
+        if self.node_count > MAX_NODES and self.open_levels:
+            mark = self.open_levels[-1].start
+            self._abort(mark, f"a spec has at most {MAX_NODES} keys and values", "huge")
+        if not self.open_levels:
             self.root = node
             return
-        level = self.open[-1]
+        level = self.open_levels[-1]
         if not level.is_mapping:
             level.nodes.append(node)
         elif level.key is None:
             level.key = node
         else:
-            self._entry(level, level.key, node)
+            self._add_entry(level, level.key, node)
             level.key = None
 
-    def _is_cut(self, level: _Open, key: Node, node: Node) -> bool:
+    def _join_split_value(self, level: _OpenCollection, key: YamlNode, node: YamlNode) -> bool:
         """Join a value that `{...}` ended at a comma: a `(` is open, what follows has no value."""
         last = next(reversed(level.entries.values()), None)
-        if not (last and isinstance(last.node, Scalar) and isinstance(key, Scalar)):
+        if not (last and isinstance(last.node, ScalarNode) and isinstance(key, ScalarNode)):
             return False
         value = last.node
         is_open = not value.quoted and value.text.count("(") > value.text.count(")")
-        if not is_open or key.quoted or not isinstance(node, Scalar) or node.text or node.quoted:
+        if (
+            not is_open
+            or key.quoted
+            or not isinstance(node, ScalarNode)
+            or node.text
+            or node.quoted
+        ):
             return False
         text = f"{value.text}, {key.text}"
         width = key.span.column + key.span.width - value.span.column
         is_one_line = key.span.line == value.span.line
         span = replace(value.span, width=width) if is_one_line else value.span
-        level.entries[last.key] = replace(last, node=Scalar(text, span))
-        level.cut.add(last.key)
+        level.entries[last.key] = replace(last, node=ScalarNode(text, span))
+        level.split_keys.add(last.key)
         return True
 
-    def _report_cut(self, entry: Entry) -> None:
-        assert isinstance(entry.node, Scalar)
+    def _report_split_value(self, entry: Entry) -> None:
+        assert isinstance(entry.node, ScalarNode)
         label = "in `{...}` YAML ends this value at its comma"
         hint = f'quote it: `{entry.key}: "{entry.node.text}"`'
         self.problems.error("yaml-feature", entry.node.span, label, hint)
 
-    def _entry(self, level: _Open, key: Node, node: Node) -> None:
-        if self._is_cut(level, key, node):
+    def _add_entry(self, level: _OpenCollection, key: YamlNode, node: YamlNode) -> None:
+        if self._join_split_value(level, key, node):
             return
-        if not isinstance(key, Scalar):
+        if not isinstance(key, ScalarNode):
             label = "a key is a name, not a list or a mapping"
             self.problems.error("key", key.span, label, "quote a text with brackets")
         elif key.text == "<<":
@@ -191,6 +203,6 @@ class _Builder:
         else:
             level.entries[key.text] = Entry(key.text, key.span, node)
 
-    def _span(self, start: Mark, end: Mark) -> Span:
+    def _span_between(self, start: Mark, end: Mark) -> Span:
         width = end.column - start.column if end.line == start.line else 1
         return Span(self.source, start.line + 1, start.column + 1, max(1, width))

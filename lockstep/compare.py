@@ -11,17 +11,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from codegen.build import FLAGS
-from codegen.harness import executable, fed, observed, tunable
-from codegen.instructions import Instructions, instructions
+from codegen.harness import build_executable, compared_variables, tick_inputs, tunable_constants
+from codegen.instructions import InstructionCounts, count_instructions
 from codegen.machine import HOST, Machine
-from engine.firing import fired
+from engine.firing import fired_transitions
 from engine.interpreter import Stepper
-from language.number import NumberType, decimal
-from language.program import Program, short
+from language.number import NumberType, shortest_decimal
+from language.program import Program, unqualified_name
 
-FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
+REAL_FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
 """How a record keeps a real; whole numbers and truth values take 8 bytes."""
-MOST_COUNTED = 5000
+MAX_COUNTED_STEPS = 5000
 """Steps whose instructions are counted: each of them is repeated forty times."""
 
 
@@ -58,7 +58,7 @@ class Verdict:
     transitions: int
     first: Difference | None
     note: str = ""
-    instructions: Instructions | None = None
+    instructions: InstructionCounts | None = None
 
     @property
     def is_equal(self) -> bool:
@@ -67,7 +67,7 @@ class Verdict:
 
 
 @dataclass
-class Tape:
+class TickLog:
     """What one instance read and carried in each tick of the interpreter."""
 
     program: Program
@@ -80,35 +80,35 @@ class Tape:
     def __post_init__(self) -> None:
         """Prepare the layout of the records."""
         self._modes: tuple[int, ...] = ()
-        self._fed = tuple(variable.name for variable in fed(self.program))
-        self._observed = observed(self.program)
-        self._names = tuple(item.name for item in self._observed)
-        real = FORMAT[self.program.number]
-        kinds = [real if item.kind == "real" else "q" for item in self._observed]
-        self._input = struct.Struct(f"<{len(self._fed) + 1}d")
-        self._tunable = tuple(constant.name for constant in tunable(self.program))
-        self._page = [constant.value for constant in tunable(self.program)]
+        self._input_names = tuple(variable.name for variable in tick_inputs(self.program))
+        self._compared = compared_variables(self.program)
+        self._names = tuple(item.name for item in self._compared)
+        real = REAL_FORMAT[self.program.number_type]
+        kinds = [real if item.kind == "real" else "q" for item in self._compared]
+        self._input = struct.Struct(f"<{len(self._input_names) + 1}d")
+        self._tunable_names = tuple(constant.name for constant in tunable_constants(self.program))
+        self._page = [constant.value for constant in tunable_constants(self.program)]
         self._page_record = struct.Struct(f"<{len(self._page)}d")
         self._value = struct.Struct(f"<{''.join(kinds)}")
         ends = [0, *itertools.accumulate(struct.calcsize(f"<{kind}") for kind in kinds)]
-        self._places = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
+        self._slices = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
 
-    def record(self, stepper: Stepper) -> None:
+    def record_tick(self, stepper: Stepper) -> None:
         """Keep the inputs, a new calibration and the values of the tick that was just done."""
-        inputs = [float(stepper.get(name)) for name in self._fed]
-        page = [stepper.get(name) for name in self._tunable]
+        inputs = [float(stepper.get(name)) for name in self._input_names]
+        page = [stepper.get(name) for name in self._tunable_names]
         record = self._input.pack(*inputs, float(page != self._page))
         if page != self._page:
             record += self._page_record.pack(*page)
             self._page = page
         self.inputs.append(record)
         self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
-        self.transitions += self._taken(stepper)
+        self.transitions += self._count_transitions(stepper)
 
-    def _taken(self, stepper: Stepper) -> int:
+    def _count_transitions(self, stepper: Stepper) -> int:
         """Return how many transitions fired in a tick; of a step whether a mode is another."""
         if self.program.period is not None:
-            return len(fired(self.program, stepper))
+            return len(fired_transitions(self.program, stepper))
         before = self._modes
         self._modes = tuple(stepper.get(name) for name in self.program.mode_variables().values())
         return int(before not in ((), self._modes))
@@ -117,9 +117,9 @@ class Tape:
         """Return the values of a record."""
         return self._value.unpack(record)
 
-    def word(self, record: bytes, position: int) -> bytes:
+    def value_bytes(self, record: bytes, position: int) -> bytes:
         """Return the bytes of one value of a record."""
-        return record[self._places[position]]
+        return record[self._slices[position]]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,13 +127,13 @@ class Tape:
         return self._names
 
     @property
-    def size(self) -> int:
+    def record_size(self) -> int:
         """The bytes of a record of values."""
         return self._value.size
 
 
 def compare(
-    tape: Tape,
+    log: TickLog,
     flags: Sequence[str] = FLAGS,
     compiler: str | None = None,
     machine: Machine = HOST,
@@ -142,72 +142,77 @@ def compare(
 
     Raises ToolMissing, BuildError.
     """
-    with executable(tape.program, flags, compiler, machine) as target:
-        return judged(tape, machine.run(target, b"".join(tape.inputs)))
+    with build_executable(log.program, flags, compiler, machine) as target:
+        return compare_output(log, machine.run(target, b"".join(log.inputs)))
 
 
-def counted(verdict: Verdict, tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
+def add_instruction_counts(verdict: Verdict, log: TickLog, flags: Sequence[str] = FLAGS) -> Verdict:
     """Return a verdict with the instructions of its first steps on a Cortex-M4F."""
-    records = b"".join(tape.inputs[:MOST_COUNTED])
-    return replace(verdict, instructions=instructions(tape.program, records, flags))
+    records = b"".join(log.inputs[:MAX_COUNTED_STEPS])
+    return replace(verdict, instructions=count_instructions(log.program, records, flags))
 
 
-def judged(tape: Tape, output: bytes) -> Verdict:
+def compare_output(log: TickLog, output: bytes) -> Verdict:
     """Return the verdict on what the C of the tape's program wrote for the tape's inputs."""
-    size, ticks = tape.size, len(tape.values)
+    size, ticks = log.record_size, len(log.values)
     differing, first = 0, None
     if len(output) != size * ticks:
         raise ValueError(f"C wrote {len(output)} bytes, {size * ticks} were expected")
     for tick in range(ticks):
-        ours, theirs = tape.values[tick], output[tick * size : (tick + 1) * size]
+        ours, theirs = log.values[tick], output[tick * size : (tick + 1) * size]
         if ours == theirs:
             continue
-        different = _different(tape, ours, theirs)
+        different = _differing_positions(log, ours, theirs)
         differing += len(different)
         if different and first is None:
-            first = _difference(tape, tick, different[0], theirs)
+            first = _describe_difference(log, tick, different[0], theirs)
     return Verdict(
-        tape.name,
-        tape.program.name,
+        log.name,
+        log.program.name,
         ticks,
-        ticks * len(tape.names),
+        ticks * len(log.names),
         differing,
-        tape.transitions,
+        log.transitions,
         first,
     )
 
 
-def not_compared(name: str, program: Program, why: str) -> Verdict:
+def skipped_verdict(name: str, program: Program, reason: str) -> Verdict:
     """Return the verdict on an instance of which nothing can be compared."""
-    return Verdict(name, program.name, 0, 0, 0, 0, None, why)
+    return Verdict(name, program.name, 0, 0, 0, 0, None, reason)
 
 
-def _different(tape: Tape, ours: bytes, theirs: bytes) -> list[int]:
+def _differing_positions(log: TickLog, ours: bytes, theirs: bytes) -> list[int]:
     """Return the positions that differ; all NaNs are one (rule 17c)."""
-    pairs = zip(tape.unpack(ours), tape.unpack(theirs), strict=True)
+    pairs = zip(log.unpack(ours), log.unpack(theirs), strict=True)
     return [
         position
         for position, (a, b) in enumerate(pairs)
-        if tape.word(ours, position) != tape.word(theirs, position) and (a == a or b == b)
+        if log.value_bytes(ours, position) != log.value_bytes(theirs, position)
+        and (a == a or b == b)
     ]
 
 
-def _difference(tape: Tape, tick: int, position: int, theirs: bytes) -> Difference:
-    ours = tape.values[tick]
-    values, other = tape.unpack(ours), tape.unpack(theirs)
-    mode = values[tape.names.index("memory.mode")]
-    period = float(tape.program.period or tape.program.major_step)
+def _describe_difference(log: TickLog, tick: int, position: int, theirs: bytes) -> Difference:
+    ours = log.values[tick]
+    values, other = log.unpack(ours), log.unpack(theirs)
+    mode = values[log.names.index("memory.mode")]
+    period = float(log.program.period or log.program.major_step)
     return Difference(
         tick=tick,
-        time=tape.start + tick * period,
-        mode=tape.program.mode_name(int(mode)),
-        signal=short(tape.names[position]),
-        engine=_shown(tape, values[position], ours, position),
-        compiled=_shown(tape, other[position], theirs, position),
+        time=log.start + tick * period,
+        mode=log.program.mode_name(int(mode)),
+        signal=unqualified_name(log.names[position]),
+        engine=_format_value(log, values[position], ours, position),
+        compiled=_format_value(log, other[position], theirs, position),
     )
 
 
-def _shown(tape: Tape, value: float | int, record: bytes, position: int) -> str:
-    bits = tape.word(record, position)[::-1].hex()
-    text = decimal(value, tape.program.number) if isinstance(value, float) else repr(value)
+def _format_value(log: TickLog, value: float | int, record: bytes, position: int) -> str:
+    bits = log.value_bytes(record, position)[::-1].hex()
+    text = (
+        shortest_decimal(value, log.program.number_type)
+        if isinstance(value, float)
+        else repr(value)
+    )
     return f"{text} (0x{bits})"

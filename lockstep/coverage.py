@@ -6,35 +6,35 @@ import dataclasses
 from collections.abc import Sequence
 
 from engine.starting import programs_of
-from engine.stimulus import resolved
+from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
 from language.experiment import Scenario, System
 from language.program import Program
-from lockstep.compare import Verdict, not_compared
+from lockstep.compare import Verdict, skipped_verdict
 
 
-def noted(
+def add_notes(
     verdicts: Sequence[Verdict], system: System, scenario: Scenario, trajectory: Trajectory
 ) -> list[Verdict]:
     """Return the verdicts with notes, and one on each instance that has none."""
-    scenario = resolved(system, scenario)
-    found = {verdict.name: verdict for verdict in verdicts}
+    scenario = resolve_recording(system, scenario)
+    verdict_by_instance = {verdict.name: verdict for verdict in verdicts}
     for name, program in programs_of(system, scenario).items():
-        if name not in found:
-            found[name] = not_compared(name, program, _reason(program))
+        if name not in verdict_by_instance:
+            verdict_by_instance[name] = skipped_verdict(name, program, _skip_reason(program))
         elif program.period is None and trajectory.stopped is None:
-            found[name] = _with_end(found[name], program, scenario)
-    return list(found.values())
+            verdict_by_instance[name] = _add_end_note(verdict_by_instance[name], program, scenario)
+    return list(verdict_by_instance.values())
 
 
-def _reason(program: Program) -> str:
+def _skip_reason(program: Program) -> str:
     if "step" not in program.blocks:
         reason = "not compared: an input varies inside its major steps, which C cannot be given"
         return f"{reason}; `steps` and tables with `hold: previous` can be"
     return "not compared: nothing happened to it at its own pace"
 
 
-def _with_end(verdict: Verdict, program: Program, scenario: Scenario) -> Verdict:
+def _add_end_note(verdict: Verdict, program: Program, scenario: Scenario) -> Verdict:
     """A continuous instance is compared until something outside happens inside a major step."""
     assert scenario.horizon is not None
     steps = scenario.horizon // program.major_step + 1

@@ -7,20 +7,20 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 
-from codegen.fuzzing import Range, Words, fuzzed, values_of, words
-from codegen.harness import fed
+from codegen.fuzzing import Range, WordValues, decode_sequence, run_fuzzer, word_table
+from codegen.harness import tick_inputs
 from engine.interpreter import Interpreter
-from engine.simulate import CONVERT
+from engine.simulate import CONVERTER_OF_TYPE
 from language.program import Program
-from lockstep.compare import Difference, Tape, compare
+from lockstep.compare import Difference, TickLog, compare
 
 RUNS, TICKS, SEED = 20_000, 24, 1
-MOST_LOOKED_AT = 20
+MAX_COMPARED = 20
 """Sequences with another sum of which values are compared one by one."""
 
 
 @dataclass(frozen=True)
-class Fuzzed:
+class FuzzReport:
     """What came of fuzzing: sequences that `runs` tried, how many differ from each other, their
     ticks and transitions, `edges` of the C that they came along, the `modes` that they were in,
     what sanitizers found, and `differing` sequences with the `first` value that is another one.
@@ -49,51 +49,53 @@ def fuzz(
     runs: int = RUNS,
     ticks: int = TICKS,
     seed: int = SEED,
-) -> Fuzzed:
+) -> FuzzReport:
     """Let libFuzzer look for ways through the C of a sampled Program, and compare each with the
     engine's; `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
     """
-    found = fuzzed(program, ranges, runs, ticks, seed)
-    table = words(program, ranges)
-    blank = Tape(program, program.name)
-    done = taken = differing = 0
+    run = run_fuzzer(program, ranges, runs, ticks, seed)
+    table = word_table(program, ranges)
+    empty_log = TickLog(program, program.name)
+    done = transitions = differing = 0
     modes: set[int] = set()
     first: Difference | None = None
-    known = dict(found.tried)
+    known = dict(run.sequences)
     for sequence, checksum in known.items():
-        tape = _taped(blank, table, sequence, modes)
-        done, taken = done + len(tape.values), taken + tape.transitions
-        if zlib.crc32(b"".join(tape.values)) == checksum:
+        log = _replay_sequence(empty_log, table, sequence, modes)
+        done, transitions = done + len(log.values), transitions + log.transitions
+        if zlib.crc32(b"".join(log.values)) == checksum:
             continue
-        verdict = compare(tape) if differing < MOST_LOOKED_AT else None
+        verdict = compare(log) if differing < MAX_COMPARED else None
         if verdict is None or not verdict.is_equal:
             differing += 1
             first = first or (verdict.first if verdict else None)
     names = tuple(mode.name for mode in program.modes if mode.number in modes)
-    return Fuzzed(
+    return FuzzReport(
         program.name,
-        len(found.tried),
+        len(run.sequences),
         len(known),
         done,
-        taken,
-        found.edges,
+        transitions,
+        run.edges,
         names,
-        found.findings,
+        run.findings,
         differing,
         first,
     )
 
 
-def _taped(blank: Tape, table: list[Words], sequence: bytes, modes: set[int]) -> Tape:
+def _replay_sequence(
+    empty_log: TickLog, table: list[WordValues], sequence: bytes, modes: set[int]
+) -> TickLog:
     """Return what the engine does with a sequence; the modes that it is in are noted."""
-    program, tape = blank.program, copy(blank)
-    tape.inputs, tape.values, engine = [], [], Interpreter(program)
-    inputs = [(v.name, CONVERT[v.type]) for v in fed(program)]
+    program, log = empty_log.program, copy(empty_log)
+    log.inputs, log.values, engine = [], [], Interpreter(program)
+    inputs = [(v.name, CONVERTER_OF_TYPE[v.type]) for v in tick_inputs(program)]
     regions = tuple(program.mode_variables().values())
-    for values in values_of(program, table, sequence):
+    for values in decode_sequence(program, table, sequence):
         for (name, kind), value in zip(inputs, values, strict=True):
             engine.set(name, kind(value))
         engine.run("step")
-        tape.record(engine)
+        log.record_tick(engine)
         modes.update(engine.get(name) for name in regions)
-    return tape
+    return log

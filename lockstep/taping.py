@@ -7,16 +7,16 @@ from engine.simulate import simulate
 from engine.trajectory import Trajectory
 from language.experiment import Scenario, System
 from language.program import Program
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 
 
-def taped(system: System, scenario: Scenario) -> tuple[Trajectory, dict[str, Tape]]:
+def record_ticks(system: System, scenario: Scenario) -> tuple[Trajectory, dict[str, TickLog]]:
     """Simulate; return the trajectory and a tape of each instance by name."""
-    tapes: dict[str, Tape] = {}
+    logs: dict[str, TickLog] = {}
 
     def ticked(name: str, used: Program, stepper: Stepper) -> None:
-        if name not in tapes:
-            tapes[name] = Tape(used, name=name, start=float(system.instances[name].offset))
-        tapes[name].record(stepper)
+        if name not in logs:
+            logs[name] = TickLog(used, name=name, start=float(system.instances[name].offset))
+        logs[name].record_tick(stepper)
 
-    return simulate(system, scenario, ticked=ticked), tapes
+    return simulate(system, scenario, on_tick=ticked), logs

@@ -8,10 +8,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from modewright.neighbours import claim_neighbours
+from modewright.neighbours import load_own_packages
 
 if TYPE_CHECKING:
-    from diagnosis.dossier import Dossier
+    from diagnosis.dossier import DiagnosisReport
     from diagnosis.fit import Fit
     from engine.difference import RunDifference
     from engine.plot import Picture
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 __all__ = [
     "CalibrationPage",
     "CheckedRecordings",
+    "DiagnosisReport",
     "Diagram",
-    "Dossier",
     "Event",
     "Fit",
     "ImportedPage",
@@ -103,7 +103,7 @@ PLACES = {
     "resolve_calibration": "modewright.calibrations",
     "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
-    "Dossier": "diagnosis.dossier",
+    "DiagnosisReport": "diagnosis.dossier",
     "Event": "engine.trajectory",
     "Fit": "diagnosis.fit",
     "Picture": "engine.plot",
@@ -141,7 +141,7 @@ PLACES = {
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
 
-claim_neighbours()
+load_own_packages()
 
 
 def __getattr__(name: str) -> Any:

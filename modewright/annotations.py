@@ -9,10 +9,10 @@ from language.problem import Problem
 
 def annotation_lines(problems: Iterable[Problem]) -> str:
     """Return one `::error file=...::message` for each problem."""
-    return "".join(f"{_annotation(problem)}\n" for problem in problems)
+    return "".join(f"{_format_annotation(problem)}\n" for problem in problems)
 
 
-def _annotation(problem: Problem) -> str:
+def _format_annotation(problem: Problem) -> str:
     span = problem.span
     values = {
         "file": span.source.name,
@@ -21,14 +21,14 @@ def _annotation(problem: Problem) -> str:
         "endColumn": str(max(1, span.column) + span.width),
         "title": problem.code,
     }
-    parts = ",".join(f"{name}={_escaped_value(value)}" for name, value in values.items())
+    parts = ",".join(f"{name}={_escape_property(value)}" for name, value in values.items())
     text = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
-    return f"::{problem.severity} {parts}::{_escaped(text)}"
+    return f"::{problem.severity} {parts}::{_escape_data(text)}"
 
 
-def _escaped(text: str) -> str:
+def _escape_data(text: str) -> str:
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _escaped_value(text: str) -> str:
-    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
+def _escape_property(text: str) -> str:
+    return _escape_data(text).replace(":", "%3A").replace(",", "%2C")

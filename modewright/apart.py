@@ -10,22 +10,26 @@ from pathlib import Path
 from engine.recorded_part import file_of, overlap
 
 
-def require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
+def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
     """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
     for one, other in itertools.combinations(train, 2):
-        _require_other(other, "is named twice: each recording counts once", one)
+        _require_no_overlap(other, "is named twice: each recording counts once", one)
     for one, other in itertools.combinations(held_out, 2):
-        _require_other(other, "is held out twice: each recording counts once", one, opened=False)
+        _require_no_overlap(
+            other, "is held out twice: each recording counts once", one, opened=False
+        )
     for file in held_out:
         path = file_of(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
             raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
         for learnt in train:
-            _require_other(file, "is learnt from: it cannot be held out", learnt, opened=False)
+            _require_no_overlap(file, "is learnt from: it cannot be held out", learnt, opened=False)
 
 
-def _require_other(file: str | Path, what: str, earlier: str | Path, opened: bool = True) -> None:
+def _require_no_overlap(
+    file: str | Path, reason: str, other: str | Path, opened: bool = True
+) -> None:
     """Raise ValueError where a recording has values of an earlier one."""
-    if overlap(Path(file), Path(earlier), opened):
-        same = os.path.realpath(file_of(Path(file))) == os.path.realpath(file_of(Path(earlier)))
-        raise ValueError(f"{file} {what}" if same else f"{file}, a copy of {earlier}, {what}")
+    if overlap(Path(file), Path(other), opened):
+        same = os.path.realpath(file_of(Path(file))) == os.path.realpath(file_of(Path(other)))
+        raise ValueError(f"{file} {reason}" if same else f"{file}, a copy of {other}, {reason}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from codegen.build import optimised
+from codegen.build import flags_at_level
 from codegen.machine import CORTEX_M4F, HOST, MACHINES
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
@@ -21,18 +21,18 @@ from language.load import automaton_of, program_of
 from language.map import read_map
 from language.model import Automaton
 from language.number import NumberType
-from language.page import pages_of
+from language.page import parse_pages
 from language.problem import Problems, SpecError
 from language.program import Program
-from language.project import Project, layered, read_document, with_calibrations
+from language.project import Project, add_calibrations, apply_variant, read_document
 from language.scenario import read_scenario
-from language.system import in_numbers, read_system
-from lockstep.compare import Tape, Verdict, compare, counted
-from lockstep.coverage import noted
-from lockstep.taping import taped
+from language.system import read_system, with_number_type
+from lockstep.compare import TickLog, Verdict, add_instruction_counts, compare
+from lockstep.coverage import add_notes
+from lockstep.taping import record_ticks
 from modewright.checking import check as check
-from modewright.compiled import run as run_compiled
-from modewright.documents import Values, calibrated_document, scalars
+from modewright.compiled import run_simulation as run_compiled
+from modewright.documents import Values, load_calibrated_document, parse_values
 
 METHODS = ("RK4", "DOP853", "Radau", "LSODA")
 """How continuous automata can be integrated: our own method, or one of scipy's."""
@@ -65,9 +65,11 @@ def load(
 ) -> Loaded:
     """Return a system with a scenario. Raises SpecError with all problems."""
     project = Project(root or Path())
-    read = read_system(calibrated_document(system, project, calibrations), project, scalars(values))
+    parsed_system = read_system(
+        load_calibrated_document(system, project, calibrations), project, parse_values(values)
+    )
     document = read_document(project.path_of(scenario))
-    return Loaded(read, read_scenario(document, project, read))
+    return Loaded(parsed_system, read_scenario(document, project, parsed_system))
 
 
 def simulate(
@@ -94,12 +96,12 @@ def simulate(
     if reference or method != "RK4":
         from engine import reference as independent  # scipy only where asked for
 
-        run = independent.reference if reference else independent.by_method
-        scipys: Any = "DOP853" if method == "RK4" else method
-        return run(loaded.system, loaded.scenario, scipys)
-    trajectory, means = run_compiled(loaded.system, loaded.scenario, compiled)
-    told = logging.WARNING if compiled and means.startswith("interpreter") else logging.INFO
-    logging.getLogger("modewright").log(told, "%s by the %s", scenario, means)
+        run = independent.simulate_reference if reference else independent.simulate_with_scipy
+        scipy_method: Any = "DOP853" if method == "RK4" else method
+        return run(loaded.system, loaded.scenario, scipy_method)
+    trajectory, backend = run_compiled(loaded.system, loaded.scenario, compiled)
+    level = logging.WARNING if compiled and backend.startswith("interpreter") else logging.INFO
+    logging.getLogger("modewright").log(level, "%s by the %s", scenario, backend)
     return trajectory
 
 
@@ -107,7 +109,7 @@ def program(reference: str, values: Values | None = None, root: Path | None = No
     """Return the Program of an automaton. Raises SpecError."""
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
-    return program_of(automaton_of(document, project, scalars(values)))
+    return program_of(automaton_of(document, project, parse_values(values)))
 
 
 def lockstep(
@@ -133,20 +135,22 @@ def lockstep(
     """
     loaded = load(system, scenario, values, root, calibrations)
     if numbers:
-        loaded = Loaded(in_numbers(loaded.system, numbers), loaded.scenario)
+        loaded = Loaded(with_number_type(loaded.system, numbers), loaded.scenario)
     if changes:
-        pages = pages_of(changes, loaded.system)
-        loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, pages=pages))
+        pages = parse_pages(changes, loaded.system)
+        loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, calibrations=pages))
     for instance in loaded.system.instances.values():
         if instance.automaton.is_sampled:
             require_ranges(instance.automaton)
-    trajectory, tapes = taped(loaded.system, loaded.scenario)
-    flags = optimised(optimise)
+    trajectory, tapes = record_ticks(loaded.system, loaded.scenario)
+    flags = flags_at_level(optimise)
     machine = MACHINES[target]
     verdicts = [compare(tape, flags, compiler, machine) for tape in tapes.values()]
     if machine is CORTEX_M4F:
-        verdicts = [counted(verdict, tapes[verdict.name], flags) for verdict in verdicts]
-    return trajectory, noted(verdicts, loaded.system, loaded.scenario, trajectory)
+        verdicts = [
+            add_instruction_counts(verdict, tapes[verdict.name], flags) for verdict in verdicts
+        ]
+    return trajectory, add_notes(verdicts, loaded.system, loaded.scenario, trajectory)
 
 
 def replay(
@@ -164,18 +168,18 @@ def replay(
 
     Raises SpecError, ToolMissing.
     """
-    automaton, used = _estimator(estimator, variant, values, root, calibrations)
-    mapping = _map(map, root)
+    automaton, used = _load_estimator(estimator, variant, values, root, calibrations)
+    mapping = _load_map(map, root)
     columns, left_out = used_columns(automaton, mapping)
-    read = read_recording(recording, mapping, columns)
-    tape = Tape(used, name=automaton.name)
-    result = replay_recording(automaton, used, read, mapping, ticked=tape.record)
+    measured = read_recording(recording, mapping, columns)
+    tape = TickLog(used, name=automaton.name)
+    result = replay_recording(automaton, used, measured, mapping, on_tick=tape.record_tick)
     tape.start = float(result.trajectory.times[0])
     verdict = compare(tape) if compiled else None
-    return Replayed(result, verdict, tuple(left_out), read)
+    return Replayed(result, verdict, tuple(left_out), measured)
 
 
-def _estimator(
+def _load_estimator(
     reference: str,
     variant: str | None,
     values: Values | None,
@@ -188,17 +192,17 @@ def _estimator(
         over = read_document(project.path_of(variant))
         problems = Problems()
         require_kind(over, "variant", problems)
-        document = layered(document, over, project, problems)
-    document = with_calibrations(document, calibrations, "--calibration")
-    automaton = automaton_of(document, project, scalars(values))
+        document = apply_variant(document, over, project, problems)
+    document = add_calibrations(document, calibrations, "--calibration")
+    automaton = automaton_of(document, project, parse_values(values))
     if not automaton.is_sampled:
         problems = Problems()
         label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
         problems.error("form", automaton.span, label, "give it a `period`")
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     return automaton, program_of(automaton)
 
 
-def _map(reference: str, root: Path | None) -> RecordingMap:
+def _load_map(reference: str, root: Path | None) -> RecordingMap:
     project = Project(root or Path())
     return read_map(read_document(project.path_of(reference)), project)

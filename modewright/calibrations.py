@@ -9,18 +9,18 @@ from pathlib import Path
 from codegen.exchange.characteristic import PageFile
 from codegen.exchange.desk import Remark
 from codegen.exchange.formats import FORMATS, read_page
-from codegen.exchange.owned import Owned
-from codegen.exchange.page import page_constants, page_name, page_of
-from codegen.exchange.taking import Taken, taken
-from language.document import Document, Node, Scalar
+from codegen.exchange.owned import NameFilter
+from codegen.exchange.page import page_characteristics, page_constants, page_name
+from codegen.exchange.taking import ImportedValues, import_values
+from language.document import Document, ScalarNode, YamlNode
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.problem import Problem, Problems, Source, Span
 from language.program import Constant, Program
 from language.project import Project
-from language.tree import one_line
-from language.written import calibration_text, is_written, value_in_unit
-from modewright.documents import Values, calibrated_document, scalars as as_scalars
+from language.tree import format_inline
+from language.written import format_calibration, format_value_in_unit, is_exact_literal
+from modewright.documents import Values, load_calibrated_document, parse_values as as_scalars
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,15 @@ class CalibrationPage:
 
     def text(self, form: str) -> str:
         """Return the page as a file: `dcm`, `cdfx` or `csv`."""
-        name, number = self.program.name, self.program.number
+        name, number = self.program.name, self.program.number_type
         heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
-        return FORMATS[form].write(name, heading, page_of(self.automaton, self.program))
+        return FORMATS[form].write(
+            name, heading, page_characteristics(self.automaton, self.program)
+        )
 
 
 @dataclass(frozen=True)
-class Change:
+class SolvedChange:
     """A solved number that is another one now; `relative` is |change| over the larger size."""
 
     name: str
@@ -73,12 +75,12 @@ class ImportedPage:
     page: CalibrationPage
     values: Mapping[str, str]
     remarks: tuple[Remark, ...]
-    stale: tuple[Change, ...]
+    stale: tuple[SolvedChange, ...]
     warnings: tuple[Problem, ...]
 
     def calibration(self, name: str, origin: str = "", date: str = "") -> str:
         """Return the calibration file of the language with these values."""
-        return calibration_text(name, self.page.program.name, origin, date, self.values)
+        return format_calibration(name, self.page.program.name, origin, date, self.values)
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class ResolvedPage:
     """A page that was solved anew, the solved numbers that changed, and those that were absent."""
 
     page: CalibrationPage
-    changes: tuple[Change, ...]
+    changes: tuple[SolvedChange, ...]
     added: tuple[str, ...]
     remarks: tuple[Remark, ...] = ()
     warnings: tuple[Problem, ...] = ()
@@ -100,7 +102,9 @@ def export_calibration(
 ) -> CalibrationPage:
     """Return the calibration page of an automaton. Raises SpecError."""
     project = Project(root or Path())
-    return _page(calibrated_document(reference, project, calibrations), project, as_scalars(values))
+    return _build_page(
+        load_calibrated_document(reference, project, calibrations), project, as_scalars(values)
+    )
 
 
 def import_calibration(
@@ -115,7 +119,9 @@ def import_calibration(
     With `own_only` names of other functions of the ECU are passed over.
     """
     project = Project(root or Path())
-    return _imported(file, form, calibrated_document(of, project, ()), project, {}, own_only)
+    return _import_page(
+        file, form, load_calibrated_document(of, project, ()), project, {}, own_only
+    )
 
 
 def resolve_calibration(
@@ -131,52 +137,63 @@ def resolve_calibration(
     Changes are those since the file, without one since the spec as it stands. Raises SpecError.
     """
     project = Project(root or Path())
-    document, scalars = calibrated_document(reference, project, calibrations), as_scalars(values)
+    document, scalars = (
+        load_calibrated_document(reference, project, calibrations),
+        as_scalars(values),
+    )
     if page:
-        found = _imported(page, form, document, project, scalars)
-        absent = [remark.name for remark in found.remarks if remark.kind == "missing"]
-        solved = {page_name(found.page.program, c) for c in found.page.solved}
+        imported = _import_page(page, form, document, project, scalars)
+        absent = [remark.name for remark in imported.remarks if remark.kind == "missing"]
+        solved = {page_name(imported.page.program, c) for c in imported.page.solved}
         added = tuple(name for name in absent if name in solved)
-        kept = tuple(remark for remark in found.remarks if remark.name not in added)
-        return ResolvedPage(found.page, found.stale, added, kept, found.warnings)
-    before = _page(calibrated_document(reference, project, ()), project, {})
-    after = _page(document, project, scalars)
+        remarks = tuple(remark for remark in imported.remarks if remark.name not in added)
+        return ResolvedPage(imported.page, imported.stale, added, remarks, imported.warnings)
+    before = _build_page(load_calibrated_document(reference, project, ()), project, {})
+    after = _build_page(document, project, scalars)
     known = {constant.name: constant.value for constant in before.solved}
     added = tuple(page_name(after.program, c) for c in after.solved if c.name not in known)
-    return ResolvedPage(after, _changes(known, after), added)
+    return ResolvedPage(after, _changed_constants(known, after), added)
 
 
-def _imported(
+def _import_page(
     file: Path,
     form: str | None,
     document: Document,
     project: Project,
-    scalars: Mapping[str, Scalar],
+    scalars: Mapping[str, ScalarNode],
     own_only: bool = False,
 ) -> ImportedPage:
     problems = Problems()
     automaton = automaton_of(document, project, scalars)
     program = program_of(automaton)
-    owned = Owned(program.name if own_only else "")
-    read: PageFile = read_page(file, problems, form, owned)
-    found: Taken = taken(read, automaton, program, problems, owned)
-    page = _page(document, project, {**scalars, **found.values})
-    values = {name: one_line(node) for name, node in found.values.items()}
+    owned = NameFilter(program.name if own_only else "")
+    page_file: PageFile = read_page(file, problems, form, owned)
+    found: ImportedValues = import_values(page_file, automaton, program, problems, owned)
+    page = _build_page(document, project, {**scalars, **found.values})
+    values = {name: format_inline(node) for name, node in found.values.items()}
     return ImportedPage(
-        page, values, found.remarks, _changes(found.solved, page), tuple(problems.found)
+        page,
+        values,
+        found.remarks,
+        _changed_constants(found.solved, page),
+        tuple(problems.reported),
     )
 
 
-def _changes(before: Mapping[str, float], page: CalibrationPage) -> tuple[Change, ...]:
+def _changed_constants(
+    before: Mapping[str, float], page: CalibrationPage
+) -> tuple[SolvedChange, ...]:
     """Return the solved numbers that are others than they were."""
     return tuple(
-        Change(page_name(page.program, constant), before[constant.name], constant.value)
+        SolvedChange(page_name(page.program, constant), before[constant.name], constant.value)
         for constant in page.solved
         if constant.name in before and constant.value != before[constant.name]
     )
 
 
-def _page(document: Document, project: Project, values: Mapping[str, Node]) -> CalibrationPage:
+def _build_page(
+    document: Document, project: Project, values: Mapping[str, YamlNode]
+) -> CalibrationPage:
     """Return a page; a value with more digits than its type is taken as the page will hold it.
 
     What is solved for a value then fits what a tool reads of it, to the last bit.
@@ -184,20 +201,20 @@ def _page(document: Document, project: Project, values: Mapping[str, Node]) -> C
     automaton = automaton_of(document, project, values)
     program = program_of(automaton)
     solved_for = {name for c in page_constants(program) for name in c.depends_on}
-    finer = {
-        name: _held(automaton, program, name)
+    rounded = {
+        name: _stored_value(automaton, program, name)
         for name in sorted(solved_for)
         if automaton.parameters[name].type == "real"
-        and not is_written(automaton.parameters[name], program.number)
+        and not is_exact_literal(automaton.parameters[name], program.number_type)
     }
-    if finer:
-        automaton = automaton_of(document, project, {**values, **finer})
+    if rounded:
+        automaton = automaton_of(document, project, {**values, **rounded})
         program = program_of(automaton)
     return CalibrationPage(automaton, program)
 
 
-def _held(automaton: Automaton, program: Program, name: str) -> Scalar:
+def _stored_value(automaton: Automaton, program: Program, name: str) -> ScalarNode:
     """Return the value of a parameter as a page holds it."""
     value = next(c.value for c in program.constants if c.name == f"calibration.{name}")
-    text = value_in_unit(automaton.parameters[name], value, program.number)
-    return Scalar(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))
+    text = format_value_in_unit(automaton.parameters[name], value, program.number_type)
+    return ScalarNode(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))

@@ -9,23 +9,23 @@ from typing import Any
 
 from expectation.reader import read_test
 from language.calibration import read_calibration
-from language.document import Document, Scalar
+from language.document import Document, ScalarNode
 from language.effect import read_effect
-from language.examine import examine
-from language.load import automaton_of, lowered
+from language.examine import check_warnings
+from language.load import automaton_of, lower_automaton
 from language.map import read_map
 from language.model import Automaton
-from language.numbers_text import motion_lines
-from language.problem import Problem, Problems, SpecError, ordered
+from language.numbers_text import format_method_lines
+from language.problem import Problem, Problems, SpecError, sort_problems
 from language.program import Program
-from language.project import Project, expanded, with_calibrations
+from language.project import Project, add_calibrations, expand_document
 from language.scenario import read_scenario
 from language.system import read_system
 from sweep.study_reader import read_study
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckResult:
     """All problems of a spec, warnings too; of an automaton the limits of its step, as lines."""
 
     problems: tuple[Problem, ...]
@@ -34,34 +34,38 @@ class Checked:
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
     """Return all problems of a spec, warnings too; an empty list means that it is fine."""
-    return list(checked(reference, root).problems)
+    return list(check_spec(reference, root).problems)
 
 
-def checked(
+def check_spec(
     reference: str, root: Path | None = None, texts: Mapping[Path, str] | None = None
-) -> Checked:
+) -> CheckResult:
     """Return all problems of a spec, and the largest stable step of each mode of an automaton.
 
     `texts` are those of an editor, by resolved path: they stand for what is on the disk.
     """
-    return _checked(reference, Project(root or Path(), texts or {}), _Further(lowered, examine))
+    return _run_checks(
+        reference,
+        Project(root or Path(), texts or {}),
+        _DeepChecks(lower_automaton, check_warnings),
+    )
 
 
-def errors_first(reference: str, root: Path, texts: Mapping[Path, str]) -> Checked:
+def check_without_proofs(reference: str, root: Path, texts: Mapping[Path, str]) -> CheckResult:
     """Return what `checked` does without what takes long: solved numbers, and proofs."""
-    nothing = _Further(lambda automaton: None, lambda automaton, problems: None)
-    return _checked(reference, Project(root, texts), nothing)
+    skip_deep_checks = _DeepChecks(lambda automaton: None, lambda automaton, problems: None)
+    return _run_checks(reference, Project(root, texts), skip_deep_checks)
 
 
 @dataclass(frozen=True)
-class _Further:
+class _DeepChecks:
     """What is done with an automaton without errors: its Program is made, it is looked at."""
 
     lower: Callable[[Automaton], Program | None]
     examine: Callable[[Automaton, Problems], None]
 
 
-def _checked(reference: str, project: Project, further: _Further) -> Checked:
+def _run_checks(reference: str, project: Project, deep_checks: _DeepChecks) -> CheckResult:
     """Return what is found of a spec."""
     problems = Problems()
     limits: tuple[str, ...] = ()
@@ -69,49 +73,49 @@ def _checked(reference: str, project: Project, further: _Further) -> Checked:
         document = project.read(project.path_of(reference))
         is_calibration = document.kind == "calibration"
         if is_calibration:
-            document = _calibrated(document, reference, project, problems)
-        base = expanded(document, project, problems)
-        if base.kind == "automaton":
+            document = _apply_calibration(document, reference, project, problems)
+        expanded_document = expand_document(document, project, problems)
+        if expanded_document.kind == "automaton":
             automaton = automaton_of(document, project, problems=problems)
-            program = further.lower(automaton)
-            motion = program.motion if program else None
-            further.examine(automaton, problems)
-            if motion and motion.limits and not is_calibration:
-                first, *others = motion_lines(motion)
+            program = deep_checks.lower(automaton)
+            motion = program.integration if program else None
+            deep_checks.examine(automaton, problems)
+            if motion and motion.stability_limits and not is_calibration:
+                first, *others = format_method_lines(motion)
                 limits = (f"{document.name}: {first}", *others)
-        elif base.kind == "system":
+        elif expanded_document.kind == "system":
             instances = read_system(document, project).instances.values()
             for part in {id(each.automaton): each.automaton for each in instances}.values():
-                further.lower(part)
-        elif base.kind == "map":
+                deep_checks.lower(part)
+        elif expanded_document.kind == "map":
             read_map(document, project)
-        elif base.kind == "effect":
+        elif expanded_document.kind == "effect":
             read_effect(document, problems)
-            problems.stop_if_any()
-        elif base.kind == "study":
+            problems.raise_if_errors()
+        elif expanded_document.kind == "study":
             read_study(document, project, problems=problems)
-        elif base.kind == "test":
+        elif expanded_document.kind == "test":
             read_test(document, project, problems)
         else:
             _check_scenario(reference, project)
     except SpecError as error:
-        return Checked(tuple(dict.fromkeys(error.problems)))
-    return Checked(tuple(dict.fromkeys(problems.found)), limits)
+        return CheckResult(tuple(dict.fromkeys(error.problems)))
+    return CheckResult(tuple(dict.fromkeys(problems.reported)), limits)
 
 
-def _calibrated(
+def _apply_calibration(
     document: Document, reference: str, project: Project, problems: Problems
 ) -> Document:
     """Return what a calibration is of, calibrated by it: so its values are checked there."""
     of = read_calibration(document, problems).of
-    problems.stop_if_any()
+    problems.raise_if_errors()
     base = project.read(project.path_of(of.text, of.span))
-    return with_calibrations(base, [str(project.path_of(reference))], reference)
+    return add_calibrations(base, [str(project.path_of(reference))], reference)
 
 
-def all_problems(found: Iterable[Checked]) -> list[Problem]:
+def merge_problems(results: Iterable[CheckResult]) -> list[Problem]:
     """Return the problems of several specs, each once, in the order of their places."""
-    return ordered(problem for each in found for problem in each.problems)
+    return sort_problems(problem for each in results for problem in each.problems)
 
 
 def spec_files(root: Path) -> Iterator[Path]:
@@ -135,11 +139,11 @@ def problem_json(problem: Problem) -> dict[str, Any]:
 
 def _check_scenario(reference: str, project: Project) -> None:
     document = project.read(project.path_of(reference))
-    node = expanded(document, project).root.get("of")
-    if isinstance(node, Scalar):
+    node = expand_document(document, project).root.get("of")
+    if isinstance(node, ScalarNode):
         system = read_system(project.read(project.path_of(node.text, node.span)), project)
         read_scenario(document, project, system)
         return
     problems = Problems()
     problems.error("missing", document.name_span, "a scenario says what system it is `of`")
-    raise SpecError(problems.found)
+    raise SpecError(problems.reported)

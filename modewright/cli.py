@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from language.inside import ALLOW_OUTSIDE
+from language.inside import ALLOW_OUTSIDE_ENV
 from modewright.commands.a2l import a2l
 from modewright.commands.calibration import calibration
 from modewright.commands.check import check
@@ -47,12 +47,12 @@ from modewright.commands.sweep import sweep
 from modewright.commands.test import test
 from modewright.commands.trace import trace
 from modewright.console import configure
-from modewright.exits import EXIT_CODES, INTERRUPTED, exit_code
+from modewright.exits import EXIT_CODES, INTERRUPTED, run_with_exit_code
 from modewright.files import require_writable
-from modewright.garbage import look_rarely
-from modewright.spread import spread
+from modewright.garbage import raise_gc_threshold
+from modewright.spread import expand_arguments
 
-COMPLETION = "_MODEWRIGHT_COMPLETE"
+COMPLETION_VARIABLE = "_MODEWRIGHT_COMPLETE"
 """Set by a shell that asks for completions; its words are elsewhere."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
@@ -61,13 +61,13 @@ COMMANDS = (
 )  # fmt: skip
 
 
-def application(words: Collection[str] | None = None) -> typer.Typer:
+def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
     """Return the application; with the words of a command line only what they need is made whole.
 
     Parameters of a command take longer to look at than a page of help to print: a command that
     no word names has its name and its help alone.
     """
-    made = typer.Typer(
+    typer_app = typer.Typer(
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -76,14 +76,14 @@ def application(words: Collection[str] | None = None) -> typer.Typer:
         callback=options,
     )
     for command in COMMANDS:
-        whole = words is None or command.__name__ in words
-        made.command(epilog=EXIT_CODES)(command if whole else named(command))
-    made.add_typer(recording, name="recording")
-    made.add_typer(calibration, name="calibration")
-    return made
+        is_complete = arguments is None or command.__name__ in arguments
+        typer_app.command(epilog=EXIT_CODES)(command if is_complete else command_stub(command))
+    typer_app.add_typer(recording, name="recording")
+    typer_app.add_typer(calibration, name="calibration")
+    return typer_app
 
 
-def named(command: Callable[..., None]) -> Callable[[], None]:
+def command_stub(command: Callable[..., None]) -> Callable[[], None]:
     """Return a function with the name and the help of a command and without its parameters."""
 
     def stand_in() -> None:
@@ -105,15 +105,15 @@ def options(
     require_writable(log_file)
     configure(quiet, verbose, log_file)
     if allow_outside:
-        os.environ[ALLOW_OUTSIDE] = "1"
+        os.environ[ALLOW_OUTSIDE_ENV] = "1"
 
 
-app = application()
+app = build_application()
 
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
-    look_rarely()
+    raise_gc_threshold()
     logging.raiseExceptions = False  # a log that cannot be written is no reason to stop
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
@@ -121,10 +121,10 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be text
-    words = spread(sys.argv[1:])
-    completes = COMPLETION in os.environ
-    run = application(None if completes else words)
-    code = exit_code(lambda: run(words, standalone_mode=False))
+    arguments = expand_arguments(sys.argv[1:])
+    is_completion = COMPLETION_VARIABLE in os.environ
+    run = build_application(None if is_completion else arguments)
+    code = run_with_exit_code(lambda: run(arguments, standalone_mode=False))
     if code == INTERRUPTED:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # more of them disturb nothing but the exit
     sys.exit(code)

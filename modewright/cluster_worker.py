@@ -13,13 +13,15 @@ if TYPE_CHECKING:
     from sweep.cluster_worker import Answer
 
 
-def compute(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
+def compute_block(
+    expected_fingerprint: Mapping[str, str], serialised_study: bytes, start: int, stop: int
+) -> Answer:
     """Return the answer of this worker about the variants from `start` to before `stop`."""
     from modewright.compiled import run_block
     from sweep.block import Block
-    from sweep.cluster_worker import answer
+    from sweep.cluster_worker import answer_block
 
-    return answer(wanted, held, Block(start, stop), run_block)
+    return answer_block(expected_fingerprint, serialised_study, Block(start, stop), run_block)
 
 
 def own_fingerprint() -> Mapping[str, str]:

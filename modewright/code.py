@@ -7,18 +7,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from codegen.asam import a2l as asam
-from codegen.border import at_borders
-from codegen.can_database import FIRST, dbc as dbc_of
-from codegen.cmake import cmake_file
-from codegen.exploring import explored, records
-from codegen.fmi.archive import fmu as fmu_of
+from codegen.border import generate_boundary_sequences
+from codegen.can_database import FIRST_IDENTIFIER, emit_dbc as dbc_of
+from codegen.cmake import emit_cmake_file
+from codegen.exploring import corpus_records, generate_corpus
+from codegen.fmi.archive import build_fmu as fmu_of
 from codegen.fmi.variable import Version
-from codegen.instructions import Instructions, instructions as counted
-from codegen.mcdc import Covered, mcdc as covered, with_proofs
-from codegen.metrics import Metrics, metrics as measured
-from codegen.proofs.all import CHECKS, proofs
-from codegen.proofs.proof import Proof
-from codegen.source import c_files
+from codegen.instructions import InstructionCounts, count_instructions as counted
+from codegen.mcdc import McdcCoverage, add_infeasibility_proofs, measure_mcdc as covered
+from codegen.metrics import Metrics, measure_code as measured
+from codegen.proofs.all import CHECKS, run_checks
+from codegen.proofs.proof import ToolVerdict
+from codegen.source import emit_c_files
 from language.declaration import Input, State
 from language.limit import require_ranges
 from language.load import automaton_of, program_of
@@ -27,15 +27,15 @@ from language.number import NumberType
 from language.printing import digest
 from language.program import Program
 from language.project import Project
-from language.system import in_numbers
-from lockstep.compare import MOST_COUNTED, Tape
-from lockstep.fuzzing import RUNS, SEED, TICKS, Fuzzed, fuzz as fuzzed
-from lockstep.taping import taped
+from language.system import with_number_type
+from lockstep.compare import MAX_COUNTED_STEPS, TickLog
+from lockstep.fuzzing import RUNS, SEED, TICKS, FuzzReport, fuzz as fuzzed
+from lockstep.taping import record_ticks
 from modewright.api import load
-from modewright.documents import Values, calibrated_document, scalars
-from modewright.tests import load_tests, tests_of
+from modewright.documents import Values, load_calibrated_document, parse_values
+from modewright.tests import find_tests, load_tests
 
-HELD = ("latched.", "state.", "discrete.")
+RETAINED_PREFIXES = ("latched.", "state.", "discrete.")
 SEEDS = (SEED, SEED + 1)
 """Where libFuzzer starts: what one seed misses, another one may find."""
 
@@ -47,7 +47,7 @@ def generate(
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
     """Return the C files of an automaton by name. Raises SpecError."""
-    return c_files(_generated(reference, values, root, calibrations))
+    return emit_c_files(_load_program(reference, values, root, calibrations))
 
 
 def cmake(
@@ -57,7 +57,7 @@ def cmake(
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
     """Return the file by which CMake builds the C of an automaton, by name. Raises SpecError."""
-    return cmake_file(_generated(reference, values, root, calibrations))
+    return emit_cmake_file(_load_program(reference, values, root, calibrations))
 
 
 def fmu(
@@ -74,7 +74,7 @@ def fmu(
     `is_source_only` leaves the binary out. Raises SpecError; ValueError for another version and
     for an automaton that has no C; ToolMissing, BuildError where there is a binary to make.
     """
-    return fmu_of(_generated(reference, values, root, calibrations), version, is_source_only)
+    return fmu_of(_load_program(reference, values, root, calibrations), version, is_source_only)
 
 
 def a2l(
@@ -91,13 +91,13 @@ def a2l(
     `page` and `instance` name structures where that has several. Raises SpecError, ImageError,
     ToolMissing.
     """
-    program = _generated(reference, values, root, calibrations)
-    return asam.a2l(program, asam.located(program, elf, page, instance) if elf else None)
+    program = _load_program(reference, values, root, calibrations)
+    return asam.emit_a2l(program, asam.locate_module(program, elf, page, instance) if elf else None)
 
 
 def dbc(
     reference: str,
-    first: int = FIRST,
+    first: int = FIRST_IDENTIFIER,
     values: Values | None = None,
     root: Path | None = None,
     calibrations: Sequence[str] = (),
@@ -108,8 +108,8 @@ def dbc(
 
     Raises SpecError, ToolMissing; ValueError where identifiers run out.
     """
-    automaton, program = _made(reference, values, root, calibrations, None)
-    return dbc_of(program, _ranges(automaton), first, is_fd)
+    automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
+    return dbc_of(program, _input_ranges(automaton), first, is_fd)
 
 
 def prove(
@@ -118,13 +118,13 @@ def prove(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
     checks: Sequence[str] = CHECKS,
-) -> Iterator[Proof]:
+) -> Iterator[ToolVerdict]:
     """Yield what tools of others say of the C of an automaton: some of the checks, in turn.
 
     Raises SpecError, ToolMissing.
     """
-    automaton, program = _made(reference, values, root, calibrations, None)
-    yield from proofs(automaton, program, checks)
+    automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
+    yield from run_checks(automaton, program, checks)
 
 
 def fuzz(
@@ -136,15 +136,15 @@ def fuzz(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
-) -> Fuzzed:
+) -> FuzzReport:
     """Try `runs` sequences of at most so many `ticks` on the C of an automaton and on the engine.
 
     Raises SpecError, ValueError for a continuous automaton, ToolMissing, BuildError.
     """
-    automaton, program = _made(reference, values, root, calibrations, numbers)
+    automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     if not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    return fuzzed(program, _ranges(automaton), runs, ticks, seed)
+    return fuzzed(program, _input_ranges(automaton), runs, ticks, seed)
 
 
 def mcdc(
@@ -156,49 +156,51 @@ def mcdc(
     numbers: NumberType | None = None,
     *,
     is_proven: bool = True,
-) -> Covered:
+) -> McdcCoverage:
     """Tell which conditions of the C of an automaton are shown to matter by the tests of the
     project, by what libFuzzer finds in `runs`, and at the borders of both; and, if that
     `is_proven`, which cannot be.
 
     Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
     """
-    automaton, program = _made(reference, values, root, calibrations, numbers)
-    sequences = [tape.inputs for tape in _tested(program, root, numbers)]
-    ranges = _ranges(automaton)
+    automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
+    sequences = [tape.inputs for tape in _record_project_tests(program, root, numbers)]
+    ranges = _input_ranges(automaton)
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    ways = explored(program, ranges, runs, SEEDS) if runs else ()
-    if not sequences and not ways:
+    corpus = generate_corpus(program, ranges, runs, SEEDS) if runs else ()
+    if not sequences and not corpus:
         hint = ": give it `--runs`" if automaton.is_sampled else ""
         raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")
     if automaton.is_sampled:
-        gone = (*sequences, *sorted(records(program, ranges, ways), key=len))
-        sequences.extend(at_borders(program, gone, ranges))
-    found = covered(program, sequences, ways, ranges)
+        known_sequences = (*sequences, *sorted(corpus_records(program, ranges, corpus), key=len))
+        sequences.extend(generate_boundary_sequences(program, known_sequences, ranges))
+    found = covered(program, sequences, corpus, ranges)
     if not (is_proven and automaton.is_sampled):
         return found
-    return with_proofs(found, program, _held(automaton, program))
+    return add_infeasibility_proofs(found, program, _retained_ranges(automaton, program))
 
 
-def _held(automaton: Automaton, program: Program) -> dict[str, tuple[float, float]]:
+def _retained_ranges(automaton: Automaton, program: Program) -> dict[str, tuple[float, float]]:
     """Return the ranges [SI] in which a sampled automaton holds its reals, by variable."""
-    things: dict[str, Input | State] = {**automaton.inputs, **automaton.carried}
+    variables: dict[str, Input | State] = {**automaton.inputs, **automaton.state_variables}
     reals = {v.name for v in program.variables if v.type == "real"}
-    found = {}
-    for name, one in things.items():
-        for group in HELD:
-            if one.range and group + name in reals:
-                found[group + name] = (float(one.range[0]), float(one.range[1]))
-    return found
+    ranges = {}
+    for name, variable in variables.items():
+        for group in RETAINED_PREFIXES:
+            if variable.range and group + name in reals:
+                ranges[group + name] = (float(variable.range[0]), float(variable.range[1]))
+    return ranges
 
 
-def _tested(program: Program, root: Path | None, numbers: NumberType | None) -> Iterator[Tape]:
+def _record_project_tests(
+    program: Program, root: Path | None, numbers: NumberType | None
+) -> Iterator[TickLog]:
     """Yield what each test of a project does with a Program."""
-    for test in load_tests(tests_of(root), root):
-        run = in_numbers(test.system, numbers) if numbers else test.system
+    for test in load_tests(find_tests(root), root):
+        run = with_number_type(test.system, numbers) if numbers else test.system
         if any(one.automaton.name == program.name for one in run.instances.values()):
-            tapes = taped(run, test.scenario)[1].values()
+            tapes = record_ticks(run, test.scenario)[1].values()
             yield from (tape for tape in tapes if digest(tape.program) == digest(program))
 
 
@@ -213,7 +215,7 @@ def metrics(
 
     `numbers` replaces its number type. Raises SpecError, ToolMissing.
     """
-    return measured(_generated(reference, values, root, calibrations, numbers))
+    return measured(_load_program(reference, values, root, calibrations, numbers))
 
 
 def instructions(
@@ -224,28 +226,28 @@ def instructions(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
-) -> Instructions:
+) -> InstructionCounts:
     """Return the instructions of the steps of an automaton's C in a scenario of a system.
 
     Raises SpecError, ValueError where no instance of the system is that automaton, ToolMissing.
     """
-    program = _generated(reference, values, root, calibrations, numbers)
+    program = _load_program(reference, values, root, calibrations, numbers)
     loaded = load(system, scenario, None, root, calibrations)
-    run = in_numbers(loaded.system, numbers) if numbers else loaded.system
+    run = with_number_type(loaded.system, numbers) if numbers else loaded.system
     name = next((n for n, i in run.instances.items() if i.automaton.name == program.name), None)
     if name is None:
         raise ValueError(f"{system} has no instance of {program.name}")
-    tape = taped(run, loaded.scenario)[1][name]
-    return counted(program, b"".join(tape.inputs[:MOST_COUNTED]))
+    tape = record_ticks(run, loaded.scenario)[1][name]
+    return counted(program, b"".join(tape.inputs[:MAX_COUNTED_STEPS]))
 
 
-def _ranges(automaton: Automaton) -> dict[str, tuple[float, float]]:
+def _input_ranges(automaton: Automaton) -> dict[str, tuple[float, float]]:
     """Return the ranges [SI] of inputs by name."""
     ends = {name: one.range for name, one in automaton.inputs.items() if one.range}
     return {name: (float(low), float(high)) for name, (low, high) in ends.items()}
 
 
-def _generated(
+def _load_program(
     reference: str,
     values: Values | None,
     root: Path | None,
@@ -253,10 +255,10 @@ def _generated(
     numbers: NumberType | None = None,
 ) -> Program:
     """Return the Program that C is made of."""
-    return _made(reference, values, root, calibrations, numbers)[1]
+    return _load_automaton_and_program(reference, values, root, calibrations, numbers)[1]
 
 
-def _made(
+def _load_automaton_and_program(
     reference: str,
     values: Values | None,
     root: Path | None,
@@ -265,8 +267,8 @@ def _made(
 ) -> tuple[Automaton, Program]:
     """Return an automaton and the Program that C is made of."""
     project = Project(root or Path())
-    document = calibrated_document(reference, project, calibrations)
-    automaton = automaton_of(document, project, scalars(values))
+    document = load_calibrated_document(reference, project, calibrations)
+    automaton = automaton_of(document, project, parse_values(values))
     if numbers:
         automaton = dataclasses.replace(automaton, numbers=numbers)
     if automaton.is_sampled:

@@ -10,44 +10,46 @@ from contextlib import suppress
 from functools import cache, partial
 
 from codegen.build import BuildError
-from codegen.library import library_of
+from codegen.library import load_library
 from codegen.stepper import CompiledStepper
 from engine.batch import Batch, BatchResult
-from engine.plan import why_not_planned
-from engine.planned import PlannedRun
-from engine.planned_batch import Planner
+from engine.plan import planning_obstacle
+from engine.planned import CompiledRun
+from engine.planned_batch import CompiledBatchCache
 from engine.simulate import simulate
 from engine.starting import programs_of
-from engine.stimulus import resolved
+from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
-from engine.variants import run_variants
+from engine.variants import run_interpreted_batch
 from language.experiment import Scenario, System
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from language.program import Program
 
-LONG = 100_000
+COMPILE_THRESHOLD = 100_000
 """Steps and ticks from which on a run is compiled unasked: the interpreter takes seconds for them,
 the compiler about one, once."""
 
 
-def run(system: System, scenario: Scenario, compiled: bool | None = None) -> tuple[Trajectory, str]:
+def run_simulation(
+    system: System, scenario: Scenario, compiled: bool | None = None
+) -> tuple[Trajectory, str]:
     """Return the trajectory of a run, and what carried it out, with the reason if not all in C.
 
     `compiled` takes C where it can; None does so for runs that are long.
     """
-    scenario = resolved(system, scenario)
+    scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
-    count = _count(scenario, programs)
-    if compiled is False or (compiled is None and count < LONG):
-        why = "asked for" if compiled is False else f"{count} steps are too few to compile for"
-        return simulate(system, scenario, programs=programs), f"interpreter: {why}"
+    count = _count_steps(scenario, programs)
+    if compiled is False or (compiled is None and count < COMPILE_THRESHOLD):
+        reason = "asked for" if compiled is False else f"{count} steps are too few to compile for"
+        return simulate(system, scenario, programs=programs), f"interpreter: {reason}"
     try:
-        found, means = _in_c(system, scenario, programs)
-    except (ToolMissing, BuildError, OSError) as error:
-        found, means = None, str(error).splitlines()[0]
-    if found:
-        return found, means
-    return simulate(system, scenario, programs=programs), f"interpreter: {means}"
+        trajectory, backend = _simulate_in_c(system, scenario, programs)
+    except (MissingToolError, BuildError, OSError) as error:
+        trajectory, backend = None, str(error).splitlines()[0]
+    if trajectory:
+        return trajectory, backend
+    return simulate(system, scenario, programs=programs), f"interpreter: {backend}"
 
 
 def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
@@ -55,43 +57,45 @@ def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
 
     Raises ToolMissing, BuildError.
     """
-    scenario = resolved(system, scenario)
+    scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
-    found, means = _in_c(system, scenario, programs)
-    if found:
-        return found, means
-    found = simulate(system, scenario, CompiledStepper, programs=programs)
-    return found, f"compiled, block by block: {means}"
+    trajectory, reason = _simulate_in_c(system, scenario, programs)
+    if trajectory:
+        return trajectory, reason
+    trajectory = simulate(system, scenario, CompiledStepper, programs=programs)
+    return trajectory, f"compiled, block by block: {reason}"
 
 
-def carried_out(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Trajectory:
+def simulate_resolved(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> Trajectory:
     """Return the trajectory of a resolved scenario, in C where that is possible."""
-    with suppress(ToolMissing, BuildError, OSError):
-        found, _ = _in_c(system, scenario, programs)
-        if found:
-            return found
+    with suppress(MissingToolError, BuildError, OSError):
+        trajectory, _ = _simulate_in_c(system, scenario, programs)
+        if trajectory:
+            return trajectory
     return simulate(system, scenario, programs=programs)
 
 
-def _in_c(
+def _simulate_in_c(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> tuple[Trajectory | None, str]:
     """Return a run in one call; block by block where that is not planned; None: it stopped."""
-    why = why_not_planned(system, scenario, programs)
-    if why:
-        found = simulate(system, scenario, CompiledStepper, programs=programs)
-        return found, f"compiled, block by block: {why}"
-    build = partial(library_of, side_by_side=False)
-    run = PlannedRun(system, scenario, programs, build).trajectory()
+    reason = planning_obstacle(system, scenario, programs)
+    if reason:
+        trajectory = simulate(system, scenario, CompiledStepper, programs=programs)
+        return trajectory, f"compiled, block by block: {reason}"
+    build = partial(load_library, simd_batch=False)
+    run = CompiledRun(system, scenario, programs, build).trajectory()
     return run, "compiled" if run else "it has to tell what happened"
 
 
-def run_batch(batch: Batch, threads: int | None = None, least: int = 0) -> BatchResult:
+def run_batch(batch: Batch, threads: int | None = None, min_steps: int = 0) -> BatchResult:
     """Return what is kept of each variant of a batch: by C on all cores, or on so many threads.
 
-    Variants that share a Program and have fewer than `least` steps in all are not compiled for.
+    Variants that share a Program and have fewer than `min_steps` steps in all are not compiled for.
     """
-    return _carried_out(Planner(library_of, least), batch, threads)
+    return _run_planned(CompiledBatchCache(load_library, min_steps), batch, threads)
 
 
 def run_block(batch: Batch) -> BatchResult:
@@ -99,23 +103,23 @@ def run_block(batch: Batch) -> BatchResult:
 
     Parts that differ in numbers alone are planned once in a process.
     """
-    return _carried_out(_planner(), batch, threads=1)
+    return _run_planned(_shared_planner(), batch, threads=1)
 
 
 @cache
-def _planner() -> Planner:
-    return Planner(library_of, LONG)
+def _shared_planner() -> CompiledBatchCache:
+    return CompiledBatchCache(load_library, COMPILE_THRESHOLD)
 
 
-def _carried_out(planner: Planner, batch: Batch, threads: int | None) -> BatchResult:
+def _run_planned(planner: CompiledBatchCache, batch: Batch, threads: int | None) -> BatchResult:
     try:
-        return planner.planned(batch).carry_out(threads)
-    except (ToolMissing, BuildError, OSError) as error:
+        return planner.get_or_compile(batch).run(threads)
+    except (MissingToolError, BuildError, OSError) as error:
         note = f"interpreter: {str(error).splitlines()[0]}"
-        return BatchResult(**{**vars(run_variants(batch)), "note": note})
+        return BatchResult(**{**vars(run_interpreted_batch(batch)), "note": note})
 
 
-def _count(scenario: Scenario, programs: dict[str, Program]) -> int:
+def _count_steps(scenario: Scenario, programs: dict[str, Program]) -> int:
     """Return how many steps and ticks a run has."""
     assert scenario.horizon is not None
     return sum(int(scenario.horizon / program.major_step) for program in programs.values())

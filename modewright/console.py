@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-PLAIN_WIDTH = 160
+PIPE_WIDTH = 160
 """Columns of a table in a pipe or a file, where there is no window to fit."""
-EVERY = 20.0
+REPORT_INTERVAL = 20.0
 """Seconds between two lines that tell how far a work is, where there is no terminal."""
 log = logging.getLogger("modewright")
 
@@ -28,7 +28,7 @@ def console() -> Console:
     from rich.console import Console  # a quarter of the time of --help, which needs none
 
     has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
-    return Console(width=None if has_width else PLAIN_WIDTH)
+    return Console(width=None if has_width else PIPE_WIDTH)
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
@@ -41,17 +41,17 @@ def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None 
     log.setLevel(logging.DEBUG if verbose or log_file else logging.WARNING)
     log.propagate = False
     if verbose:
-        log.addHandler(_plain(logging.StreamHandler(sys.stderr), "%(message)s"))
+        log.addHandler(_set_formatter(logging.StreamHandler(sys.stderr), "%(message)s"))
     if log_file:
         file = logging.FileHandler(log_file, encoding="utf-8")
-        log.addHandler(_plain(file, "%(asctime)s %(levelname)s %(message)s"))
+        log.addHandler(_set_formatter(file, "%(asctime)s %(levelname)s %(message)s"))
         log.debug("command: %s", " ".join(sys.argv))
     if not log.handlers:
         log.addHandler(logging.NullHandler())
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
+def progress_spinner(description: str) -> Iterator[None]:
     """Show on a terminal that work goes on, and for how long; log when it is done."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -61,13 +61,13 @@ def working(what: str) -> Iterator[None]:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     is_hidden = not screen.is_terminal or console().quiet
     with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
-        progress.add_task(what, total=None)
+        progress.add_task(description, total=None)
         yield
-    log.info("%s: %.2f s", what, time.monotonic() - start)
+    log.info("%s: %.2f s", description, time.monotonic() - start)
 
 
 @contextmanager
-def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
+def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
     """Show on a terminal how much of a work is done, its rate and the time left.
 
     Elsewhere, in the log of a build, a line tells it now and then. What is yielded is told: how
@@ -87,33 +87,38 @@ def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
 
         def tell(done: int, before: int, total: int) -> None:
             if not progress.tasks:
-                progress.add_task(what, total=total, completed=before, count="", rate="")
+                progress.add_task(description, total=total, completed=before, count="", rate="")
             rate = (done - before) / max(time.monotonic() - start, 1e-9)
             shown = f"{rate:.3g} {noun}/s" if done > before else ""
             count, bar = f"{done}/{total}", progress.tasks[0].id
             progress.update(bar, total=total, completed=done, count=count, rate=shown)
             nonlocal told
-            if not (screen.is_terminal or console().quiet) and time.monotonic() - told > EVERY:
+            if (
+                not (screen.is_terminal or console().quiet)
+                and time.monotonic() - told > REPORT_INTERVAL
+            ):
                 told = time.monotonic()
-                print(f"{what}: {done} of {total} {noun}, {shown}", file=sys.stderr, flush=True)
+                print(
+                    f"{description}: {done} of {total} {noun}, {shown}", file=sys.stderr, flush=True
+                )
 
         yield tell
-    log.info("%s: %.2f s", what, time.monotonic() - start)
+    log.info("%s: %.2f s", description, time.monotonic() - start)
 
 
-def announce(files: Sequence[Path]) -> None:
+def report_written_files(files: Sequence[Path]) -> None:
     """Tell which files were written."""
     for path in files:
         log.info("wrote %s", path)
         console().print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
-def counted(number: int, noun: str) -> str:
+def pluralise(number: int, noun: str) -> str:
     """Return a number with its noun: `1 spec`, `2 specs`."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _plain(handler: logging.Handler, form: str) -> logging.Handler:
+def _set_formatter(handler: logging.Handler, form: str) -> logging.Handler:
     formatter = logging.Formatter(form, "%Y-%m-%dT%H:%M:%SZ")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)

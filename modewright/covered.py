@@ -7,19 +7,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from expectation.coverage import Coverage, coverage as reached_by, names_of, together
-from expectation.decision import SHOWN, Decision
+from expectation.coverage import Coverage, measure_coverage as reached_by, merge_coverages, names_of
+from expectation.decision import COVERED, Decision
 from language.problem import Problems, Source, Span, SpecError
-from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, Shade, graph
-from modewright.tests import load_tests, tests_of
+from modewright.diagram import Arrow, Diagram, ModeBox, ModePath, RegionBox, Shade, graph
+from modewright.tests import find_tests, load_tests
 
 
-def lines_of(coverage: Coverage) -> Iterator[str]:
+def coverage_lines(coverage: Coverage) -> Iterator[str]:
     """Yield the lines that tell of a coverage: the counts, then what is missing."""
     counts = coverage.count()
-    said = ", ".join(f"{done} of {total} {what}" for what, (done, total) in counts.items())
-    yield f"{coverage.name}: {said} (MC/DC)"
-    yield from (f"  {line}" for line in coverage.missed())
+    counts_text = ", ".join(f"{done} of {total} {what}" for what, (done, total) in counts.items())
+    yield f"{coverage.name}: {counts_text} (MC/DC)"
+    yield from (f"  {line}" for line in coverage.list_missed())
 
 
 def coverage_json(coverage: Coverage) -> dict[str, Any]:
@@ -35,18 +35,18 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
     }
 
 
-def covered_graph(coverage: Coverage, root: Path | None = None) -> Diagram:
+def coverage_diagram(coverage: Coverage, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton, shaded by what tests reached. Raises SpecError."""
-    return shaded(graph(coverage.automaton.span.source.name, root), coverage)
+    return shade_diagram(graph(coverage.automaton.span.source.name, root), coverage)
 
 
-def tested_graph(reference: str, root: Path | None = None) -> Diagram:
+def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton, shaded by what the tests of the project reach of it.
 
     Raises SpecError.
     """
     diagram = graph(reference, root)
-    tests = load_tests(tests_of(root), root)
+    tests = load_tests(find_tests(root), root)
     names = [{each.automaton.name for each in t.system.instances.values()} for t in tests]
     used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
     parts = [part for test in used for part in reached_by(test) if part.name == diagram.name]
@@ -54,53 +54,57 @@ def tested_graph(reference: str, root: Path | None = None) -> Diagram:
         problems = Problems()
         label = f"no test of the project runs `{diagram.name}`"
         problems.error("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")
-        raise SpecError(problems.found)
-    return shaded(diagram, together(parts)[0])
+        raise SpecError(problems.reported)
+    return shade_diagram(diagram, merge_coverages(parts)[0])
 
 
-def shaded(diagram: Diagram, coverage: Coverage) -> Diagram:
+def shade_diagram(diagram: Diagram, coverage: Coverage) -> Diagram:
     """Return a diagram whose modes and transitions are shaded by what tests reached."""
     entered = {names_of(key) for key in coverage.modes}
     decisions = {names_of(decision.key): decision for decision in coverage.decisions}
     return dataclasses.replace(
         diagram,
-        regions=tuple(_region(region, entered) for region in diagram.regions),
-        arrows=tuple(_arrow(arrow, coverage, decisions) for arrow in diagram.arrows),
+        regions=tuple(_shade_region(region, entered) for region in diagram.regions),
+        arrows=tuple(_shade_arrow(arrow, coverage, decisions) for arrow in diagram.arrows),
     )
 
 
-def _region(region: RegionBox, entered: set[Key]) -> RegionBox:
-    return dataclasses.replace(region, modes=tuple(_mode(mode, entered) for mode in region.modes))
+def _shade_region(region: RegionBox, entered: set[ModePath]) -> RegionBox:
+    return dataclasses.replace(
+        region, modes=tuple(_shade_mode(mode, entered) for mode in region.modes)
+    )
 
 
-def _mode(mode: ModeBox, entered: set[Key]) -> ModeBox:
-    was = mode.path in entered
-    inner = tuple(_region(region, entered) for region in mode.regions)
-    return dataclasses.replace(mode, shade="covered" if was else "missed", regions=inner)
+def _shade_mode(mode: ModeBox, entered: set[ModePath]) -> ModeBox:
+    is_entered = mode.path in entered
+    inner = tuple(_shade_region(region, entered) for region in mode.regions)
+    return dataclasses.replace(mode, shade="covered" if is_entered else "missed", regions=inner)
 
 
-def _arrow(arrow: Arrow, coverage: Coverage, decisions: dict[Key, Decision]) -> Arrow:
+def _shade_arrow(arrow: Arrow, coverage: Coverage, decisions: dict[ModePath, Decision]) -> Arrow:
     decision = decisions.get((*arrow.source, arrow.name))
     if decision is None:
         return arrow
     shade: Shade = "missed"
     lines = arrow.lines
     if decision.key in coverage.transitions:
-        shown = zip(decision.conditions, coverage.shown(decision), strict=True)
-        still = [text for text, how in shown if how not in SHOWN]
-        shade = "part" if still else "covered"
-        lines = (*lines, *(f"? {text}" for text in still))
+        shown = zip(decision.conditions, coverage.condition_coverage(decision), strict=True)
+        unshown = [text for text, how in shown if how not in COVERED]
+        shade = "part" if unshown else "covered"
+        lines = (*lines, *(f"? {text}" for text in unshown))
     return dataclasses.replace(arrow, shade=shade, lines=lines)
 
 
 def _transition_json(coverage: Coverage, decision: Decision) -> dict[str, Any]:
-    seen = coverage.seen.get(decision.key, frozenset())
+    seen = coverage.combinations.get(decision.key, frozenset())
     return {
         "key": decision.key,
         "taken": decision.key in coverage.transitions,
         "outcomes": sorted(decision.outcomes(seen)),
         "conditions": [
             {"text": text, "shown": how}
-            for text, how in zip(decision.conditions, coverage.shown(decision), strict=True)
+            for text, how in zip(
+                decision.conditions, coverage.condition_coverage(decision), strict=True
+            )
         ],
     }

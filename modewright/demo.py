@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from engine.band import Band
-from engine.plot import Line, Panel, picture
+from engine.band import ModeBand
+from engine.plot import Panel, PlotLine, draw_picture
 from modewright import api, show
 from modewright.files import write_files
 
@@ -16,28 +16,28 @@ WINDOW = (0.45, 1.15)
 """The part of the scenario in which the gap is crossed [s]."""
 
 
-def run(folder: Path, console: Console) -> bool:
+def run_demo(folder: Path, console: Console) -> bool:
     """Run the demo, print its tables, write `tip_out.png`; tell whether no bit differs."""
     console.print("Tip-out of an EV driveline with backlash, 30 -> -20 N*m at 0.4785 s")
     trajectory, verdicts = api.lockstep(SYSTEM, SCENARIO)
     torque = [
-        Line("plant.T_hs", "plant"),
-        Line("est.T_hs", "estimator, 1 kHz"),
-        Line("simple.T_hs", "simplified, 100 Hz", dashed=True),
+        PlotLine("plant.T_hs", "plant"),
+        PlotLine("est.T_hs", "estimator, 1 kHz"),
+        PlotLine("simple.T_hs", "simplified, 100 Hz", dashed=True),
     ]
     gap = [
-        Line("plant.theta_b", "plant", 1e3),
-        Line("est.theta_b", "estimator, 1 kHz", 1e3, dashed=True),
+        PlotLine("plant.theta_b", "plant", 1e3),
+        PlotLine("est.theta_b", "estimator, 1 kHz", 1e3, dashed=True),
     ]
     panels = [Panel("half-shaft torque [N*m]", torque), Panel("position in the gap [mrad]", gap)]
     bands = [
-        Band("plant", "plant.mode"),
-        Band("1 kHz", "est.mode"),
-        Band("100 Hz", "simple.mode"),
+        ModeBand("plant", "plant.mode"),
+        ModeBand("1 kHz", "est.mode"),
+        ModeBand("100 Hz", "simple.mode"),
     ]
     title = "Tip-out: contact is lost, the gap is crossed, the estimators follow"
     path = folder / "tip_out.png"
-    write_files({path: picture([trajectory], panels, bands, title, WINDOW).data()})
+    write_files({path: draw_picture([trajectory], panels, bands, title, WINDOW).data()})
     console.print(show.events_table(trajectory.events))
     console.print()
     show.print_verdicts(console, verdicts)

@@ -9,38 +9,42 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from diagnosis.case import Bootstrap, Case
+from diagnosis.case import BootstrapMode, Case
 from diagnosis.diagnose import diagnose as diagnosed
-from diagnosis.dossier import Dossier, hashes, undecided, unusable
-from diagnosis.file_names import names_of
-from diagnosis.finding import told
+from diagnosis.dossier import DiagnosisReport, file_digests, undecided_verdict, unusable_reasons
+from diagnosis.file_names import recording_names
+from diagnosis.finding import format_findings
 from diagnosis.fit import Fit, fit as fitted
-from diagnosis.leftover import left_by
-from diagnosis.library import library
+from diagnosis.leftover import find_stale_files
+from diagnosis.library import library_effects
 from diagnosis.recording_check import used_columns
-from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
-from diagnosis.variant import needed, variant_text
-from diagnosis.wording import summary
+from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds, format_thresholds, read_thresholds
+from diagnosis.variant import format_variant, missing_effect_notes
+from diagnosis.wording import summary_lines
 from engine.recorded_part import file_of
 from engine.recording import read_recording
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
-from language.project import Project, expanded, read_document, shown
-from modewright.apart import require_apart
+from language.project import Project, display_path, expand_document, read_document
+from modewright.apart import require_disjoint
 from modewright.files import OutputError, make_folder, remove_files, write_files
-from modewright.garbage import rarely_looked
-from modewright.missed import missed, with_missed
-from modewright.own_effects import laid_nowhere, own_effects
+from modewright.garbage import infrequent_gc
+from modewright.missed import unfollowed_signals, withdraw_nothing_missing
+from modewright.own_effects import explain_unplaceable, load_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
-from modewright.threads import OneThread
-from modewright.workable import OpenedLater, workable
+from modewright.threads import SingleThreadedBlas
+from modewright.workable import LazyRecordings, select_usable
 
-Tell = Callable[[str], None]
-KEPT = "kept"
-STAGES = "stages"
+Report = Callable[[str], None]
+CACHED = "kept"
+CHECKPOINT_FOLDER = "stages"
 """Where a folder of results keeps what a diagnosis that was ended goes on from."""
-BOOTSTRAPS: Mapping[str, Bootstrap] = {KEPT: "kept", "bootstrap": "made", "usual": "never"}
+THRESHOLD_WORDS: Mapping[str, BootstrapMode] = {
+    CACHED: "kept",
+    "bootstrap": "made",
+    "usual": "never",
+}
 """Words for thresholds; anything else is a file."""
 
 
@@ -55,30 +59,30 @@ class UnusableRecordings(Exception):
 class _Budget:
     """The time [s] that a diagnosis may take, and what has been told in it."""
 
-    def __init__(self, seconds: float | None, tell: Tell) -> None:
+    def __init__(self, seconds: float | None, report: Report) -> None:
         self.begun = time.monotonic()
         self.seconds = seconds
-        self.telling = tell
+        self.telling = report
         self.told: list[str] = []
 
-    def tell(self, text: str) -> None:
+    def report(self, text: str) -> None:
         """Tell what a stage has found."""
         self.told.append(text)
         self.telling(text)
 
     def check(self) -> None:
         """Raise BudgetSpent when the time has passed."""
-        if self.seconds is not None and self.spent > self.seconds:
+        if self.seconds is not None and self.elapsed > self.seconds:
             raise BudgetSpent(f"the {self.seconds:g} s of its budget are over")
 
     @property
-    def spent(self) -> float:
+    def elapsed(self) -> float:
         """The time [s] since the beginning."""
         return time.monotonic() - self.begun
 
 
-@OneThread()
-@rarely_looked()
+@SingleThreadedBlas()
+@infrequent_gc()
 def diagnose(
     spec: str,
     train: Sequence[str | Path],
@@ -87,12 +91,12 @@ def diagnose(
     effects: str | Path | None = None,
     root: Path | None = None,
     *,
-    thresholds: str | Path = KEPT,
+    thresholds: str | Path = CACHED,
     out: str | Path | None = None,
     budget: float | None = None,
     anyway: bool = False,
-    tell: Tell = lambda text: None,
-) -> Dossier:
+    tell: Report = lambda text: None,
+) -> DiagnosisReport:
     """Say which physics an automaton lacks to show what was recorded; write it into a folder.
 
     Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
@@ -101,92 +105,104 @@ def diagnose(
     bootstrap has left (`kept`, else the usual one), those of a `bootstrap` made where it has left
     none, the `usual` one, or a file. Raises SpecError, ValueError, ToolMissing, OutputError.
     """
-    clock = _Budget(budget, tell)
-    tell = clock.tell
-    require_apart(train, held_out)
-    bootstrap, limits = _wanted(thresholds)
+    time_budget = _Budget(budget, tell)
+    tell = time_budget.report
+    require_disjoint(train, held_out)
+    bootstrap, limits = _read_thresholds(thresholds)
     checked = check_recordings(train, map, spec, root=root)
-    case, automaton = _case(spec, train, held_out, checked, effects, root)
-    stages = _stages(out)
+    case, automaton = _build_case(spec, train, held_out, checked, effects, root)
+    stages = _checkpoint_folder(out)
     case = dataclasses.replace(
-        case, thresholds=limits, bootstrap=bootstrap, stages=stages, before=clock.check
+        case,
+        thresholds=limits,
+        bootstrap=bootstrap,
+        checkpoint_folder=stages,
+        before_fit=time_budget.check,
     )
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
-    kept, errors = workable(case, checked.check, anyway)
-    left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
-    if kept:
+    usable_files, errors = select_usable(case, checked.check, anyway)
+    left_out = tuple(case.name_of(file) for file in case.train if file not in usable_files)
+    if usable_files:
         reasons = [f"left out: {text}" for text in errors]
         if effects is not None:
-            reasons += laid_nowhere(case.effects or (), case.document, case.project)
+            reasons += explain_unplaceable(case.effects or (), case.document, case.project)
         for text in reasons:
             tell(text)
-        case = dataclasses.replace(case, train=kept)
-        dossier = _concluded(case, automaton, checked, left_out, reasons, clock)
+        case = dataclasses.replace(case, train=usable_files)
+        dossier = _conclude(case, automaton, checked, left_out, reasons, time_budget)
     else:
-        dossier = _unusable(case, automaton, checked, errors, clock)
+        dossier = _build_unusable_dossier(case, automaton, checked, errors, time_budget)
     if out is not None:
         save_diagnosis(dossier, out, spec)
     return dossier
 
 
-def _unusable(
+def _build_unusable_dossier(
     case: Case,
     automaton: Automaton,
     checked: CheckedRecordings,
     errors: Sequence[str],
-    clock: _Budget,
-) -> Dossier:
+    budget: _Budget,
+) -> DiagnosisReport:
     """Return what is told where no recording is left to conclude from."""
-    messages = tuple(dict.fromkeys((*unusable(checked.check), *errors)))
-    verdict = undecided(messages, hashes(case, case.train), clock.spent)
-    return Dossier(case, automaton, checked.check, verdict)
+    messages = tuple(dict.fromkeys((*unusable_reasons(checked.check), *errors)))
+    verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
+    return DiagnosisReport(case, automaton, checked.check, verdict)
 
 
-def _stages(out: str | Path | None) -> Path | None:
+def _checkpoint_folder(out: str | Path | None) -> Path | None:
     """Return where stages are kept. Raises OutputError where they cannot be."""
     if out is None:
         return None
-    stages = Path(out) / STAGES
-    if os.path.lexists(stages) and not stages.is_dir():
-        raise OutputError(f"{stages}: this is a file; what is found on the way is kept there")
-    return stages
+    folder = Path(out) / CHECKPOINT_FOLDER
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise OutputError(f"{folder}: this is a file; what is found on the way is kept there")
+    return folder
 
 
-def _concluded(
+def _conclude(
     case: Case,
     automaton: Automaton,
     checked: CheckedRecordings,
     left_out: tuple[str, ...],
     reasons: Sequence[str],
-    clock: _Budget,
-) -> Dossier:
+    budget: _Budget,
+) -> DiagnosisReport:
     """Return what is concluded from recordings; where the time is over, what was found till then.
 
     A verdict from a part of the candidates would look like one from all: it is `unknown`.
     """
     try:
-        found = diagnosed(case, clock.tell)
+        diagnosis = diagnosed(case, budget.report)
     except BudgetSpent as spent:
-        done = [text for text in clock.told if text.startswith(("accepted", "recalibrated"))]
+        done = [text for text in budget.told if text.startswith(("accepted", "recalibrated"))]
         advice = "with a larger --budget and the same --out it goes on from there"
         messages = (*reasons, f"not finished: {spent}", *done, advice)
-        verdict = undecided(messages, hashes(case, case.train), clock.spent)
+        verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
         ended = f"{spent}; {advice}"
-        return Dossier(case, automaton, checked.check, verdict, left_out=left_out, ended=ended)
-    case = dataclasses.replace(case, thresholds=found.thresholds)
-    after = hashes(case, case.held_out)
-    misses = tuple(missed(found.verdict))
-    verdict = with_missed(found.verdict, misses)
-    dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
-    doubts = (*misses, *held_out_findings(case, automaton))
-    for text in doubts:
-        clock.tell(text)
-    messages = (*reasons, *summary(dossier), *found.unread, *doubts, *needed(dossier))
+        return DiagnosisReport(
+            case, automaton, checked.check, verdict, unused_recordings=left_out, end_reason=ended
+        )
+    case = dataclasses.replace(case, thresholds=diagnosis.thresholds)
+    after = file_digests(case, case.held_out)
+    unfollowed = tuple(unfollowed_signals(diagnosis.verdict))
+    verdict = withdraw_nothing_missing(diagnosis.verdict, unfollowed)
+    dossier = DiagnosisReport(case, automaton, checked.check, verdict, diagnosis, after, left_out)
+    warnings = (*unfollowed, *held_out_findings(case, automaton))
+    for text in warnings:
+        budget.report(text)
+    messages = (
+        *reasons,
+        *summary_lines(dossier),
+        *diagnosis.unread,
+        *warnings,
+        *missing_effect_notes(dossier),
+    )
     verdict = dataclasses.replace(verdict, messages=messages)
     return dataclasses.replace(dossier, verdict=verdict)
 
 
-def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
+def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
     """Write verdict, variant, report and figures into a folder; return the files.
 
     Raises OutputError.
@@ -195,28 +211,32 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
 
     folder = Path(out)
     make_folder(folder)
-    variant = variant_text(dossier, base_of(dossier, spec, folder))
+    variant = format_variant(dossier, base_of(dossier, spec, folder))
     files = {}
-    if dossier.case.thresholds != EVERYWHERE:
-        files[folder / "thresholds.json"] = written(dossier.case.thresholds).encode()
-    for name, data in report_files(dossier, variant, Path(shown(folder))).items():
+    if dossier.case.thresholds != DEFAULT_THRESHOLDS:
+        files[folder / "thresholds.json"] = format_thresholds(dossier.case.thresholds).encode()
+    for name, data in report_files(dossier, variant, Path(display_path(folder))).items():
         files[folder / name] = data
-    stale = [path for path in left_by(folder) if path not in files and not _is_read(path, dossier)]
+    stale = [
+        path
+        for path in find_stale_files(folder)
+        if path not in files and not _is_input_file(path, dossier)
+    ]
     write_files(files)
     remove_files(stale)
-    if not dossier.ended:
-        shutil.rmtree(folder / STAGES, ignore_errors=True)
+    if not dossier.end_reason:
+        shutil.rmtree(folder / CHECKPOINT_FOLDER, ignore_errors=True)
     return list(files)
 
 
-def _is_read(path: Path, dossier: Dossier) -> bool:
+def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
     """Tell whether a file is one that the diagnosis itself has read."""
     recordings = (*dossier.case.train, *dossier.case.held_out)
     is_recording = path.resolve() in {file_of(one).resolve() for one in recordings}
     return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
 
 
-def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
+def base_of(dossier: DiagnosisReport, spec: str, folder: Path) -> str:
     """Return how a variant in a folder names its base: by name, or by file if need be."""
     project = dossier.case.project
     path = project.path_of(spec)
@@ -225,7 +245,7 @@ def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
     return os.path.relpath(path.resolve(), folder.resolve())
 
 
-def _case(
+def _build_case(
     spec: str,
     train: Sequence[str | Path],
     held_out: Sequence[str | Path],
@@ -236,36 +256,44 @@ def _case(
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
     automaton = checked.automaton or automaton_of(document, project)
-    whole = expanded(document, project)
+    expanded_document = expand_document(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
-    candidates = _candidates(effects, project)
-    names = names_of(*files)
+    candidates = _load_effects(effects, project)
+    names = recording_names(*files)
     known = dict(zip(files[0], checked.recordings, strict=True))
     used = used_columns(checked.mapping, automaton)
-    read = OpenedLater(known, files[1], lambda path: read_recording(path, checked.mapping, used))
-    case = Case(whole, project, checked.mapping, *files, candidates, names=names, read=read)
+    read = LazyRecordings(known, files[1], lambda path: read_recording(path, checked.mapping, used))
+    case = Case(
+        expanded_document,
+        project,
+        checked.mapping,
+        *files,
+        candidates,
+        names=names,
+        recordings=read,
+    )
     return case, automaton
 
 
-def _wanted(thresholds: str | Path) -> tuple[Bootstrap, Thresholds]:
+def _read_thresholds(thresholds: str | Path) -> tuple[BootstrapMode, Thresholds]:
     """Return whether a bootstrap is used, and the thresholds without one. Raises ValueError."""
-    if thresholds in BOOTSTRAPS:
-        return BOOTSTRAPS[str(thresholds)], EVERYWHERE
+    if thresholds in THRESHOLD_WORDS:
+        return THRESHOLD_WORDS[str(thresholds)], DEFAULT_THRESHOLDS
     if not Path(thresholds).is_file():
-        words = ", ".join(BOOTSTRAPS)
+        words = ", ".join(THRESHOLD_WORDS)
         raise ValueError(f"thresholds `{thresholds}`: neither one of {words} nor a file")
-    return "never", thresholds_in(Path(thresholds))
+    return "never", read_thresholds(Path(thresholds))
 
 
-def _candidates(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
+def _load_effects(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
     """Return the effects of a folder; without one those of the project and those shipped.
 
     Raises SpecError, ValueError.
     """
-    return library(project) if folder is None else own_effects(Path(folder))
+    return library_effects(project) if folder is None else load_effects(Path(folder))
 
 
-@OneThread()
+@SingleThreadedBlas()
 def fit(
     spec: str,
     train: Sequence[str | Path],
@@ -274,7 +302,7 @@ def fit(
     root: Path | None = None,
     *,
     anyway: bool = False,
-    tell: Tell = lambda text: None,
+    tell: Report = lambda text: None,
 ) -> Fit:
     """Fit parameters of an automaton within their ranges to what was recorded.
 
@@ -282,18 +310,18 @@ def fit(
     about the recordings is told. Those with errors are not used, but if it is wanted `anyway`.
     Raises UnusableRecordings where most of them are, SpecError, ValueError, ToolMissing.
     """
-    require_apart(train, ())
+    require_disjoint(train, ())
     checked = check_recordings(train, map, spec, root=root)
-    case, _ = _case(spec, train, (), checked, None, root)
-    kept, errors = workable(case, checked.check, anyway)
-    found = [f"{severity}: {text}" for severity, text in told(checked.check.findings)]
-    for text in dict.fromkeys((*found, *(f"error: {text}" for text in errors))):
+    case, _ = _build_case(spec, train, (), checked, None, root)
+    usable_files, errors = select_usable(case, checked.check, anyway)
+    findings = [f"{severity}: {text}" for severity, text in format_findings(checked.check.findings)]
+    for text in dict.fromkeys((*findings, *(f"error: {text}" for text in errors))):
         if not text.startswith("note"):
             tell(text)
-    if not kept:
+    if not usable_files:
         raise UnusableRecordings("the recordings are not usable; nothing was fitted to them")
     for file in case.train:
-        if file not in kept:
+        if file not in usable_files:
             tell(f"left out: {case.name_of(file)}")
-    case = dataclasses.replace(case, train=kept)
+    case = dataclasses.replace(case, train=usable_files)
     return fitted(case, parameters, tell)

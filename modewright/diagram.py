@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from language.document import Document, Entry, Items, Node, Table
-from language.overlay import lay, without
+from language.document import Document, Entry, MappingNode, SequenceNode, YamlNode
+from language.overlay import apply_overlay, without_keys
 from language.problem import Problems
-from language.transition_table import with_transition_tables
-from modewright.label import Sort, inside, label_of, sort_of, text_of
+from language.transition_table import expand_transition_tables
+from modewright.label import ModeKind, label_lines, mode_kind_of, mode_lines, node_text
 
-Key = tuple[str, ...]
+ModePath = tuple[str, ...]
 Shade = Literal["", "covered", "part", "missed"]
 """What tests have reached of a mode or a transition; empty where nothing is said of it."""
 
@@ -26,8 +26,8 @@ Shade = Literal["", "covered", "part", "missed"]
 class Arrow:
     """A transition between two modes (paths from the root) with the lines of its label."""
 
-    source: Key
-    target: Key
+    source: ModePath
+    target: ModePath
     lines: tuple[str, ...]
     name: str = ""
     shade: Shade = ""
@@ -37,11 +37,11 @@ class Arrow:
 class ModeBox:
     """A mode: its path, what holds in it, and its inner regions (none in a plain mode)."""
 
-    path: Key
+    path: ModePath
     lines: tuple[str, ...]
     regions: tuple[RegionBox, ...] = ()
     shade: Shade = ""
-    sort: Sort = ""
+    kind: ModeKind = ""
 
     @property
     def name(self) -> str:
@@ -69,15 +69,15 @@ class Diagram:
 
     def mermaid(self) -> str:
         """Return the diagram as Mermaid text, for Markdown that Git hosts show."""
-        from modewright.mermaid import mermaid
+        from modewright.mermaid import render_mermaid
 
-        return mermaid(self)
+        return render_mermaid(self)
 
     def svg(self) -> str:
         """Return the diagram as an SVG document."""
-        from modewright.diagram_svg import svg
+        from modewright.diagram_svg import render_svg
 
-        return svg(self)
+        return render_svg(self)
 
     def _repr_svg_(self) -> str:
         return self.svg()
@@ -89,16 +89,26 @@ def diagram_of(document: Document) -> Diagram:
     The automaton must have been checked: targets are there.
     """
     templates = document.root.get("templates")
-    root = _filled(document.root, templates) if isinstance(templates, Table) else document.root
-    root = with_transition_tables(root, Problems())
-    regions = [_with_fault(r, text_of(root.get("fault_mode"))) for r in _regions(root, ())]
-    known = set(_paths(regions))
-    arrows = [arrow for path, table in _modes(root, ()) for arrow in _arrows(path, table, known)]
+    root = (
+        _apply_templates(document.root, templates)
+        if isinstance(templates, MappingNode)
+        else document.root
+    )
+    root = expand_transition_tables(root, Problems())
+    regions = [
+        _mark_fault_mode(r, node_text(root.get("fault_mode"))) for r in _region_boxes(root, ())
+    ]
+    known = set(_iter_mode_paths(regions))
+    arrows = [
+        arrow
+        for path, table in _iter_modes(root, ())
+        for arrow in _transition_arrows(path, table, known)
+    ]
     about = document.root.get("about")
-    return Diagram(document.name, text_of(about), tuple(regions), tuple(arrows))
+    return Diagram(document.name, node_text(about), tuple(regions), tuple(arrows))
 
 
-def _with_fault(region: RegionBox, fault_mode: str) -> RegionBox:
+def _mark_fault_mode(region: RegionBox, fault_mode: str) -> RegionBox:
     """Return a region in which the mode that faults lead to says so."""
     boxes = tuple(
         dataclasses.replace(box, lines=("entered on a fault", *box.lines))
@@ -109,25 +119,25 @@ def _with_fault(region: RegionBox, fault_mode: str) -> RegionBox:
     return dataclasses.replace(region, modes=boxes)
 
 
-def _filled(owner: Table, templates: Table) -> Table:
+def _apply_templates(owner: MappingNode, templates: MappingNode) -> MappingNode:
     """Return a table whose modes, inner ones too, are laid over the templates that they name."""
-    template = templates.get(text_of(owner.get("like")))
-    if isinstance(template, Table):
-        owner = lay(template, without(owner, "like"), Problems(), template=True)
+    template = templates.get(node_text(owner.get("like")))
+    if isinstance(template, MappingNode):
+        owner = apply_overlay(template, without_keys(owner, "like"), Problems(), template=True)
     entries = dict(owner.entries)
     for key in ("modes", "regions"):
         node = owner.get(key)
-        if isinstance(node, Table):
+        if isinstance(node, MappingNode):
             inner = {
-                e.key: Entry(e.key, e.span, _filled(e.node, templates))
+                e.key: Entry(e.key, e.span, _apply_templates(e.node, templates))
                 for e in node
-                if isinstance(e.node, Table)
+                if isinstance(e.node, MappingNode)
             }
-            entries[key] = Entry(key, owner.entries[key].span, Table(inner, node.span))
-    return Table(entries, owner.span)
+            entries[key] = Entry(key, owner.entries[key].span, MappingNode(inner, node.span))
+    return MappingNode(entries, owner.span)
 
 
-def lifted(arrow: Arrow) -> Arrow:
+def lift_arrow(arrow: Arrow) -> Arrow:
     """Return an arrow between modes of one region: those that hold its ends, which it names."""
     depth = 0
     for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):
@@ -143,79 +153,79 @@ def lifted(arrow: Arrow) -> Arrow:
     return dataclasses.replace(arrow, source=source, target=target, lines=tuple(lines))
 
 
-def _regions(owner: Table, path: Key) -> list[RegionBox]:
+def _region_boxes(owner: MappingNode, path: ModePath) -> list[RegionBox]:
     """Return the regions of the automaton or of a mode: its `modes`, then its `regions`."""
-    found = []
+    boxes = []
     modes, regions = owner.get("modes"), owner.get("regions")
-    if isinstance(modes, Table):
-        found.append(_region("chart" if regions else "", owner, modes, path))
-    if isinstance(regions, Table):
+    if isinstance(modes, MappingNode):
+        boxes.append(_region_box("chart" if regions else "", owner, modes, path))
+    if isinstance(regions, MappingNode):
         for entry in regions:
-            inner = entry.node.get("modes") if isinstance(entry.node, Table) else None
-            if isinstance(entry.node, Table) and isinstance(inner, Table):
-                found.append(_region(entry.key, entry.node, inner, (*path, entry.key)))
-    return found
+            inner = entry.node.get("modes") if isinstance(entry.node, MappingNode) else None
+            if isinstance(entry.node, MappingNode) and isinstance(inner, MappingNode):
+                boxes.append(_region_box(entry.key, entry.node, inner, (*path, entry.key)))
+    return boxes
 
 
-def _region(name: str, owner: Table, modes: Table, path: Key) -> RegionBox:
+def _region_box(name: str, owner: MappingNode, modes: MappingNode, path: ModePath) -> RegionBox:
     boxes = [
         ModeBox(
             (*path, entry.key),
-            tuple(inside(entry.node)),
-            tuple(_regions(entry.node, (*path, entry.key))),
-            sort=sort_of(entry.node),
+            tuple(mode_lines(entry.node)),
+            tuple(_region_boxes(entry.node, (*path, entry.key))),
+            kind=mode_kind_of(entry.node),
         )
         for entry in modes
-        if isinstance(entry.node, Table)
+        if isinstance(entry.node, MappingNode)
     ]
     return RegionBox(
-        name, text_of(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
+        name, node_text(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
     )
 
 
-def _modes(owner: Table, path: Key) -> Iterator[tuple[Key, Table]]:
+def _iter_modes(owner: MappingNode, path: ModePath) -> Iterator[tuple[ModePath, MappingNode]]:
     """Yield every mode with its path, outer ones first."""
     regions = owner.get("regions")
     owners = [(path, owner)]
-    if isinstance(regions, Table):
-        owners += [((*path, e.key), e.node) for e in regions if isinstance(e.node, Table)]
+    if isinstance(regions, MappingNode):
+        owners += [((*path, e.key), e.node) for e in regions if isinstance(e.node, MappingNode)]
     for place, each in owners:
         modes = each.get("modes")
-        for entry in modes if isinstance(modes, Table) else ():
-            if isinstance(entry.node, Table):
+        for entry in modes if isinstance(modes, MappingNode) else ():
+            if isinstance(entry.node, MappingNode):
                 yield (*place, entry.key), entry.node
-                yield from _modes(entry.node, (*place, entry.key))
+                yield from _iter_modes(entry.node, (*place, entry.key))
 
 
-def _paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterator[Key]:
+def _iter_mode_paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterator[ModePath]:
     for region in regions:
         for mode in region.modes:
             yield mode.path
-            yield from _paths(mode.regions)
+            yield from _iter_mode_paths(mode.regions)
 
 
-def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
+def _transition_arrows(path: ModePath, mode: MappingNode, known: set[ModePath]) -> Iterator[Arrow]:
     transitions = mode.get("transitions")
-    for entry in transitions if isinstance(transitions, Table) else ():
-        if isinstance(entry.node, Table):
-            label = tuple(label_of(entry.node))
-            names = _names(entry.node.get("to"), entry.key)
+    for entry in transitions if isinstance(transitions, MappingNode) else ():
+        if isinstance(entry.node, MappingNode):
+            label = tuple(label_lines(entry.node))
+            names = _target_names(entry.node.get("to"), entry.key)
             if not names:
                 yield Arrow(path, path, (*label, "/ stays"), entry.key)
             for name in names:
-                target = _target(tuple(name.split(".")), path, known)
+                target = _resolve_target(tuple(name.split(".")), path, known)
                 if target:
                     yield Arrow(path, target, label, entry.key)
 
 
-def _names(to: Node | None, key: str) -> list[str]:
+def _target_names(to: YamlNode | None, key: str) -> list[str]:
     """Return the targets of a transition: those of a list, the only one, or its key."""
-    if isinstance(to, Items):
-        return [text_of(item) for item in to.nodes]
-    return [text_of(to) or key]
+    if isinstance(to, SequenceNode):
+        return [node_text(item) for item in to.nodes]
+    return [node_text(to) or key]
 
 
-def _target(name: Key, path: Key, known: set[Key]) -> Key | None:
+def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> ModePath | None:
     """Return the mode that a name means: among the siblings first, then those of the parents."""
     for depth in range(len(path) - 1, -1, -1):
         if (*path[:depth], *name) in known:
@@ -226,9 +236,9 @@ def _target(name: Key, path: Key, known: set[Key]) -> Key | None:
 def graph(reference: str, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton. Raises SpecError with all its problems."""
     from language.load import automaton_of
-    from language.project import Project, expanded, read_document
+    from language.project import Project, expand_document, read_document
 
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
     automaton_of(document, project)
-    return diagram_of(expanded(document, project))
+    return diagram_of(expand_document(document, project))

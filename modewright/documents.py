@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from language.document import Document, Scalar
+from language.document import Document, ScalarNode
 from language.load import command_line_value
-from language.project import Project, read_document, with_calibrations
+from language.project import Project, add_calibrations, read_document
 
 Values = Mapping[str, str]
 """Parameter values as text with units, by `parameter` or `instance.parameter`."""
 
 
-def calibrated_document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
+def load_calibrated_document(
+    reference: str, project: Project, calibrations: Sequence[str]
+) -> Document:
     """Return a spec with calibrations laid over it. Raises SpecError."""
     document = read_document(project.path_of(reference))
-    return with_calibrations(document, calibrations, "--calibration")
+    return add_calibrations(document, calibrations, "--calibration")
 
 
-def scalars(values: Values | None) -> dict[str, Scalar]:
+def parse_values(values: Values | None) -> dict[str, ScalarNode]:
     """Return values that a user gave as the language reads them. Raises SpecError."""
     return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

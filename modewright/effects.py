@@ -7,72 +7,76 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from diagnosis.library import Described, described, library
-from diagnosis.naming import OTHER_NAMES
+from diagnosis.library import EffectDescription, describe_effect, library_effects
+from diagnosis.naming import VERDICT_ALIASES
 from language.document import Document
 from language.load import automaton_of
-from language.problem import Problems, Source, Span, SpecError, nearest
-from language.project import Project, expanded, read_document
+from language.problem import Problems, Source, Span, SpecError, suggest_name
+from language.project import Project, expand_document, read_document
 
 if TYPE_CHECKING:
     from engine.plot import Picture
 
-USUAL_BASE = "blind_driveline"
+DEFAULT_BASE = "blind_driveline"
 """The spec over which signatures are drawn where none is named."""
-ALIKE = 4
+PREFIX_LENGTH = 4
 """Letters at the start of a word that make two names alike."""
 
 
-def effects(at: str | None = None, root: Path | None = None) -> list[Described]:
+def list_effects(at: str | None = None, root: Path | None = None) -> list[EffectDescription]:
     """Return all effects of the project and of the product; with a spec, the places they fit."""
     project = Project(root or Path())
-    document = _base(at, project) if at else None
-    return [described(effect, document, project) for effect in library(project)]
+    document = _load_base(at, project) if at else None
+    return [describe_effect(effect, document, project) for effect in library_effects(project)]
 
 
-def effect(name: str, at: str | None = None, root: Path | None = None) -> Described:
+def find_effect(name: str, at: str | None = None, root: Path | None = None) -> EffectDescription:
     """Return one effect; with a spec, the places it fits, or the one of `effect@place`.
 
     Raises SpecError.
     """
     project = Project(root or Path())
-    document = _base(at, project) if at else None
-    known = {one.name: one for one in library(project)}
-    plain, _, place = name.partition("@")
-    plain, _ = OTHER_NAMES.get(plain, (plain, ""))
-    if plain not in known:
-        _refuse(name, f"there is no effect named `{plain}`", _like(plain, known))
-    found = described(known[plain], document, project)
+    document = _load_base(at, project) if at else None
+    known = {one.name: one for one in library_effects(project)}
+    effect_name, _, place = name.partition("@")
+    effect_name, _ = VERDICT_ALIASES.get(effect_name, (effect_name, ""))
+    if effect_name not in known:
+        _raise_name_error(
+            name, f"there is no effect named `{effect_name}`", _suggest_name(effect_name, known)
+        )
+    found = describe_effect(known[effect_name], document, project)
     if not place or document is None:
         return found
-    layers = tuple(layer for layer in found.layers if layer.place == place)
+    layers = tuple(layer for layer in found.placements if layer.place == place)
     if not layers:
         fits = ", ".join(found.places) or "none"
-        _refuse(name, f"`{plain}` fits no `{place}` of `{document.name}`", f"places: {fits}")
-    return dataclasses.replace(found, layers=layers)
+        _raise_name_error(
+            name, f"`{effect_name}` fits no `{place}` of `{document.name}`", f"places: {fits}"
+        )
+    return dataclasses.replace(found, placements=layers)
 
 
-def _like(name: str, known: Iterable[str]) -> str:
+def _suggest_name(name: str, known: Iterable[str]) -> str:
     """Return what may have been meant: the nearest name, or those that begin a word alike."""
-    names = sorted({*known, *OTHER_NAMES})
-    near = nearest(name, names)
-    if near:
-        return near
-    start = name[:ALIKE]
+    names = sorted({*known, *VERDICT_ALIASES})
+    nearest_name = suggest_name(name, names)
+    if nearest_name:
+        return nearest_name
+    start = name[:PREFIX_LENGTH]
     found = [one for one in names if any(word.startswith(start) for word in one.split("_"))]
-    if len(start) == ALIKE and found:
+    if len(start) == PREFIX_LENGTH and found:
         return f"there are {', '.join(f'`{one}`' for one in found)}"
     return "`modewright effects` lists them"
 
 
-def _refuse(text: str, label: str, help: str) -> NoReturn:
+def _raise_name_error(text: str, label: str, help: str) -> NoReturn:
     problems = Problems()
     span = Span(Source("command line", (text,)), 1, 1, max(1, len(text)))
     problems.error("name", span, label, help)
-    raise SpecError(problems.found)
+    raise SpecError(problems.reported)
 
 
-def signature(
+def draw_signature(
     name: str, at: str | None = None, root: Path | None = None, *, step: str | None = None
 ) -> Picture:
     """Draw how an effect shows: a spec without and with it, under steps of an input.
@@ -80,25 +84,25 @@ def signature(
     `name` may say where it is laid: `coulomb_friction@w_em`; `step` is like `T_em=40 N*m`.
     Raises SpecError, ValueError.
     """
-    from diagnosis.signature import signature as runs, signature_picture
+    from diagnosis.signature import draw_signature, simulate_signature as runs
 
     project = Project(root or Path())
-    document = _base(at or USUAL_BASE, project)
-    layers = effect(name, at or USUAL_BASE, root).layers
+    document = _load_base(at or DEFAULT_BASE, project)
+    layers = find_effect(name, at or DEFAULT_BASE, root).placements
     if not layers:
         raise ValueError(f"`{name}` fits no place of `{document.name}`")
-    return signature_picture(runs(document, project, layers[0], _step(step) if step else None))
+    return draw_signature(runs(document, project, layers[0], _parse_step(step) if step else None))
 
 
-def _step(text: str) -> tuple[str, str]:
+def _parse_step(text: str) -> tuple[str, str]:
     name, _, height = (part.strip() for part in text.partition("="))
     if not (name and height):
         raise ValueError(f"`{text}` is not `input=height`")
     return name, height
 
 
-def _base(reference: str, project: Project) -> Document:
+def _load_base(reference: str, project: Project) -> Document:
     """Return the expanded automaton of a reference. Raises SpecError."""
-    document = expanded(read_document(project.path_of(reference)), project)
+    document = expand_document(read_document(project.path_of(reference)), project)
     automaton_of(document, project)
     return document

@@ -13,14 +13,14 @@ from typing import Any
 
 import typer
 
-from language.missing import ToolMissing
-from language.problem import SpecError, ordered, render_all
-from language.text import shortened, visible
+from language.missing import MissingToolError
+from language.problem import SpecError, render_all, sort_problems
+from language.text import escape_invisible, truncate
 from modewright.files import OutputError
 from sweep.cluster_error import ClusterError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
-MOST_SHOWN = 100
+MAX_SHOWN = 100
 """Problems that are shown to a person; `check --json` has all of them."""
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """The class of all usage errors; typer brings its own copy of click's."""
@@ -29,11 +29,11 @@ differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a d
 modewright (one line and a report file); 130 interrupted."""
 
 
-def exit_code(run: Callable[[], object]) -> int:
+def run_with_exit_code(run: Callable[[], object]) -> int:
     """Run a command line and return its exit code; every message goes to stderr."""
     try:
         code = run()
-        _flush()
+        _flush_stdout()
         return code if isinstance(code, int) else DONE
     except USAGE_ERROR as error:
         error.show()
@@ -44,65 +44,65 @@ def exit_code(run: Callable[[], object]) -> int:
     except typer.Exit as error:
         if error.exit_code == INTERRUPTED:
             print("interrupted", file=sys.stderr)
-        return _flushed(error.exit_code)
+        return _flush_with_code(error.exit_code)
     except SpecError as error:
-        report(error)
+        report_problems(error)
         return PROBLEMS
     except (OutputError, ClusterError) as error:
         print(f"error: {error}", file=sys.stderr)
         return PROBLEMS
-    except ToolMissing as error:
+    except MissingToolError as error:
         print(f"error: {error}", file=sys.stderr)
         return TOOL
     except BrokenPipeError:
-        return _unread()
+        return _discard_output()
     except OSError as error:
-        if error.errno not in NOT_OURS:
-            return _defect(error)
-        _unread()
+        if error.errno not in USER_ERRNOS:
+            return _report_defect(error)
+        _discard_output()
         where = f": {error.filename}" if error.filename else ""
-        print(f"error: {visible(shortened(str(error.strerror) + where))}", file=sys.stderr)
+        print(f"error: {escape_invisible(truncate(str(error.strerror) + where))}", file=sys.stderr)
         return PROBLEMS
     except Exception as error:
-        return _defect(error)
+        return _report_defect(error)
 
 
-def _defect(error: Exception) -> int:
+def _report_defect(error: Exception) -> int:
     print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
-    print(f"a report is in {_write_report()}", file=sys.stderr)
+    print(f"a report is in {_write_defect_report()}", file=sys.stderr)
     return DEFECT
 
 
-def _flush() -> None:
+def _flush_stdout() -> None:
     if sys.stdout is not None:
         sys.stdout.flush()
 
 
-def _flushed(code: int) -> int:
+def _flush_with_code(code: int) -> int:
     try:
-        _flush()
+        _flush_stdout()
     except BrokenPipeError:
-        return _unread() or code
+        return _discard_output() or code
     return code
 
 
-def _unread() -> int:
+def _discard_output() -> int:
     """Who reads our output has gone (`| head`): the rest goes nowhere, which is no failure."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return DONE
 
 
-def report(error: SpecError) -> None:
+def report_problems(error: SpecError) -> None:
     """Print the problems and their number."""
-    problems = ordered(error.problems)
+    problems = sort_problems(error.problems)
     count = sum(problem.severity == "error" for problem in problems)
-    print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
-    if len(problems) > MOST_SHOWN:
-        print(f"\n... and {len(problems) - MOST_SHOWN} more", file=sys.stderr)
+    print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)
+    if len(problems) > MAX_SHOWN:
+        print(f"\n... and {len(problems) - MAX_SHOWN} more", file=sys.stderr)
     print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
 
 
-NOT_OURS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.ENAMETOOLONG, errno.EIO}
+USER_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.ENAMETOOLONG, errno.EIO}
 """Errors of the system that the user can do something about: a full disk, a wrong path."""
 
 
@@ -111,7 +111,7 @@ def _first_line(error: Exception) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def _write_report() -> Path:
+def _write_defect_report() -> Path:
     text = f"command: {' '.join(sys.argv)}\npython: {sys.version}\n\n{traceback.format_exc()}"
     with tempfile.NamedTemporaryFile(
         "w", prefix="modewright-report-", suffix=".txt", delete=False

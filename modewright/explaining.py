@@ -10,53 +10,59 @@ from typing import Any, Literal
 from language.calibration import read_calibration
 from language.document import Document
 from language.hoist import PASSES
-from language.load import automaton_of, command_line_value, lowered, program_of
-from language.model_text import model_text
-from language.numbers_text import numbers_text
+from language.load import automaton_of, command_line_value, lower_automaton, program_of
+from language.model_text import format_model
+from language.numbers_text import format_solved_numbers
 from language.parameter import parameter_kinds
-from language.printing import program_text
+from language.printing import format_program
 from language.problem import Problems, SpecError
-from language.project import Project, expanded, read_document, with_calibrations
-from language.provenance import Row, difference_text, differences, rows, spec_text
+from language.project import Project, add_calibrations, expand_document, read_document
+from language.provenance import (
+    ProvenanceEntry,
+    diff_specs,
+    format_diff,
+    format_spec,
+    provenance_entries,
+)
 from language.system import read_system
-from language.tree import one_line
+from language.tree import format_inline
 
-Pass = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
+PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
 Values = Mapping[str, str]
 
 
-def explained(spec: str, stage: Pass, values: Values, root: Path | None = None) -> str:
+def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
     """Return a spec after a pass, as text. Raises SpecError."""
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
     if stage == "document":
-        return spec_text(_expanded(document, project).root)
+        return format_spec(_expand_document(document, project).root)
     if document.kind == "calibration":
         return _calibration_text(document, project)
-    given = {name: command_line_value(text) for name, text in values.items()}
-    automaton = automaton_of(document, project, given)
+    scalars = {name: command_line_value(text) for name, text in values.items()}
+    automaton = automaton_of(document, project, scalars)
     if stage == "model":
-        return model_text(automaton)
+        return format_model(automaton)
     if stage == "numbers":
-        return numbers_text(program_of(automaton))
-    program = lowered(automaton)
+        return format_solved_numbers(program_of(automaton))
+    program = lower_automaton(automaton)
     for name, run in PASSES.items():
         if stage == "lowered":
             break
         program = run(program)
         if stage == name:
             break
-    return program_text(program)
+    return format_program(program)
 
 
 def _calibration_text(document: Document, project: Project) -> str:
     """Return the values of a calibration: SI, compiled in (fixed) or not (tunable), and origin."""
     problems = Problems()
     calibration = read_calibration(document, problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
     base = read_document(project.path_of(calibration.of.text, calibration.of.span))
-    base = with_calibrations(base, [document.source.name], document.name)
-    if expanded(base, project).kind == "system":
+    base = add_calibrations(base, [document.source.name], document.name)
+    if expand_document(base, project).kind == "system":
         instances = read_system(base, project).instances.values()
         automata = {f"{instance.name}.": instance.automaton for instance in instances}
     else:
@@ -70,56 +76,58 @@ def _calibration_text(document: Document, project: Project) -> str:
             if parameter and ("." not in name or name.startswith(owner)):
                 texts = [kinds[own], *([f"std {value.std}"] if value.std else [])]
                 texts += [text for text in (value.origin, value.date) if text]
-                lines.append(f"{owner}{own} = {one_line(value.value)}  # {', '.join(texts)}")
+                lines.append(f"{owner}{own} = {format_inline(value.value)}  # {', '.join(texts)}")
     return "".join(f"{line}\n" for line in lines)
 
 
-def compared(spec: str, other: str, stage: Pass, values: Values, root: Path | None = None) -> str:
+def compare_specs(
+    spec: str, other: str, stage: PassName, values: Values, root: Path | None = None
+) -> str:
     """Return what differs between two specs after a pass, as text. Raises SpecError."""
     if stage == "document":
         project = Project(root or Path())
-        old, new = (_named(name, project).root for name in (spec, other))
-        return difference_text(differences(old, new))
-    before, after = (explained(name, stage, values, root).splitlines() for name in (spec, other))
+        old, new = (_load_expanded(name, project).root for name in (spec, other))
+        return format_diff(diff_specs(old, new))
+    before, after = (explain_spec(name, stage, values, root).splitlines() for name in (spec, other))
     found = difflib.unified_diff(before, after, spec, other, lineterm="")
     return "".join(f"{line}\n" for line in found)
 
 
-def explained_json(spec: str, root: Path | None = None) -> dict[str, Any]:
+def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
     """Return the values of an expanded spec with their places, as plain data. Raises SpecError."""
-    document = _named(spec, Project(root or Path()))
-    found = [_row_json(row) for row in rows(document.root)]
+    document = _load_expanded(spec, Project(root or Path()))
+    found = [_row_json(row) for row in provenance_entries(document.root)]
     return {"kind": document.kind, "name": document.name, "values": found}
 
 
-def compared_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
+def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
     """Return what differs between two expanded specs, as plain data. Raises SpecError."""
     project = Project(root or Path())
-    old, new = (_named(name, project).root for name in (spec, other))
+    old, new = (_load_expanded(name, project).root for name in (spec, other))
     found = [
         {
             "path": difference.path,
             "old": _row_json(difference.old) if difference.old else None,
             "new": _row_json(difference.new) if difference.new else None,
         }
-        for difference in differences(old, new)
+        for difference in diff_specs(old, new)
     ]
     return {"differences": found}
 
 
-def _named(spec: str, project: Project) -> Document:
-    return _expanded(read_document(project.path_of(spec)), project)
+def _load_expanded(spec: str, project: Project) -> Document:
+    return _expand_document(read_document(project.path_of(spec)), project)
 
 
-def _expanded(document: Document, project: Project) -> Document:
+def _expand_document(document: Document, project: Project) -> Document:
     problems = Problems()
-    made = expanded(document, project, problems)
+    result = expand_document(document, project, problems)
     if problems.has_errors:
-        raise SpecError(problems.found)
-    return made
+        raise SpecError(problems.reported)
+    return result
 
 
-def _row_json(row: Row) -> dict[str, Any]:
+def _row_json(row: ProvenanceEntry) -> dict[str, Any]:
     return {
         "path": row.path,
         "value": row.value,

@@ -8,11 +8,11 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-NEW_MODE = 0o644
-SPECS = (".yaml", ".yml")
-RESULTS = ("study.json", "blocks")
+DEFAULT_FILE_MODE = 0o644
+SPEC_SUFFIXES = (".yaml", ".yml")
+RESULT_NAMES = ("study.json", "blocks")
 """What the results of a study are in their folder: sweep/store.py."""
-RUN = (*RESULTS, "plots", ".lock")
+STUDY_FOLDER_NAMES = (*RESULT_NAMES, "plots", ".lock")
 """What a run of a study writes into that folder."""
 
 
@@ -37,52 +37,52 @@ def require_writable(*paths: Path | None) -> None:
     for path in paths:
         if path is None:
             continue
-        if path.exists() and path.resolve().suffix in SPECS:
+        if path.exists() and path.resolve().suffix in SPEC_SUFFIXES:
             raise OutputError(f"{path}: this is a spec; an output would replace it")
         if any(_is_result(place) for place in (path.resolve(), path.resolve().parent)):
             raise OutputError(f"{path}: this is a part of the results of a study")
-        require_place(path)
+        require_writable_location(path)
 
 
 def _is_result(place: Path) -> bool:
     folder = place.parent
-    is_store = (folder / RESULTS[0]).is_file() and (folder / RESULTS[1]).is_dir()
-    return is_store and place.name in RESULTS
+    is_store = (folder / RESULT_NAMES[0]).is_file() and (folder / RESULT_NAMES[1]).is_dir()
+    return is_store and place.name in RESULT_NAMES
 
 
-def require_beside(results: Path, *paths: Path | None) -> None:
+def require_separate_outputs(results: Path, *paths: Path | None) -> None:
     """Raise OutputError, before any work is done, for outputs that a run would get mixed up with.
 
     Its `results` are a folder that may be made by the run; an output may lie in it.
     """
-    folder, taken = results.resolve(), set[Path]()
+    folder, claimed = results.resolve(), set[Path]()
     for path in paths:
         if path is None:
             continue
         place = path.resolve()
-        if place in taken:
+        if place in claimed:
             raise OutputError(f"{path}: this is the name of two outputs")
-        taken.add(place)
-        if any(place.is_relative_to(folder / name) for name in RUN):
+        claimed.add(place)
+        if any(place.is_relative_to(folder / name) for name in STUDY_FOLDER_NAMES):
             raise OutputError(f"{path}: this is a part of the results of the study")
         if place.parent != folder or folder.exists():
             require_writable(path)
 
 
-def require_calibration(path: Path) -> None:
+def require_calibration_output(path: Path) -> None:
     """Raise OutputError for what a new calibration cannot be written to, such as another spec."""
-    require_place(path)
+    require_writable_location(path)
     if path.is_file() and not any(line.startswith(b"calibration:") for line in path.open("rb")):
         raise OutputError(f"{path}: this is no calibration; a new one would replace it")
 
 
-def require_place(path: Path) -> None:
+def require_writable_location(path: Path) -> None:
     """Raise OutputError for a path that cannot be written."""
     if path.is_dir():
         raise OutputError(f"{path}: this is a folder; name a file in it")
     if path.exists() and not path.is_file() and not _is_stream(path):
         raise OutputError(f"{path}: this is a device or a socket; name a file")
-    folder = _target(path).parent
+    folder = _resolve_link(path).parent
     if not folder.is_dir():
         raise OutputError(f"{path}: there is no folder {folder}")
     if not os.access(path if _is_stream(path) else folder, os.W_OK):
@@ -95,7 +95,7 @@ def write_files(files: Mapping[Path, bytes]) -> None:
 
     A file that is there keeps its mode, a link leads where it led; pipes are written to at last.
     """
-    made: list[tuple[str, Path]] = []
+    temporary_files: list[tuple[str, Path]] = []
     current = Path()
     streams = {path: data for path, data in files.items() if _is_stream(path)}
     try:
@@ -103,27 +103,29 @@ def write_files(files: Mapping[Path, bytes]) -> None:
             current = path
             if path in streams:
                 continue
-            target = _target(path)
+            target = _resolve_link(path)
             handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            made.append((name, target))
+            temporary_files.append((name, target))
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
-            os.chmod(name, stat.S_IMODE(target.stat().st_mode) if target.exists() else NEW_MODE)
-        while made:
-            name, current = made[0]
+            os.chmod(
+                name, stat.S_IMODE(target.stat().st_mode) if target.exists() else DEFAULT_FILE_MODE
+            )
+        while temporary_files:
+            name, current = temporary_files[0]
             os.replace(name, current)
-            made.pop(0)
+            temporary_files.pop(0)
         for current, data in streams.items():
             with current.open("wb") as stream:
                 stream.write(data)
     except OSError as error:
         raise OutputError(f"{current}: {error.strerror}") from None
     finally:
-        for name, _ in made:
+        for name, _ in temporary_files:
             Path(name).unlink(missing_ok=True)
 
 
-def _target(path: Path) -> Path:
+def _resolve_link(path: Path) -> Path:
     """Return the file that a path leads to: a link stays, what it names is written."""
     return path.resolve() if path.is_symlink() and not _is_stream(path) else path
 

@@ -6,22 +6,22 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-YOUNG_OBJECTS = 1_000_000
+GENERATION_0_THRESHOLD = 1_000_000
 """New objects after which garbage is looked for."""
 
 
-def look_rarely() -> None:
+def raise_gc_threshold() -> None:
     """Let garbage be looked for rarely from now on; not at all where it was not."""
     young, *older = gc.get_threshold()
     if young:
-        gc.set_threshold(max(young, YOUNG_OBJECTS), *older)
+        gc.set_threshold(max(young, GENERATION_0_THRESHOLD), *older)
 
 
 @contextmanager
-def rarely_looked() -> Iterator[None]:
+def infrequent_gc() -> Iterator[None]:
     """Let garbage be looked for rarely while it lasts: that took 4 % of a diagnosis."""
     before = gc.get_threshold()
-    look_rarely()
+    raise_gc_threshold()
     try:
         yield
     finally:

@@ -4,39 +4,39 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from codegen.source import c_files
+from codegen.source import emit_c_files
 from language.load import automaton_of, program_of
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 from modewright.checking import spec_files
 
-LIBRARY = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
+MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
 
 
 def generated_files(root: Path) -> dict[Path, bytes]:
     """Return every file that belongs below `generated/`. Raises SpecError."""
     project = Project(root)
-    found: dict[Path, bytes] = {}
+    files: dict[Path, bytes] = {}
     for path in spec_files(root):
         document = read_document(path)
-        if expanded(document, project).kind != "automaton":
+        if expand_document(document, project).kind != "automaton":
             continue
         automaton = automaton_of(document, project)
         folder = root / "generated" / path.parent.relative_to(root / "spec")
-        for name, text in c_files(program_of(automaton)).items():
-            found[folder / name] = text.encode()
-    return found
+        for name, text in emit_c_files(program_of(automaton)).items():
+            files[folder / name] = text.encode()
+    return files
 
 
 def stale_files(root: Path) -> list[str]:
     """Return what is missing, different or left over below `generated/`, one line each."""
-    wanted = generated_files(root)
+    expected = generated_files(root)
     present = {path for path in (root / "generated").rglob("*.[ch]") if path.is_file()}
     lines = []
-    for path, data in wanted.items():
+    for path, data in expected.items():
         name = path.relative_to(root)
         if path not in present:
             lines.append(f"{name}: missing")
         elif path.read_bytes() != data:
             lines.append(f"{name}: differs from what the specs give")
-    lines += [f"{path.relative_to(root)}: left over" for path in sorted(present - set(wanted))]
+    lines += [f"{path.relative_to(root)}: left over" for path in sorted(present - set(expected))]
     return lines

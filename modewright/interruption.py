@@ -8,12 +8,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-PATIENCE = 15.0
+GRACE_PERIOD = 15.0
 """Time [s] that a work has to end after Ctrl-C; then another one interrupts that too."""
 
 
 @contextmanager
-def interrupted_once() -> Iterator[None]:
+def debounce_interrupts() -> Iterator[None]:
     """Let the first Ctrl-C interrupt; those that follow do not disturb how the work ends."""
     is_ours = threading.current_thread() is threading.main_thread()
     if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -22,7 +22,7 @@ def interrupted_once() -> Iterator[None]:
     first: list[float] = []
 
     def interrupt(*given: object) -> None:
-        if first and time.monotonic() < first[0] + PATIENCE:
+        if first and time.monotonic() < first[0] + GRACE_PERIOD:
             return
         first[:] = [time.monotonic()]
         raise KeyboardInterrupt

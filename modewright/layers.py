@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 Size = tuple[float, float]
 Point = tuple[float, float]
 
-GAP = 34.0
+COLUMN_GAP = 34.0
 """Room between columns, in which lines bend [px]."""
-ROOM = 12.0
+ITEM_SPACING = 12.0
 """Least distance of items of one column [px]."""
 SWEEPS = 16
 """Passes over the columns; more change nothing in diagrams of 20 modes."""
@@ -53,38 +53,40 @@ class _Item:
 
     size: Size
     column: int
-    lid: float = 0.0
+    top_margin: float = 0.0
     y: float = 0.0
     before: list[_Item] = field(default_factory=list, repr=False)
     after: list[_Item] = field(default_factory=list, repr=False)
 
 
-def layout(boxes: Sequence[Size], edges: Sequence[Edge], lids: Sequence[float] = ()) -> Layout:
+def compute_layout(
+    boxes: Sequence[Size], edges: Sequence[Edge], top_margins: Sequence[float] = ()
+) -> Layout:
     """Place boxes (the first is where to start) and edges between different boxes.
 
-    No edge meets a box in its upper `lids` [px].
+    No edge meets a box in its upper `top_margins` [px].
     """
-    backward = _backward(len(boxes), edges)
-    ranks = _ranks(len(boxes), edges, backward)
+    backward = _find_backward_edges(len(boxes), edges)
+    ranks = _assign_ranks(len(boxes), edges, backward)
     items = [
         _Item(size, 2 * rank, lid)
-        for size, rank, lid in zip(boxes, ranks, lids or [0.0] * len(boxes), strict=True)
+        for size, rank, lid in zip(boxes, ranks, top_margins or [0.0] * len(boxes), strict=True)
     ]
-    chains = [_chain(edge, k in backward, items) for k, edge in enumerate(edges)]
-    columns = _columns(items, chains)
+    chains = [_insert_dummies(edge, k in backward, items) for k, edge in enumerate(edges)]
+    columns = _group_columns(items, chains)
     _reduce_crossings(columns)
-    _place(columns)
-    lefts, widths = _lefts(columns)
+    _assign_heights(columns)
+    lefts, widths = _column_extents(columns)
     bottom = max((item.y + item.size[1] / 2 for column in columns for item in column), default=0.0)
     corners = tuple(
         (lefts[item.column] + (widths[item.column] - item.size[0]) / 2, item.y - item.size[1] / 2)
         for item in items
     )
-    routes = _routes(edges, backward, items, chains, lefts, widths)
+    routes = _route_edges(edges, backward, items, chains, lefts, widths)
     return Layout(corners, routes, (lefts[-1] + widths[-1] if lefts else 0.0, bottom))
 
 
-def _backward(count: int, edges: Sequence[Edge]) -> set[int]:
+def _find_backward_edges(count: int, edges: Sequence[Edge]) -> set[int]:
     """Return the edges that do not lead away from the first box, counted in steps from it.
 
     Boxes near the start stay left; a walk in depth breaks fewer edges but makes long rows.
@@ -100,7 +102,7 @@ def _backward(count: int, edges: Sequence[Edge]) -> set[int]:
     return {k for k, edge in enumerate(edges) if place[edge.target] < place[edge.source]}
 
 
-def _ranks(count: int, edges: Sequence[Edge], backward: set[int]) -> list[int]:
+def _assign_ranks(count: int, edges: Sequence[Edge], backward: set[int]) -> list[int]:
     """Return for each box the length of the longest path that leads to it."""
     ends = [
         (e.target, e.source) if k in backward else (e.source, e.target) for k, e in enumerate(edges)
@@ -112,7 +114,7 @@ def _ranks(count: int, edges: Sequence[Edge], backward: set[int]) -> list[int]:
     return ranks
 
 
-def _chain(edge: Edge, reversed_: bool, items: Sequence[_Item]) -> list[_Item]:
+def _insert_dummies(edge: Edge, reversed_: bool, items: Sequence[_Item]) -> list[_Item]:
     """Return the label and the passages of an edge, from left to right, linked to its boxes."""
     left, right = items[edge.source], items[edge.target]
     if reversed_:
@@ -126,7 +128,7 @@ def _chain(edge: Edge, reversed_: bool, items: Sequence[_Item]) -> list[_Item]:
     return chain
 
 
-def _columns(items: Sequence[_Item], chains: Sequence[Sequence[_Item]]) -> list[list[_Item]]:
+def _group_columns(items: Sequence[_Item], chains: Sequence[Sequence[_Item]]) -> list[list[_Item]]:
     everything = [*items, *(item for chain in chains for item in chain)]
     columns: list[list[_Item]] = [[] for _ in range(max((i.column for i in items), default=-1) + 1)]
     for item in everything:
@@ -135,7 +137,7 @@ def _columns(items: Sequence[_Item], chains: Sequence[Sequence[_Item]]) -> list[
 
 
 def _reduce_crossings(columns: list[list[_Item]]) -> None:
-    best, fewest = [list(column) for column in columns], _crossings(columns)
+    best, fewest = [list(column) for column in columns], _count_crossings(columns)
     for sweep in range(SWEEPS):
         forward = sweep % 2 == 0
         for column in columns if forward else reversed(columns):
@@ -146,13 +148,13 @@ def _reduce_crossings(columns: list[list[_Item]]) -> None:
                 own = [place[id(other)] for other in beside]
                 means[id(item)] = sum(own) / len(own) if own else float(k)
             column.sort(key=lambda item: means[id(item)])
-        count = _crossings(columns)
+        count = _count_crossings(columns)
         if count < fewest:
             best, fewest = [list(column) for column in columns], count
     columns[:] = best
 
 
-def _crossings(columns: Sequence[Sequence[_Item]]) -> int:
+def _count_crossings(columns: Sequence[Sequence[_Item]]) -> int:
     place = {id(item): k for column in columns for k, item in enumerate(column)}
     total = 0
     for column in columns:
@@ -162,52 +164,52 @@ def _crossings(columns: Sequence[Sequence[_Item]]) -> int:
     return total
 
 
-def _place(columns: Sequence[Sequence[_Item]]) -> None:
+def _assign_heights(columns: Sequence[Sequence[_Item]]) -> None:
     """Give every item its height: near its neighbours, the order and the room kept."""
     for column in columns:
-        _settle(column, [0.0] * len(column))
+        _resolve_overlaps(column, [0.0] * len(column))
     for sweep in range(2 * SWEEPS):
         for column in columns if sweep % 2 == 0 else reversed(columns):
-            wanted = []
+            desired = []
             for item in column:
                 beside = [*item.before, *item.after]
-                wanted.append(sum(b.y for b in beside) / len(beside) if beside else item.y)
-            _settle(column, wanted)
+                desired.append(sum(b.y for b in beside) / len(beside) if beside else item.y)
+            _resolve_overlaps(column, desired)
     top = min((item.y - item.size[1] / 2 for column in columns for item in column), default=0.0)
     for column in columns:
         for item in column:
             item.y -= top
 
 
-def _settle(column: Sequence[_Item], wanted: Sequence[float]) -> None:
+def _resolve_overlaps(column: Sequence[_Item], desired: Sequence[float]) -> None:
     """Set the heights that are nearest to those wanted, in least squares, without overlap.
 
     With the distances taken off this is isotonic regression (pool adjacent violators).
     """
     offsets = [0.0]
     for above, below in itertools.pairwise(column):
-        offsets.append(offsets[-1] + (above.size[1] + below.size[1]) / 2 + ROOM)
+        offsets.append(offsets[-1] + (above.size[1] + below.size[1]) / 2 + ITEM_SPACING)
     pools: list[tuple[float, int]] = []
-    for value, offset in zip(wanted, offsets, strict=False):
+    for value, offset in zip(desired, offsets, strict=False):
         total, count = value - offset, 1
         while pools and pools[-1][0] / pools[-1][1] > total / count:
             last = pools.pop()
             total, count = total + last[0], count + last[1]
         pools.append((total, count))
-    settled = [total / count for total, count in pools for _ in range(count)]
-    for item, value, offset in zip(column, settled, offsets, strict=False):
+    pool_means = [total / count for total, count in pools for _ in range(count)]
+    for item, value, offset in zip(column, pool_means, offsets, strict=False):
         item.y = value + offset
 
 
-def _lefts(columns: Sequence[Sequence[_Item]]) -> tuple[list[float], list[float]]:
+def _column_extents(columns: Sequence[Sequence[_Item]]) -> tuple[list[float], list[float]]:
     widths = [max(item.size[0] for item in column) for column in columns]
     lefts: list[float] = []
     for k, _ in enumerate(widths):
-        lefts.append(lefts[-1] + widths[k - 1] + GAP if lefts else 0.0)
+        lefts.append(lefts[-1] + widths[k - 1] + COLUMN_GAP if lefts else 0.0)
     return lefts, widths
 
 
-def _routes(
+def _route_edges(
     edges: Sequence[Edge],
     backward: set[int],
     items: Sequence[_Item],
@@ -215,8 +217,8 @@ def _routes(
     lefts: Sequence[float],
     widths: Sequence[float],
 ) -> tuple[Route, ...]:
-    ports = _ports(edges, backward, items, chains)
-    found = []
+    ports = _port_heights(edges, backward, items, chains)
+    routes = []
     for k, (edge, chain) in enumerate(zip(edges, chains, strict=True)):
         ends = [items[edge.source], items[edge.target]]
         left, right = reversed(ends) if k in backward else ends
@@ -238,11 +240,11 @@ def _routes(
         pieces.append((*piece, (start, ports[k][1])))
         if k in backward:
             pieces = [tuple(reversed(points)) for points in reversed(pieces)]
-        found.append(Route(tuple(pieces), corner))
-    return tuple(found)
+        routes.append(Route(tuple(pieces), corner))
+    return tuple(routes)
 
 
-def _ports(
+def _port_heights(
     edges: Sequence[Edge],
     backward: set[int],
     items: Sequence[_Item],
@@ -260,5 +262,7 @@ def _ports(
                     here.append((chains[k][0 if side == 0 else -1].y, k))
             for position, (_, k) in enumerate(sorted(here), 1):
                 share = position / (len(here) + 1) - 0.5
-                ports[k][side] = item.y + item.lid / 2 + share * (item.size[1] - item.lid)
+                ports[k][side] = (
+                    item.y + item.top_margin / 2 + share * (item.size[1] - item.top_margin)
+                )
     return ports

@@ -5,34 +5,36 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from language.text import visible
-from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, lifted
+from language.text import escape_invisible
+from modewright.diagram import Arrow, Diagram, ModeBox, ModePath, RegionBox, lift_arrow
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
 
-SIGNS = {"history": "(H) "}
+KIND_MARKS = {"history": "(H) "}
 """What stands before the name of a mode that is no plain one."""
 
 
-def mermaid(diagram: Diagram) -> str:
+def render_mermaid(diagram: Diagram) -> str:
     """Return the diagram as Mermaid text; a transition stands where both its modes are inside."""
     lines = ["stateDiagram-v2", "    direction LR"]
     if len(diagram.regions) == 1:
         lines += _region_lines(diagram.regions[0], diagram.arrows, 1)
     else:
-        lines.append(f'    state "{_escaped(diagram.name)}" as {identifier((diagram.name,))}_ {{')
-        lines += _parallel(diagram.regions, diagram.arrows, 2)
+        lines.append(
+            f'    state "{_escape_label(diagram.name)}" as {identifier_of((diagram.name,))}_ {{'
+        )
+        lines += _parallel_lines(diagram.regions, diagram.arrows, 2)
         lines.append("    }")
     return "\n".join(lines) + "\n"
 
 
-def identifier(path: Key) -> str:
+def identifier_of(path: ModePath) -> str:
     """Return the identifier of a mode: its path, not a word of Mermaid."""
     name = re.sub(r"\W", "_", "__".join(path), flags=re.ASCII)
     return name + "_" if name in RESERVED else name
 
 
-def _parallel(
+def _parallel_lines(
     regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...], depth: int
 ) -> Iterator[str]:
     for k, region in enumerate(regions):
@@ -45,31 +47,33 @@ def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> I
     indent = "    " * depth
     for mode in region.modes:
         if mode.name == region.initial:
-            yield f"{indent}[*] --> {identifier(mode.path)}"
+            yield f"{indent}[*] --> {identifier_of(mode.path)}"
     for mode in region.modes:
         yield from _mode_lines(mode, arrows, depth)
-        if mode.sort == "final":
-            yield f"{indent}{identifier(mode.path)} --> [*]"
+        if mode.kind == "final":
+            yield f"{indent}{identifier_of(mode.path)} --> [*]"
     place = region.modes[0].path[:-1] if region.modes else ()
-    for arrow in map(lifted, arrows):
+    for arrow in map(lift_arrow, arrows):
         if arrow.source[:-1] == place:
-            label = f" : {'<br/>'.join(map(_escaped, arrow.lines))}" if arrow.lines else ""
-            yield f"{indent}{identifier(arrow.source)} --> {identifier(arrow.target)}{label}"
+            label = f" : {'<br/>'.join(map(_escape_label, arrow.lines))}" if arrow.lines else ""
+            yield f"{indent}{identifier_of(arrow.source)} --> {identifier_of(arrow.target)}{label}"
 
 
 def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
     indent = "    " * depth
-    text = "<br/>".join(map(_escaped, (SIGNS.get(mode.sort, "") + mode.name, *mode.lines)))
-    head = f'{indent}state "{text}" as {identifier(mode.path)}'
+    text = "<br/>".join(
+        map(_escape_label, (KIND_MARKS.get(mode.kind, "") + mode.name, *mode.lines))
+    )
+    head = f'{indent}state "{text}" as {identifier_of(mode.path)}'
     if not mode.regions:
         yield head
         return
     yield head + " {"
-    yield from _parallel(mode.regions, arrows, depth + 1)
+    yield from _parallel_lines(mode.regions, arrows, depth + 1)
     yield indent + "}"
 
 
-def _escaped(text: str) -> str:
+def _escape_label(text: str) -> str:
     """Return a text without what ends a label in some version of Mermaid, or is HTML."""
-    plain = visible(text).replace('"', "'")
+    plain = escape_invisible(text).replace('"', "'")
     return re.sub(r"[#;:]|<(?=[A-Za-z/!?])", lambda match: f"#{ord(match[0])};", plain)

@@ -6,7 +6,7 @@ import os
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 
-NEIGHBOURS = (
+OWN_PACKAGES = (
     "language",
     "engine",
     "codegen",
@@ -18,7 +18,7 @@ NEIGHBOURS = (
 )
 
 
-def claim_neighbours() -> None:
+def load_own_packages() -> None:
     """Load our packages by their place, so that the user's `engine/` is not taken for ours.
 
     Their names are common words and Python searches the script's own folder first. Each holds a
@@ -26,7 +26,7 @@ def claim_neighbours() -> None:
     of that name was loaded before.
     """
     base = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    for name in NEIGHBOURS:
+    for name in OWN_PACKAGES:
         place = os.path.join(base, name, "__init__.py")
         loaded = sys.modules.get(name)
         if loaded is not None:

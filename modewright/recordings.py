@@ -12,29 +12,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnosis.case import Case
-from diagnosis.file_names import file_names
-from diagnosis.finding import told
-from diagnosis.guessed_map import guessed_map
-from diagnosis.mistakes import mistakes_of
+from diagnosis.file_names import distinguish_file_names
+from diagnosis.finding import format_findings
+from diagnosis.guessed_map import guess_map
+from diagnosis.mistakes import find_clock_and_sign_errors
 from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
 from engine.recording import Recording, read_recording
 from language.experiment import RecordingMap
 from language.load import automaton_of
 from language.map import read_map
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from language.model import Automaton
 from language.pairing import check_pairing
 from language.problem import Problems, SpecError
-from language.project import Project, expanded, read_document
-from modewright.compiled import carried_out
+from language.project import Project, expand_document, read_document
+from modewright.compiled import simulate_resolved
 
 if TYPE_CHECKING:
     from engine.plot import Picture
 
 
-Lacking = dict[str, str]
+MissingReasons = dict[str, str]
 """Why a file has none of some columns, by their names in the map."""
-LACKING = ("column", "empty")
+MISSING_KINDS = ("column", "empty")
 """Problems of a file that lacks a column, or has no value in it."""
 
 
@@ -49,10 +49,10 @@ class CheckedRecordings:
 
     def plot(self, title: str = "") -> Picture:
         """Return a picture of the channels, what they excite and what was found."""
-        from diagnosis.recording_picture import recording_picture
+        from diagnosis.recording_picture import draw_recordings
 
         names = ", ".join(recording.name for recording in self.recordings)
-        return recording_picture(self.recordings, self.check, title or names)
+        return draw_recordings(self.recordings, self.check, title or names)
 
 
 def check_recordings(
@@ -68,32 +68,36 @@ def check_recordings(
     Raises SpecError, ToolMissing.
     """
     project = Project(root or Path())
-    automaton = _automaton(spec, project) if spec else None
-    named = map or (automaton.recording_map.text if automaton and automaton.recording_map else None)
-    if automaton and not named:
+    automaton = _load_automaton(spec, project) if spec else None
+    map_name = map or (
+        automaton.recording_map.text if automaton and automaton.recording_map else None
+    )
+    if automaton and not map_name:
         problems = Problems()
         label = f"`{automaton.name}` names no map of recordings"
         hint = "`recording_map: <name>` in the spec, or `--map`"
         problems.error("missing", automaton.span, label, hint)
-        raise SpecError(problems.found)
-    if named:
-        mapping = read_map(read_document(project.path_of(named)), project)
+        raise SpecError(problems.reported)
+    if map_name:
+        mapping = read_map(read_document(project.path_of(map_name)), project)
         _check_map(automaton, mapping)
     else:
-        mapping = guessed_map(Path(files[0]), databases)
+        mapping = guess_map(Path(files[0]), databases)
     used = used_columns(mapping, automaton)
     if len({os.path.realpath(file) for file in files}) < len(files):
         raise ValueError("a recording is named twice: each recording counts once")
-    names = file_names([Path(file) for file in files])
-    read = [_read(path, name, mapping, used) for path, name in names.items()]
+    names = distinguish_file_names([Path(file) for file in files])
+    read = [_read_available(path, name, mapping, used) for path, name in names.items()]
     recordings = tuple(recording for recording, _ in read)
-    lacking = {recording.name: why for recording, why in read}
+    reasons = {recording.name: why for recording, why in read}
     if spec is None or automaton is None:
-        check = _explained(checked(recordings, mapping, automaton), lacking)
+        check = _add_missing_reasons(checked(recordings, mapping, automaton), reasons)
         return CheckedRecordings(check, mapping, recordings)
-    document = expanded(read_document(project.path_of(spec)), project)
-    mistakes = partial(mistakes_of, document, project, automaton, mapping)
-    check = _explained(checked(recordings, mapping, automaton, carried_out, mistakes), lacking)
+    document = expand_document(read_document(project.path_of(spec)), project)
+    mistakes = partial(find_clock_and_sign_errors, document, project, automaton, mapping)
+    check = _add_missing_reasons(
+        checked(recordings, mapping, automaton, simulate_resolved, mistakes), reasons
+    )
     return CheckedRecordings(check, mapping, recordings, automaton)
 
 
@@ -106,54 +110,62 @@ def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
     recordings = []
     for path in case.held_out:
         name = case.name_of(path)
-        with suppress(SpecError, ToolMissing, ValueError):
-            known = case.read.get(path) or _read(path, name, case.mapping, used)[0]
-            recordings.append(dataclasses.replace(known, name=name))
+        with suppress(SpecError, MissingToolError, ValueError):
+            recording = (
+                case.recordings.get(path) or _read_available(path, name, case.mapping, used)[0]
+            )
+            recordings.append(dataclasses.replace(recording, name=name))
     if not recordings:
         return ()
-    mistakes = partial(mistakes_of, case.document, case.project, automaton, case.mapping)
-    check = checked(recordings, case.mapping, automaton, carried_out, mistakes)
+    mistakes = partial(
+        find_clock_and_sign_errors, case.document, case.project, automaton, case.mapping
+    )
+    check = checked(recordings, case.mapping, automaton, simulate_resolved, mistakes)
     serious = [finding for finding in check.findings if finding.severity != "note"]
-    return tuple(f"held out, {severity}: {text}" for severity, text in told(serious))
+    return tuple(f"held out, {severity}: {text}" for severity, text in format_findings(serious))
 
 
-def _read(
-    path: Path, name: str, mapping: RecordingMap, used: Sequence[str]
-) -> tuple[Recording, Lacking]:
+def _read_available(
+    path: Path, name: str, mapping: RecordingMap, columns: Sequence[str]
+) -> tuple[Recording, MissingReasons]:
     """Read a recording, without the columns that it has not got; say why it has not.
 
     What else is wrong with a file is a problem of the file. Raises SpecError, ToolMissing.
     """
-    why: Lacking = {}
+    reasons: MissingReasons = {}
     try:
-        recording = read_recording(path, mapping, used)
+        recording = read_recording(path, mapping, columns)
     except SpecError as error:
-        why = {column: text for column in used if (text := _lack(path, mapping, column))}
-        kept = [column for column in used if column not in why]
-        if not kept or any(problem.kind not in LACKING for problem in error.problems):
+        reasons = {
+            column: text for column in columns if (text := _missing_reason(path, mapping, column))
+        }
+        available = [column for column in columns if column not in reasons]
+        if not available or any(problem.kind not in MISSING_KINDS for problem in error.problems):
             raise
-        recording = read_recording(path, mapping, kept)
-    return dataclasses.replace(recording, name=name), why
+        recording = read_recording(path, mapping, available)
+    return dataclasses.replace(recording, name=name), reasons
 
 
-def _lack(path: Path, mapping: RecordingMap, column: str) -> str:
+def _missing_reason(path: Path, mapping: RecordingMap, column: str) -> str:
     """Return why a file does not have a column; empty where it has, or is wrong otherwise."""
     try:
         read_recording(path, mapping, [column])
     except SpecError as error:
-        lacks = [problem for problem in error.problems if problem.kind in LACKING]
+        lacks = [problem for problem in error.problems if problem.kind in MISSING_KINDS]
         if len(lacks) == len(error.problems):
             return "; ".join(text for text in (lacks[0].label, lacks[0].help) if text)
     return ""
 
 
-def _explained(check: RecordingCheck, lacking: Mapping[str, Lacking]) -> RecordingCheck:
+def _add_missing_reasons(
+    check: RecordingCheck, reasons: Mapping[str, MissingReasons]
+) -> RecordingCheck:
     """Return a check in which missing signals are told with why they are."""
     findings = []
-    for one in check.findings:
-        why = lacking.get(one.recording, {}).get(one.channel, "")
-        is_absent = bool(why) and one.kind == "no_signal"
-        findings.append(dataclasses.replace(one, text=why) if is_absent else one)
+    for finding in check.findings:
+        why = reasons.get(finding.recording, {}).get(finding.channel, "")
+        is_absent = bool(why) and finding.kind == "no_signal"
+        findings.append(dataclasses.replace(finding, text=why) if is_absent else finding)
     return dataclasses.replace(check, findings=tuple(findings))
 
 
@@ -162,8 +174,8 @@ def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
     problems = Problems()
     if automaton is not None:
         check_pairing(automaton, mapping, problems)
-    problems.stop_if_any()
+    problems.raise_if_errors()
 
 
-def _automaton(spec: str, project: Project) -> Automaton:
+def _load_automaton(spec: str, project: Project) -> Automaton:
     return automaton_of(read_document(project.path_of(spec)), project)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.band import Band
-from engine.plot import Line, Panel, axis_title, picture
+from engine.band import ModeBand
+from engine.plot import Panel, PlotLine, axis_title, draw_picture
 from engine.trajectory import Trajectory
 from modewright.api import Replayed
 
@@ -14,7 +14,7 @@ def replay_picture(replayed: Replayed, title: str, form: str = "png") -> bytes:
     """Return the picture: one panel per unit of what was measured, one per unit of the outputs."""
     trajectory = replayed.result.trajectory
     panels = [*_panels(trajectory, measured=True), *_panels(trajectory, measured=False)]
-    return picture([trajectory], panels, [Band("mode", "mode")], title).data(form)
+    return draw_picture([trajectory], panels, [ModeBand("mode", "mode")], title).data(form)
 
 
 def _panels(trajectory: Trajectory, *, measured: bool) -> list[Panel]:
@@ -25,7 +25,8 @@ def _panels(trajectory: Trajectory, *, measured: bool) -> list[Panel]:
     word = "measured" if measured else "estimated"
     return [
         Panel(
-            f"{word} {axis_title(unit)}", [Line(name, name.removeprefix("in.")) for name in names]
+            f"{word} {axis_title(unit)}",
+            [PlotLine(name, name.removeprefix("in.")) for name in names],
         )
         for unit, names in by_unit.items()
     ]

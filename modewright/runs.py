@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine.difference import RunDifference, run_difference
-from engine.run_file import FORMATS, read_run, run_files
+from engine.difference import RunDifference, compare_runs
+from engine.run_file import FORMATS, encode_run, read_run
 from engine.trajectory import Trajectory
 from modewright import api
 from modewright.files import write_files
@@ -24,7 +24,7 @@ def save(trajectory: Trajectory, path: str | Path) -> None:
 
     Raises OutputError, ToolMissing, ValueError (another ending).
     """
-    write_files(run_files(trajectory, Path(path)))
+    write_files(encode_run(trajectory, Path(path)))
 
 
 def read(run: Run, root: Path | None = None) -> Trajectory:
@@ -54,12 +54,14 @@ def plot(
 
     `signals` are patterns such as `plant.*`; `span` is in seconds.
     """
-    from engine.plot import overview
+    from engine.plot import draw_overview
 
     runs = [read(each) for each in (run, other) if each is not None]
-    names = [label(each, letter) for each, letter in ((run, "A"), (other, "B")) if each is not None]
+    names = [
+        run_label(each, letter) for each, letter in ((run, "A"), (other, "B")) if each is not None
+    ]
     shown = title or (f"A: {names[0]}; B (dashed): {names[1]}" if len(runs) > 1 else names[0])
-    return overview(runs, signals, span, shown)
+    return draw_overview(runs, signals, span, shown)
 
 
 def compare(
@@ -77,13 +79,13 @@ def compare(
     A signal may differ by `relative` times its peak, or by its entry in `tolerances` (patterns of
     names, values in SI); modes may disagree for `slack` [s]. Raises ValueError, SpecError.
     """
-    return run_difference(
+    return compare_runs(
         read(a), read(b),
         relative=relative, tolerances=tolerances, slack=slack, patterns=signals, span=span,
     )  # fmt: skip
 
 
-def label(run: Run, default: str) -> str:
+def run_label(run: Run, default: str) -> str:
     """Return what a run is called in a picture."""
     if isinstance(run, Trajectory):
         return run.name or default

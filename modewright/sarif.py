@@ -13,7 +13,7 @@ from language.problem import Problem
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def sarif(problems: Sequence[Problem]) -> dict[str, Any]:
+def to_sarif(problems: Sequence[Problem]) -> dict[str, Any]:
     """Return problems as one run of a SARIF log; only the rules that they break are listed."""
     kinds = sorted({problem.kind for problem in problems}, key=code_of)
     places = {kind: index for index, kind in enumerate(kinds)}

@@ -15,9 +15,9 @@ from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
 from lockstep.compare import Verdict
 from modewright.api import Replayed
-from modewright.doctor import Finding
+from modewright.doctor import HealthCheck
 
-MOST_EVENTS = 40
+MAX_EVENTS = 40
 """Most transitions shown to a person; all of them are in --json."""
 
 
@@ -32,8 +32,8 @@ def events_table(events: Sequence[Event]) -> Table:
         escape("time [s]"), "automaton", "transition", "from", "to",
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
-    kept = sorted(_kept(events))
-    for number, before in zip(kept, [-1, *kept], strict=False):
+    shown = sorted(_select_events(events))
+    for number, before in zip(shown, [-1, *shown], strict=False):
         if number > before + 1:
             table.add_row("...", f"{number - before - 1} more", "", "", "")
         event = events[number]
@@ -44,14 +44,14 @@ def events_table(events: Sequence[Event]) -> Table:
     return table
 
 
-def _kept(events: Sequence[Event]) -> set[int]:
+def _select_events(events: Sequence[Event]) -> set[int]:
     """Return which events are shown: of many the first, the last, and what is no transition."""
     numbers = range(len(events))
-    if len(events) <= MOST_EVENTS:
+    if len(events) <= MAX_EVENTS:
         return set(numbers)
     others = [number for number in numbers if events[number].kind != "transition"]
-    half = MOST_EVENTS // 2
-    return {*numbers[:half], *numbers[-half:], *others[:MOST_EVENTS]}
+    half = MAX_EVENTS // 2
+    return {*numbers[:half], *numbers[-half:], *others[:MAX_EVENTS]}
 
 
 def verdict_table(verdicts: Iterable[Verdict]) -> Table:
@@ -162,75 +162,79 @@ def print_replay(console: Console, replayed: Replayed) -> None:
         print_verdicts(console, [replayed.verdict])
 
 
-def print_difference(console: Console, found: RunDifference) -> None:
+def print_difference(console: Console, difference: RunDifference) -> None:
     """Print the differences of two runs: signals, modes, transitions, and when they part."""
     table = Table(
         "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
-    for item in found.signals:
+    for item in difference.signals:
         first = "" if item.first is None else f"[red]{item.first:.9g}[/]"
         at = f"{item.at:.6g}" if item.largest else ""
         table.add_row(item.name, item.unit, f"{item.rms:.4g}", f"{item.largest:.4g}", at, first)
     console.print(table)
-    for sequence in found.sequences:
+    for sequence in difference.sequences:
         console.print(_sequence_line(sequence), highlight=False)
-    for window in found.windows[:MOST_EVENTS]:
+    for window in difference.windows[:MAX_EVENTS]:
         span = f"{window.start:.9g} s to {window.end:.9g} s"
         text = f"{window.signal}: {span}: {window.a} in A, {window.b} in B"
         console.print(text, highlight=False, soft_wrap=True)
-    if len(found.windows) > MOST_EVENTS:
-        console.print(f"{len(found.windows) - MOST_EVENTS} more windows of disagreement")
-    for names, letter in ((found.only_a, "A"), (found.only_b, "B")):
+    if len(difference.windows) > MAX_EVENTS:
+        console.print(f"{len(difference.windows) - MAX_EVENTS} more windows of disagreement")
+    for names, letter in ((difference.only_a, "A"), (difference.only_b, "B")):
         if names:
             console.print(f"only in {letter}: {', '.join(names)}", highlight=False, soft_wrap=True)
-    if found.uncovered:
-        console.print(f"{found.uncovered:.6g} s are in one of the runs only", highlight=False)
-    if found.first:
-        console.print(f"they part at {found.first[0]:.9g} s: {found.first[1]}", highlight=False)
+    if difference.uncovered:
+        console.print(f"{difference.uncovered:.6g} s are in one of the runs only", highlight=False)
+    if difference.first:
+        console.print(
+            f"they part at {difference.first[0]:.9g} s: {difference.first[1]}", highlight=False
+        )
     console.print(
-        f"{found.samples} samples: {'within' if found.is_within else 'NOT within'} tolerance"
+        f"{difference.samples} samples: {'within' if difference.is_within else 'NOT within'} tolerance"
     )
 
 
-def difference_json(found: RunDifference) -> dict[str, Any]:
+def difference_json(difference: RunDifference) -> dict[str, Any]:
     """Return the differences of two runs as plain data; what is infinite is null."""
     return {
-        "within": found.is_within,
-        "span": list(found.span),
-        "samples": found.samples,
-        "signals": [finite(vars(item)) for item in found.signals],
-        "mode_windows": [vars(window) for window in found.windows],
-        "transitions": [vars(sequence) for sequence in found.sequences],
-        "only_a": list(found.only_a),
-        "only_b": list(found.only_b),
-        "uncovered": found.uncovered,
-        "first": list(found.first) if found.first else None,
+        "within": difference.is_within,
+        "span": list(difference.span),
+        "samples": difference.samples,
+        "signals": [null_nonfinite(vars(item)) for item in difference.signals],
+        "mode_windows": [vars(window) for window in difference.windows],
+        "transitions": [vars(sequence) for sequence in difference.sequences],
+        "only_a": list(difference.only_a),
+        "only_b": list(difference.only_b),
+        "uncovered": difference.uncovered,
+        "first": list(difference.first) if difference.first else None,
     }
 
 
 def _sequence_line(sequence: ModeSequence) -> str:
     counts = f"{sequence.count_a} transitions in A, {sequence.count_b} in B"
     same = f"the same, at most {sequence.apart:.3g} s apart"
-    told = same if sequence.parted is None else f"not the same from number {sequence.parted + 1} on"
-    return f"{sequence.instance or 'automaton'}: {counts}, {told}"
+    order_text = (
+        same if sequence.parted is None else f"not the same from number {sequence.parted + 1} on"
+    )
+    return f"{sequence.instance or 'automaton'}: {counts}, {order_text}"
 
 
-def finite(values: Mapping[str, Any]) -> dict[str, Any]:
+def null_nonfinite(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values for JSON, which has neither infinities nor NaN: they are null."""
-    return {name: _finite(value) for name, value in values.items()}
+    return {name: _null_nonfinite_value(value) for name, value in values.items()}
 
 
-def _finite(value: Any) -> Any:
+def _null_nonfinite_value(value: Any) -> Any:
     if isinstance(value, tuple | list):
-        return [_finite(each) for each in value]
+        return [_null_nonfinite_value(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def print_finding(console: Console, finding: Finding) -> None:
+def print_health_check(console: Console, check: HealthCheck) -> None:
     """Print one finding of the doctor, and what would help."""
-    colour = {"ok": "green", "absent": "yellow", "fault": "red"}[finding.verdict]
-    text = f"[{colour}]{finding.verdict:<6}[/] {finding.name:<12} {escape(finding.told)}"
+    colour = {"ok": "green", "absent": "yellow", "fault": "red"}[check.verdict]
+    text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.told)}"
     console.print(text, highlight=False, soft_wrap=True)
-    if finding.help:
-        console.print(f"       help: {escape(finding.help)}", highlight=False, soft_wrap=True)
+    if check.help:
+        console.print(f"       help: {escape(check.help)}", highlight=False, soft_wrap=True)

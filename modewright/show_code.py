@@ -8,12 +8,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from codegen.mcdc import Covered, Decision
-from codegen.proofs.proof import Proof
-from lockstep.fuzzing import Fuzzed
+from codegen.mcdc import Decision, McdcCoverage
+from codegen.proofs.proof import ToolVerdict
+from lockstep.fuzzing import FuzzReport
 
 
-def print_proofs(console: Console, proofs: Sequence[Proof]) -> None:
+def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
     """Print what tools say of generated C, and each thing that they found."""
     table = Table(box=None, pad_edge=False)
     for title in ("check", "tool", "of", "found"):
@@ -28,43 +28,43 @@ def print_proofs(console: Console, proofs: Sequence[Proof]) -> None:
             console.print(f"{proof.check}: {finding}", soft_wrap=True, highlight=False)
 
 
-def proof_json(proof: Proof) -> dict[str, Any]:
+def proof_json(proof: ToolVerdict) -> dict[str, Any]:
     """Return what a machine wants of a check of generated C."""
     return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
 
 
-def print_fuzzed(console: Console, found: Fuzzed) -> None:
+def print_fuzzed(console: Console, result: FuzzReport) -> None:
     """Print what came of fuzzing: what was tried, and each thing that was found."""
     console.print(
-        f"{found.program}: {found.distinct} different sequences of {found.runs}, "
-        f"{found.ticks} ticks, {found.transitions} transitions, {found.edges} edges of the C",
+        f"{result.program}: {result.distinct} different sequences of {result.runs}, "
+        f"{result.ticks} ticks, {result.transitions} transitions, {result.edges} edges of the C",
         soft_wrap=True,
         highlight=False,
     )
-    console.print(f"modes: {', '.join(found.modes)}", soft_wrap=True, highlight=False)
-    for finding in found.findings:
+    console.print(f"modes: {', '.join(result.modes)}", soft_wrap=True, highlight=False)
+    for finding in result.findings:
         console.print(f"sanitizers: {finding}", soft_wrap=True, highlight=False, markup=False)
-    told = f"; first: {found.first}" if found.first else ""
-    text = f"{found.differing} sequences differ from the engine{told}"
+    told = f"; first: {result.first}" if result.first else ""
+    text = f"{result.differing} sequences differ from the engine{told}"
     console.print(text, soft_wrap=True, highlight=False, markup=False)
 
 
-def fuzzed_json(found: Fuzzed) -> dict[str, Any]:
+def fuzzed_json(result: FuzzReport) -> dict[str, Any]:
     """Return what a machine wants of fuzzing."""
-    first = vars(found.first) if found.first else None
-    lists = {"modes": list(found.modes), "findings": list(found.findings)}
-    return {**vars(found), **lists, "first": first, "clean": found.is_clean}
+    first = vars(result.first) if result.first else None
+    lists = {"modes": list(result.modes), "findings": list(result.findings)}
+    return {**vars(result), **lists, "first": first, "clean": result.is_clean}
 
 
-def print_mcdc(console: Console, found: Covered) -> None:
+def print_mcdc(console: Console, coverage: McdcCoverage) -> None:
     """Print what was shown of generated C, and each decision of which something was not."""
-    for decision in found.missed:
-        text = f"{found.file}:{decision.line}: {_marks(decision)} {decision.text}"
+    for decision in coverage.uncovered:
+        text = f"{coverage.file}:{decision.line}: {_marks(decision)} {decision.text}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
     text = (
-        f"{found.file}: of {found.conditions} conditions {found.shown} are shown to matter (MC/DC) "
-        f"by {found.sequences} sequences, {found.steps} steps; "
-        f"{found.conditions - found.shown - found.open} are proven infeasible, {found.open} open"
+        f"{coverage.file}: of {coverage.conditions} conditions {coverage.shown} are shown to matter (MC/DC) "
+        f"by {coverage.sequences} sequences, {coverage.steps} steps; "
+        f"{coverage.conditions - coverage.shown - coverage.open} are proven infeasible, {coverage.open} open"
     )
     console.print(text, soft_wrap=True, highlight=False)
 
@@ -78,11 +78,11 @@ def _marks(decision: Decision) -> str:
     return "".join("+" if shown else never[outcome] for shown, outcome in pairs)
 
 
-def mcdc_json(found: Covered) -> dict[str, Any]:
+def mcdc_json(coverage: McdcCoverage) -> dict[str, Any]:
     """Return what a machine wants of MC/DC."""
     decisions = [
         {**vars(each), "shown": list(each.shown), "never": list(each.never)}
-        for each in found.decisions
+        for each in coverage.decisions
     ]
-    counts = {"conditions": found.conditions, "shown": found.shown, "open": found.open}
-    return {**vars(found), **counts, "decisions": decisions}
+    counts = {"conditions": coverage.conditions, "shown": coverage.shown, "open": coverage.open}
+    return {**vars(coverage), **counts, "decisions": decisions}

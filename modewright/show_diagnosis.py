@@ -7,14 +7,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.dossier import Dossier, finite
-from diagnosis.fit import STRONG, Fit
-from diagnosis.wording import rounded, summary
+from diagnosis.dossier import DiagnosisReport, replace_non_finite
+from diagnosis.fit import STRONG_CORRELATION, Fit
+from diagnosis.wording import format_rounded, summary_lines
 
 
-def print_dossier(screen: Console, dossier: Dossier) -> None:
+def print_dossier(screen: Console, dossier: DiagnosisReport) -> None:
     """Print a diagnosis in at most four lines."""
-    for line in summary(dossier):
+    for line in summary_lines(dossier):
         screen.print(line.replace("`", ""), highlight=False, markup=False, soft_wrap=True)
 
 
@@ -25,17 +25,21 @@ def print_fit(screen: Console, fit: Fit) -> None:
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
     for one in fit.parameters:
-        goes = f"{one.strongest[0]} {one.strongest[1]:+.2f}" if one.strongest else ""
+        goes = (
+            f"{one.strongest_correlation[0]} {one.strongest_correlation[1]:+.2f}"
+            if one.strongest_correlation
+            else ""
+        )
         table.add_row(
             one.name, f"{one.declared:.5g}", f"{one.quantity.value:.5g}",
-            rounded(one.quantity.std), one.quantity.unit, f"{one.left:.0%}", goes, one.note,
+            format_rounded(one.quantity.std), one.quantity.unit, f"{one.prior_ratio:.0%}", goes, one.note,
         )  # fmt: skip
     screen.print(table)
     for name, misfit in fit.misfits.items():
         text = f"misfit of free simulation, {name}: {misfit.nrmse_before:.2%} as declared, "
         screen.print(text + f"{misfit.nrmse_after:.2%} as fitted", highlight=False)
     for (first, second), value in fit.correlations.items():
-        if abs(value) >= STRONG:
+        if abs(value) >= STRONG_CORRELATION:
             text = f"hardly told apart: {first} and {second}, correlation {value:+.2f}"
             screen.print(text, highlight=False)
     if fit.undetermined:
@@ -53,7 +57,7 @@ def fit_json(fit: Fit) -> dict[str, Any]:
                 "value": one.quantity.value,
                 "std": one.quantity.std,
                 "unit": one.quantity.unit,
-                "of_prior": one.left,
+                "of_prior": one.prior_ratio,
                 "note": one.note,
             }
             for one in fit.parameters
@@ -63,4 +67,4 @@ def fit_json(fit: Fit) -> dict[str, Any]:
         "misfits": {name: vars(misfit) for name, misfit in fit.misfits.items()},
         "inputs": dict(fit.inputs),
     }
-    return dict(finite(found))
+    return dict(replace_non_finite(found))

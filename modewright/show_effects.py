@@ -9,36 +9,36 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from diagnosis.change import Change
-from diagnosis.library import Described, place_kinds
-from diagnosis.naming import OTHER_NAMES, place_path
+from diagnosis.change import EquationChange
+from diagnosis.library import EffectDescription, format_place_kinds
+from diagnosis.naming import VERDICT_ALIASES, place_path
 
 
-def print_effects(screen: Console, found: Sequence[Described], at: str | None) -> None:
+def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str | None) -> None:
     """Print a line for each effect; with a spec those that fit it, and where."""
     table = Table(
         "effect", f"places of {at}" if at else "fits", "what it is",
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
-    for one in found:
-        where = ", ".join(one.places) if at else place_kinds(one.effect)
+    for one in effects:
+        where = ", ".join(one.places) if at else format_place_kinds(one.effect)
         if where:
             table.add_row(one.effect.name, escape(where), escape(one.effect.about))
     screen.print(table)
 
 
-def print_effect(screen: Console, one: Described, at: str | None) -> None:
+def print_effect(screen: Console, entry: EffectDescription, at: str | None) -> None:
     """Print all that is known of an effect."""
-    effect = one.effect
-    lines = [f"{effect.name}: {effect.about}", f"fits {place_kinds(effect)}"]
-    for name, (other, where) in OTHER_NAMES.items():
+    effect = entry.effect
+    lines = [f"{effect.name}: {effect.about}", f"fits {format_place_kinds(effect)}"]
+    for name, (other, where) in VERDICT_ALIASES.items():
         if other == effect.name:
             lines.append(f"verdicts call it {name} {where}")
     if at:
-        lines.append(f"in {at}: {', '.join(one.places) or 'nowhere'}")
-    lines += ["", *(f"  {line}" for line in one.lines), ""]
-    for place in one.places:
-        lines += [f"laid on {place} of {at}:", *_changed(one.changes[place]), ""]
+        lines.append(f"in {at}: {', '.join(entry.places) or 'nowhere'}")
+    lines += ["", *(f"  {line}" for line in entry.lines), ""]
+    for place in entry.places:
+        lines += [f"laid on {place} of {at}:", *_change_lines(entry.changes[place]), ""]
     parts = {
         "signature": effect.signature,
         "confused with": ", ".join(effect.confused_with),
@@ -50,7 +50,7 @@ def print_effect(screen: Console, one: Described, at: str | None) -> None:
         screen.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
-def _changed(changes: Sequence[Change]) -> list[str]:
+def _change_lines(changes: Sequence[EquationChange]) -> list[str]:
     found = []
     for change in changes:
         found.append(f"  {change.path}")
@@ -59,21 +59,21 @@ def _changed(changes: Sequence[Change]) -> list[str]:
     return found
 
 
-def effect_json(one: Described) -> dict[str, Any]:
+def effect_json(entry: EffectDescription) -> dict[str, Any]:
     """Return an effect as plain data."""
-    effect = one.effect
+    effect = entry.effect
     return {
         "id": effect.name,
         "about": effect.about,
-        "fits": place_kinds(effect),
-        "lines": list(one.lines),
+        "fits": format_place_kinds(effect),
+        "lines": list(entry.lines),
         "signature": effect.signature,
         "confused_with": list(effect.confused_with),
         "separated_by": list(effect.separated_by),
         "references": list(effect.references),
-        "places": [place_path(layer) for layer in one.layers],
+        "places": [place_path(layer) for layer in entry.placements],
         "changes": {
-            layer.place: [vars(change) for change in one.changes[layer.place]]
-            for layer in one.layers
+            layer.place: [vars(change) for change in entry.changes[layer.place]]
+            for layer in entry.placements
         },
     }

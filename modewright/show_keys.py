@@ -7,8 +7,8 @@ from html import escape
 from typing import Any
 
 from expectation.key_trace import KeyTrace, KeyTraces
-from expectation.trace import Line
-from modewright.console import counted
+from expectation.trace import CodeLine
+from modewright.console import pluralise
 
 STYLE = """body{font:13px/1.4 system-ui,sans-serif;margin:0;color:#222;height:100vh;display:flex;
 flex-direction:column}header{padding:.6rem 1rem;border-bottom:1px solid #ccc}
@@ -28,7 +28,7 @@ const f=s.querySelector(".on");if(f)s.scrollTo({top:f.offsetTop-s.clientHeight/3
 })});"""
 
 
-def keys_json(found: KeyTraces) -> dict[str, Any]:
+def key_traces_json(traces: KeyTraces) -> dict[str, Any]:
     """Return a trace of keys as plain data."""
     return {
         "keys": [
@@ -39,51 +39,58 @@ def keys_json(found: KeyTraces) -> dict[str, Any]:
                 "line": key.place.line,
                 "c": [{"file": file, "line": line} for file, line in key.code],
             }
-            for key in found.keys
+            for key in traces.keys
         ],
-        "silent": [f"{key.spec} {key.path}" for key in found.silent],
-        "strays": list(found.strays),
+        "silent": [f"{key.spec} {key.path}" for key in traces.uncited],
+        "strays": list(traces.unmatched_citations),
     }
 
 
-def keys_lines(found: KeyTraces) -> list[str]:
+def key_traces_lines(traces: KeyTraces) -> list[str]:
     """Return the lines that tell of a trace of keys."""
-    return [*(f"{key.spec} {key.path}: {_code(key)}" for key in found.keys), keys_summary(found)]
+    return [
+        *(f"{key.spec} {key.path}: {_code_places(key)}" for key in traces.keys),
+        key_traces_summary(traces),
+    ]
 
 
-def keys_summary(found: KeyTraces) -> str:
+def key_traces_summary(traces: KeyTraces) -> str:
     """Return how many keys show in C."""
-    shown = len(found.keys) - len(found.silent)
-    text = f"{counted(len(found.keys), 'key')}, {shown} of them in lines of C"
-    return text + (f"; C cites what no spec has: {', '.join(found.strays)}" if found.strays else "")
+    shown = len(traces.keys) - len(traces.uncited)
+    text = f"{pluralise(len(traces.keys), 'key')}, {shown} of them in lines of C"
+    return text + (
+        f"; C cites what no spec has: {', '.join(traces.unmatched_citations)}"
+        if traces.unmatched_citations
+        else ""
+    )
 
 
-def keys_html(
-    found: KeyTraces, specs: Mapping[str, str], code: Mapping[str, str], title: str
+def key_traces_html(
+    traces: KeyTraces, specs: Mapping[str, str], code: Mapping[str, str], title: str
 ) -> str:
     """Return a page with specs and C side by side; a click on a line shows what belongs to it.
 
     `specs` and `code` are texts by file.
     """
-    numbers = {(key.spec, key.path): f"k{n}" for n, key in enumerate(found.keys)}
-    marks: dict[Line, list[str]] = {}
-    for key in found.keys:
+    numbers = {(key.spec, key.path): f"k{n}" for n, key in enumerate(traces.keys)}
+    marks: dict[CodeLine, list[str]] = {}
+    for key in traces.keys:
         number = numbers[key.spec, key.path]
         for place in ((key.place.source.name, key.place.line), *key.code):
             marks.setdefault(place, []).append(number)
-    silent = {(key.place.source.name, key.place.line) for key in found.silent}
-    left = "".join(_file(name, text, marks, silent) for name, text in specs.items())
-    right = "".join(_file(name, text, marks, set()) for name, text in code.items())
+    silent = {(key.place.source.name, key.place.line) for key in traces.uncited}
+    left = "".join(_file_section(name, text, marks, silent) for name, text in specs.items())
+    right = "".join(_file_section(name, text, marks, set()) for name, text in code.items())
     return (
         f"<!doctype html><meta charset=utf-8><title>{escape(title)}</title><style>{STYLE}</style>\n"
-        f"<header><b>{escape(title)}</b>: {escape(keys_summary(found))}. Click a line to see what "
+        f"<header><b>{escape(title)}</b>: {escape(key_traces_summary(traces))}. Click a line to see what "
         "belongs to it; keys in brown show in no line: their values went into other numbers, or "
         f"their name says all.</header>\n<main><section>{left}</section>"
         f"<section>{right}</section></main><script>{SCRIPT}</script>\n"
     )
 
 
-def _file(
+def _file_section(
     name: str,
     text: str,
     marks: Mapping[tuple[str, int], Sequence[str]],
@@ -98,7 +105,7 @@ def _file(
     return f"<h2>{escape(name)}</h2><pre>{''.join(lines)}</pre>\n"
 
 
-def _code(key: KeyTrace) -> str:
+def _code_places(key: KeyTrace) -> str:
     by_file: dict[str, list[str]] = {}
     for file, line in key.code:
         by_file.setdefault(file, []).append(str(line))

@@ -8,10 +8,10 @@ from typing import Any
 
 from rich.table import Table
 
-from codegen.instructions import Instructions
+from codegen.instructions import InstructionCounts
 from codegen.metrics import Metrics
 
-Measured = tuple[Metrics, Instructions | None]
+AutomatonMetrics = tuple[Metrics, InstructionCounts | None]
 """What one automaton takes, and its instructions where they were counted."""
 HEADS = (
     *("automaton", "ROM", "code", "constants", "page", "RAM", "data", "stack", "instructions"),
@@ -32,15 +32,15 @@ WIDTH, HEIGHT = 900, 90
 """Of the picture of instructions over steps [px]."""
 
 
-def metrics_table(found: Sequence[Measured]) -> Table:
+def metrics_table(automata: Sequence[AutomatonMetrics]) -> Table:
     """Return a table for a person."""
     table = Table(*HEADS, box=None, pad_edge=False, header_style="bold")
-    for measured in found:
+    for measured in automata:
         table.add_row(*_row(measured))
     return table
 
 
-def metrics_json(found: Sequence[Measured]) -> dict[str, Any]:
+def metrics_json(automata: Sequence[AutomatonMetrics]) -> dict[str, Any]:
     """Return metrics as plain data."""
     return {
         "target": "cortex-m4f",
@@ -51,20 +51,20 @@ def metrics_json(found: Sequence[Measured]) -> dict[str, Any]:
                 "rom": metrics.rom,
                 "instructions": counts and list(counts.steps),
             }
-            for metrics, counts in found
+            for metrics, counts in automata
         ],
     }
 
 
-def metrics_html(found: Sequence[Measured]) -> str:
+def metrics_html(automata: Sequence[AutomatonMetrics]) -> str:
     """Return a page: the table, and the instructions of each step as a picture."""
     heads = "".join(f"<th>{escape(head)}</th>" for head in HEADS)
     rows = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(measured)) + "</tr>\n"
-        for measured in found
+        for measured in automata
     )
-    reasons = "".join(f"<p>{escape(line)}</p>\n" for line in unbounded_lines(found))
-    pictures = "".join(_picture(metrics, counts) for metrics, counts in found if counts)
+    reasons = "".join(f"<p>{escape(line)}</p>\n" for line in unbounded_lines(automata))
+    pictures = "".join(_instructions_svg(metrics, counts) for metrics, counts in automata if counts)
     return (
         f"<!doctype html><meta charset=utf-8><title>metrics</title><style>{STYLE}</style>\n"
         f"<h1>What generated C takes</h1><p>{escape(ABOUT)}</p>\n"
@@ -72,7 +72,7 @@ def metrics_html(found: Sequence[Measured]) -> str:
     )
 
 
-def _row(measured: Measured) -> tuple[str, ...]:
+def _row(measured: AutomatonMetrics) -> tuple[str, ...]:
     metrics, counts = measured
     stack = f"{metrics.stack}{' and more' if metrics.beside else ''}"
     sizes = (metrics.rom, metrics.code, metrics.constants, metrics.page)
@@ -82,13 +82,13 @@ def _row(measured: Measured) -> tuple[str, ...]:
     return metrics.name, *numbers, stack, str(counts) if counts else "not counted", most
 
 
-def unbounded_lines(found: Sequence[Measured]) -> list[str]:
+def unbounded_lines(automata: Sequence[AutomatonMetrics]) -> list[str]:
     """Return why there is no bound of a step, a line for each automaton without one."""
-    lacking = [metrics for metrics, _ in found if metrics.longest is None]
-    return [f"{one.name}: no bound of a step: {one.unbounded}" for one in lacking]
+    unbounded = [metrics for metrics, _ in automata if metrics.longest is None]
+    return [f"{one.name}: no bound of a step: {one.unbounded}" for one in unbounded]
 
 
-def _picture(metrics: Metrics, counts: Instructions) -> str:
+def _instructions_svg(metrics: Metrics, counts: InstructionCounts) -> str:
     """Return the instructions over the steps: the least and most of those in a pixel."""
     steps, most = counts.steps, max(counts.steps, default=0) or 1
     wide = max(1, -(-len(steps) // WIDTH))

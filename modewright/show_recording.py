@@ -12,12 +12,12 @@ from rich.table import Table
 
 from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation
-from diagnosis.finding import told
+from diagnosis.finding import format_findings
 from diagnosis.recording_check import RecordingCheck
-from modewright.show import finite
+from modewright.show import null_nonfinite
 
 STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
-MOST_CHANNELS = 24
+MAX_CHANNELS = 24
 """Longest table of channels shown to a person; all of them are in --json."""
 
 
@@ -29,7 +29,7 @@ def print_check(screen: Console, check: RecordingCheck) -> None:
         screen.print("\n[green]nothing odd was found in these data[/]")
     else:
         screen.print()
-    for severity, line in told(check.findings):
+    for severity, line in format_findings(check.findings):
         screen.print(f"[{STYLES[severity]}]{severity}[/]: {escape(line)}", highlight=False)
 
 
@@ -37,55 +37,55 @@ def channel_table(channels: Sequence[ChannelCheck]) -> Table:
     """Return a table of channels, their values in the units of the map."""
     heads = ("recording", "channel", "signal", "unit", "rate", "jitter", "missing", "step", "noise")
     table = Table(*heads, "from", "to", box=None, pad_edge=False, header_style="bold")
-    for one in channels[:MOST_CHANNELS]:
+    for channel in channels[:MAX_CHANNELS]:
         table.add_row(
-            escape(one.recording),
-            escape(one.name),
-            escape(one.signal if one.signal != one.name else ""),
-            one.unit,
-            f"{one.rate:.4g} Hz",
-            f"{1e3 * one.jitter:.2g} ms",
-            f"{one.dropped:.1%}",
-            f"{one.quantum / one.factor:.3g}" if one.quantum else "-",
-            f"{one.noise / one.factor:.2g}",
-            f"{one.low / one.factor:.4g}",
-            f"{one.high / one.factor:.4g}",
+            escape(channel.recording),
+            escape(channel.name),
+            escape(channel.signal if channel.signal != channel.name else ""),
+            channel.unit,
+            f"{channel.rate:.4g} Hz",
+            f"{1e3 * channel.jitter:.2g} ms",
+            f"{channel.dropped:.1%}",
+            f"{channel.quantum / channel.factor:.3g}" if channel.quantum else "-",
+            f"{channel.noise / channel.factor:.2g}",
+            f"{channel.low / channel.factor:.4g}",
+            f"{channel.high / channel.factor:.4g}",
         )
-    if len(channels) > MOST_CHANNELS:
-        table.add_row("...", f"{len(channels) - MOST_CHANNELS} more")
+    if len(channels) > MAX_CHANNELS:
+        table.add_row("...", f"{len(channels) - MAX_CHANNELS} more")
     return table
 
 
-def _print_excitation(screen: Console, excited: Excitation) -> None:
-    screen.print(f"\n{excited.duration:.4g} s in all", highlight=False)
-    for kind, signals in (("input", excited.inputs), ("speed", excited.speeds)):
+def _print_excitation(screen: Console, excitation: Excitation) -> None:
+    screen.print(f"\n{excitation.duration:.4g} s in all", highlight=False)
+    for kind, signals in (("input", excitation.inputs), ("speed", excitation.speeds)):
         for one in signals:
             steps = f"{len(one.steps)} steps, " if kind == "input" else ""
             text = f"{kind} `{one.name}`: {steps}{one.sign_changes} changes of sign, "
             text += f"above its noise up to {one.band:.3g} Hz" if one.band else "nothing but noise"
             screen.print(escape(text), highlight=False)
-    able = [effect.effect for effect in excited.effects if effect.is_testable]
-    screen.print(f"\nthese data can test {', '.join(able) or 'no effect'}", highlight=False)
-    unable: dict[str, list[str]] = {}
-    for effect in excited.effects:
+    testable = [effect.effect for effect in excitation.effects if effect.is_testable]
+    screen.print(f"\nthese data can test {', '.join(testable) or 'no effect'}", highlight=False)
+    untestable: dict[str, list[str]] = {}
+    for effect in excitation.effects:
         if effect.lacking:
-            unable.setdefault(" and ".join(effect.lacking), []).append(effect.effect)
-    for lacking, effects in unable.items():
+            untestable.setdefault(" and ".join(effect.lacking), []).append(effect.effect)
+    for lacking, effects in untestable.items():
         screen.print(f"not {', '.join(effects)}: needs {lacking}", highlight=False)
 
 
 def check_json(check: RecordingCheck) -> dict[str, Any]:
     """Return a check as JSON, values in SI."""
-    excited = check.excitation
+    excitation = check.excitation
     return {
         "usable": check.is_usable,
-        "channels": [finite(asdict(one)) for one in check.channels],
+        "channels": [null_nonfinite(asdict(one)) for one in check.channels],
         "findings": [asdict(one) for one in check.findings],
-        "duration": excited.duration,
-        "inputs": [finite(asdict(one)) for one in excited.inputs],
-        "speeds": [finite(asdict(one)) for one in excited.speeds],
+        "duration": excitation.duration,
+        "inputs": [null_nonfinite(asdict(one)) for one in excitation.inputs],
+        "speeds": [null_nonfinite(asdict(one)) for one in excitation.speeds],
         "effects": {
-            e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excited.effects
+            e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excitation.effects
         },
-        "relations": [finite(asdict(one)) for one in check.relations],
+        "relations": [null_nonfinite(asdict(one)) for one in check.agreements],
     }

@@ -10,54 +10,54 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from language.text import visible
-from modewright.show import finite
-from modewright.show_study import interval_text, progress_text, short
-from sweep.sensitivity import FEWEST, Index, Sensitivity
+from language.text import escape_invisible
+from modewright.show import null_nonfinite
+from modewright.show_study import format_number, interval_text, progress_text
+from sweep.sensitivity import MIN_COMPLETE, Index, Sensitivity
 
-WHOLE = {"saltelli": "blocks", "morris": "paths"}
+DESIGN_UNITS = {"saltelli": "blocks", "morris": "paths"}
 
 
-def print_sensitivity(console: Console, found: Sensitivity) -> None:
+def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
     """Print the indices by group and measure, the largest first."""
-    text = f"{found.study}: {found.method}; {progress_text(found.counts, found.expected)}"
-    console.print(visible(text), highlight=False, markup=False)
-    if sum(found.counts.values()) < found.expected:
+    text = f"{sensitivity.study}: {sensitivity.method}; {progress_text(sensitivity.counts, sensitivity.expected)}"
+    console.print(escape_invisible(text), highlight=False, markup=False)
+    if sum(sensitivity.counts.values()) < sensitivity.expected:
         text = "unfinished: the same `modewright sweep STUDY --out DIR` goes on"
         console.print(text, highlight=False, markup=False)
-    if not found.indices:
+    if not sensitivity.indices:
         return
-    first = found.indices[0]
-    sure = f"{found.confidence * 100:g} %"
+    first = sensitivity.indices[0]
+    sure = f"{sensitivity.confidence * 100:g} %"
     values = [head for name in first.values for head in (name, sure)]
     table = Table(
-        *first.group, "measure", "of", *values, WHOLE[found.method], box=None, pad_edge=False,
+        *first.group, "measure", "of", *values, DESIGN_UNITS[sensitivity.method], box=None, pad_edge=False,
         header_style="bold",
     )  # fmt: skip
-    for one in ordered_indices(found):
-        groups = (escape(visible(name)) for name in one.group.values())
+    for one in sort_indices(sensitivity):
+        groups = (escape(escape_invisible(name)) for name in one.group.values())
         table.add_row(*groups, one.measure, escape(one.name), *_cells(one))
     console.print(table)
-    for text in untold_texts(found):
+    for text in incomplete_index_notes(sensitivity):
         console.print(text, highlight=False, markup=False)
 
 
-def untold_texts(found: Sensitivity) -> list[str]:
+def incomplete_index_notes(sensitivity: Sensitivity) -> list[str]:
     """Return a note where some indices are not told, for want of complete blocks or paths."""
-    few = sum(one.used < FEWEST for one in found.indices)
-    whole = WHOLE[found.method]
-    hint = f"fewer than {FEWEST} {whole} are complete (every point done and with the measure)"
-    return [f"{few} of {len(found.indices)} indices are not told (-): {hint}"] if few else []
+    few = sum(one.used < MIN_COMPLETE for one in sensitivity.indices)
+    whole = DESIGN_UNITS[sensitivity.method]
+    hint = f"fewer than {MIN_COMPLETE} {whole} are complete (every point done and with the measure)"
+    return [f"{few} of {len(sensitivity.indices)} indices are not told (-): {hint}"] if few else []
 
 
-def ordered_indices(found: Sensitivity) -> list[Index]:
+def sort_indices(sensitivity: Sensitivity) -> list[Index]:
     """Return the indices with the largest of each measure first."""
-    key = "total" if found.method == "saltelli" else "mu_star"
+    key = "total" if sensitivity.method == "saltelli" else "mu_star"
     places: dict[object, int] = {}
-    for one in found.indices:
+    for one in sensitivity.indices:
         places.setdefault((*one.group.values(), one.measure), len(places))
     return sorted(
-        found.indices,
+        sensitivity.indices,
         key=lambda one: (
             places[(*one.group.values(), one.measure)],
             math.inf if math.isnan(one.values[key]) else -one.values[key],
@@ -65,32 +65,32 @@ def ordered_indices(found: Sensitivity) -> list[Index]:
     )
 
 
-def sensitivity_json(found: Sensitivity) -> dict[str, Any]:
+def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
     """Return the indices as plain data; what is not there is null."""
     return {
-        "study": found.study,
-        "digest": found.digest,
-        "expected": found.expected,
-        "counts": dict(found.counts),
-        "method": found.method,
-        "fewest": FEWEST,
-        "confidence": found.confidence,
+        "study": sensitivity.study,
+        "digest": sensitivity.digest,
+        "expected": sensitivity.expected,
+        "counts": dict(sensitivity.counts),
+        "method": sensitivity.method,
+        "fewest": MIN_COMPLETE,
+        "confidence": sensitivity.confidence,
         "indices": [
-            {**asdict(one), "values": finite(one.values), "intervals": _plain(one)}
-            for one in found.indices
+            {**asdict(one), "values": null_nonfinite(one.values), "intervals": _intervals_json(one)}
+            for one in sensitivity.indices
         ],
     }
 
 
-def _plain(one: Index) -> dict[str, Any]:
+def _intervals_json(index: Index) -> dict[str, Any]:
     return {
-        name: list(finite({"from": pair[0], "to": pair[1]}).values()) if pair else None
-        for name, pair in one.intervals.items()
+        name: list(null_nonfinite({"from": pair[0], "to": pair[1]}).values()) if pair else None
+        for name, pair in index.intervals.items()
     }
 
 
-def _cells(one: Index) -> list[str]:
+def _cells(index: Index) -> list[str]:
     found = []
-    for name, value in one.values.items():
-        found += [short(value), interval_text(one.intervals[name])]
-    return [*found, f"{one.used} of {one.count}"]
+    for name, value in index.values.items():
+        found += [format_number(value), interval_text(index.intervals[name])]
+    return [*found, f"{index.used} of {index.count}"]

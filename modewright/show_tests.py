@@ -8,26 +8,26 @@ from xml.etree import ElementTree
 
 from expectation.expected import Expectation
 from expectation.judging import Outcome
-from language.text import visible
+from language.text import escape_invisible
 from language.units import Dimension
-from modewright.console import counted
+from modewright.console import pluralise
 from modewright.tests import TestRun
 
-XML = "<?xml version='1.0' encoding='utf-8'?>"
-TEST_SECONDS = 3
+XML_DECLARATION = "<?xml version='1.0' encoding='utf-8'?>"
+SECONDS_DECIMALS = 3
 """Decimals of the seconds that a test took."""
 
 
-def lines_of(run: TestRun) -> Iterator[str]:
+def spec_test_lines(run: TestRun) -> Iterator[str]:
     """Yield the lines that tell of a test: one if it passed, else one for all that failed."""
     word = "passed" if run.passed else "FAILED"
     also = f" and C, {run.means.partition(':')[0]}" if run.means else ""
-    count = counted(len(run.outcomes), "expectation")
+    count = pluralise(len(run.outcomes), "expectation")
     yield f"{word}  {run.test.name}: {count}, engine{also} ({run.seconds:.2f} s)"
     for expectation, outcome in zip(run.test.expectations, run.outcomes, strict=True):
         if not outcome.passed:
-            yield f"  {expectation.span}: {outcome.name}: {failure(expectation, outcome)}"
-            yield from (f"      {line}" for line in _found(run, outcome))
+            yield f"  {expectation.span}: {outcome.name}: {failure_text(expectation, outcome)}"
+            yield from (f"      {line}" for line in _failure_details(run, outcome))
     for label in (run.difference, run.stopped and f"the run stopped: {run.stopped}"):
         if label:
             yield f"  {run.test.span}: {label}"
@@ -35,19 +35,19 @@ def lines_of(run: TestRun) -> Iterator[str]:
         yield f"  warning: a fault bit is set: {fault}"
 
 
-def failure(expectation: Expectation, outcome: Outcome) -> str:
+def failure_text(expectation: Expectation, outcome: Outcome) -> str:
     """Return what went wrong in one line."""
-    subject = f"`{visible(expectation.text)}` " if expectation.text else ""
+    subject = f"`{escape_invisible(expectation.text)}` " if expectation.text else ""
     return f"{subject}{outcome.message}"
 
 
-def summary(runs: Sequence[TestRun]) -> str:
+def spec_tests_summary(runs: Sequence[TestRun]) -> str:
     """Return how many tests there were, and how many failed."""
     failed = sum(not run.passed for run in runs)
-    return f"{counted(len(runs), 'test')}, {failed} failed"
+    return f"{pluralise(len(runs), 'test')}, {failed} failed"
 
 
-def test_json(run: TestRun) -> dict[str, Any]:
+def spec_test_json(run: TestRun) -> dict[str, Any]:
     """Return what became of a test as plain data; times in s, values in SI."""
     return {
         "name": run.test.name,
@@ -55,7 +55,7 @@ def test_json(run: TestRun) -> dict[str, Any]:
         "line": run.test.span.line,
         "requirements": list(run.test.requirements),
         "passed": run.passed,
-        "seconds": round(run.seconds, TEST_SECONDS),
+        "seconds": round(run.seconds, SECONDS_DECIMALS),
         "beside": run.means,
         "difference": run.difference,
         "stopped": run.stopped,
@@ -66,25 +66,27 @@ def test_json(run: TestRun) -> dict[str, Any]:
     }
 
 
-def junit(runs: Sequence[TestRun]) -> bytes:
+def junit_xml(runs: Sequence[TestRun]) -> bytes:
     """Return the tests as JUnit XML: a suite for each, a case for each expectation."""
     root = ElementTree.Element("testsuites", _counts(runs))
     for run in runs:
         suite = ElementTree.SubElement(root, "testsuite", {"name": run.test.name, **_counts([run])})
         file, share = run.test.span.source.name, run.seconds / max(1, len(run.outcomes))
         for expectation, outcome in zip(run.test.expectations, run.outcomes, strict=True):
-            case = _case(suite, run, outcome.name, share, (file, expectation.span.line))
+            case = _add_case(suite, run, outcome.name, share, (file, expectation.span.line))
             if not outcome.passed:
-                _fail(case, failure(expectation, outcome), _found(run, outcome))
+                _add_failure(
+                    case, failure_text(expectation, outcome), _failure_details(run, outcome)
+                )
         for name, text in (("lock_step", run.difference), ("run", run.stopped)):
             if text:
-                _fail(_case(suite, run, name, 0.0, (file, run.test.span.line)), text, [])
+                _add_failure(_add_case(suite, run, name, 0.0, (file, run.test.span.line)), text, [])
     ElementTree.indent(root)
     text = ElementTree.tostring(root, "unicode")
-    return f"{XML}\n{text}\n".encode()
+    return f"{XML_DECLARATION}\n{text}\n".encode()
 
 
-def _found(run: TestRun, outcome: Outcome) -> list[str]:
+def _failure_details(run: TestRun, outcome: Outcome) -> list[str]:
     """Return the modes and values at the place of a failure."""
     units = {name: unit for name, unit in _units(run).items()}
     lines = []
@@ -131,21 +133,21 @@ def _counts(runs: Sequence[TestRun]) -> dict[str, str]:
     return {
         "tests": str(cases + extra),
         "failures": str(failed + extra),
-        "time": f"{seconds:.{TEST_SECONDS}f}",
+        "time": f"{seconds:.{SECONDS_DECIMALS}f}",
     }
 
 
-def _case(
+def _add_case(
     suite: ElementTree.Element, run: TestRun, name: str, seconds: float, place: tuple[str, int]
 ) -> ElementTree.Element:
     file, line = place
     return ElementTree.SubElement(
         suite, "testcase",
         {"classname": run.test.name, "name": name, "file": file, "line": str(line),
-         "time": f"{seconds:.{TEST_SECONDS}f}"},
+         "time": f"{seconds:.{SECONDS_DECIMALS}f}"},
     )  # fmt: skip
 
 
-def _fail(case: ElementTree.Element, message: str, lines: Sequence[str]) -> None:
-    failed = ElementTree.SubElement(case, "failure", {"message": visible(message)})
-    failed.text = "\n".join(map(visible, lines)) or None
+def _add_failure(case: ElementTree.Element, message: str, lines: Sequence[str]) -> None:
+    failed = ElementTree.SubElement(case, "failure", {"message": escape_invisible(message)})
+    failed.text = "\n".join(map(escape_invisible, lines)) or None

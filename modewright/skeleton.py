@@ -10,9 +10,9 @@ from pathlib import Path
 
 from modewright.files import OutputError
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
-TAKEN = frozenset({"room", "thermostat", "cold_day", "stays_warm", "ev_driveline"})
-PLACES = {
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
+RESERVED_NAMES = frozenset({"room", "thermostat", "cold_day", "stays_warm", "ev_driveline"})
+TEMPLATE_TARGETS = {
     "room.yaml": "spec/room.yaml",
     "thermostat.yaml": "spec/thermostat.yaml",
     "system.yaml": "spec/system.yaml",
@@ -28,29 +28,29 @@ def skeleton_files(name: str) -> dict[str, str]:
     folder = resources.files("modewright") / "skeleton_files"
     return {
         place: (folder / source).read_text("utf-8").replace("PROJECT", name)
-        for source, place in PLACES.items()
+        for source, place in TEMPLATE_TARGETS.items()
     }
 
 
 def write_skeleton(name: str, folder: Path) -> list[Path]:
     """Write a new project into a folder that is not there yet. Raises OutputError, ValueError."""
-    if not NAME.fullmatch(name) or name in TAKEN:
+    if not NAME_PATTERN.fullmatch(name) or name in RESERVED_NAMES:
         raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")
     if folder.exists():
         raise OutputError(f"{folder}: it is there already")
-    beside = None
+    temporary_folder = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        temporary_folder = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
         for place, text in skeleton_files(name).items():
-            path = beside / place
+            path = temporary_folder / place
             path.parent.mkdir(exist_ok=True)
             path.write_text(text, "utf-8")
-        beside.chmod(0o755)
-        beside.rename(folder)
+        temporary_folder.chmod(0o755)
+        temporary_folder.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: {error.strerror}") from None
     finally:
-        if beside is not None:
-            shutil.rmtree(beside, ignore_errors=True)
-    return [folder / place for place in PLACES.values()]
+        if temporary_folder is not None:
+            shutil.rmtree(temporary_folder, ignore_errors=True)
+    return [folder / place for place in TEMPLATE_TARGETS.values()]

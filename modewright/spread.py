@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-SEVERAL = ("--train", "--held-out")
+MULTI_VALUE_OPTIONS = ("--train", "--held-out")
 """Options that take values until the next option; each is repeatable as well."""
 
 
-def spread(words: Sequence[str]) -> list[str]:
+def expand_arguments(arguments: Sequence[str]) -> list[str]:
     """Return the words of a command line with such an option written before each of its values.
 
     Only where the command has its argument in front: else it could be among the values.
     """
-    if len(words) < 2 or words[1].startswith("-"):
-        return list(words)
-    found: list[str] = []
+    if len(arguments) < 2 or arguments[1].startswith("-"):
+        return list(arguments)
+    result: list[str] = []
     option = ""
-    for word in words:
-        if word.startswith("-"):
-            option = word if word in SEVERAL else ""
-        elif option and found[-1] != option:
-            found.append(option)
-        found.append(word)
-    return found
+    for argument in arguments:
+        if argument.startswith("-"):
+            option = argument if argument in MULTI_VALUE_OPTIONS else ""
+        elif option and result[-1] != option:
+            result.append(option)
+        result.append(argument)
+    return result

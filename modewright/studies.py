@@ -10,20 +10,20 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from language.document import Scalar
+from language.document import ScalarNode
 from language.load import command_line_value
-from language.missing import ToolMissing
-from language.problem import Problems, ordered, render
+from language.missing import MissingToolError
+from language.problem import Problems, render_problem, sort_problems
 from language.project import Project, read_document
 from modewright.compiled import run_block
 from modewright.files import OutputError
 from sweep import fork_server
-from sweep.address import Address, Credentials, address_of
-from sweep.executor import Executor, InProcess
-from sweep.override import require_left_alone
-from sweep.preparation import prepared, resampled
-from sweep.processes import Processes
-from sweep.sampling_reader import balance_fault
+from sweep.address import Address, Credentials, parse_address
+from sweep.executor import Executor, SerialExecutor
+from sweep.override import require_overridable
+from sweep.preparation import prepare_study, resample_study
+from sweep.processes import ProcessExecutor
+from sweep.sampling_reader import find_imbalance
 from sweep.store import read_store
 from sweep.study import Study
 from sweep.study_reader import read_study
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from engine.plot import Picture
     from sweep.sensitivity import Sensitivity
 
-WORKER = (sys.executable, "-P", "-m", "modewright.worker")
+WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.worker")
 """What starts a process that computes blocks."""
-TEMPLATE = "modewright.cluster_template"
+TEMPLATE_MODULE = "modewright.cluster_template"
 """What the workers of a cluster of this machine are copies of."""
 
 
@@ -64,70 +64,72 @@ def sweep(
     study is warned of, and which blocks were damaged; without it Python warns.
     Raises SpecError, ValueError, ClusterError, ToolMissing, OutputError (what is done is kept).
     """
-    place = address_of(cluster) if cluster else None
+    place = parse_address(cluster) if cluster else None
     if place and place.count:
-        fork_server.start(TEMPLATE)
+        fork_server.start_fork_server(TEMPLATE_MODULE)
     if block is not None and block < 1:
         raise ValueError(f"blocks of {block} variants are none")
     tell = warn or warnings.warn
-    found = _read(study, values or {}, Project(root or Path()), tell)
-    ready = prepared(_resampled(found, samples, seed, tell))
+    found = _read_study(study, values or {}, Project(root or Path()), tell)
+    ready = prepare_study(_override_sampling(found, samples, seed, tell))
     try:
         if place is None:
-            return run_study(ready, Path(out), executor or _local(workers), block, progress, tell)
-        with _on_cluster(place, credentials or Credentials()) as remote:
+            return run_study(
+                ready, Path(out), executor or _local_executor(workers), block, progress, tell
+            )
+        with _cluster_executor(place, credentials or Credentials()) as remote:
             return run_study(ready, Path(out), remote, block, progress, tell)
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
         raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
 
 
-def _local(workers: int | None) -> Executor:
+def _local_executor(workers: int | None) -> Executor:
     """Return processes of this machine, one for each core; of one this process is enough."""
     count = workers or os.cpu_count() or 1
-    return Processes(count, WORKER) if count > 1 else InProcess(run_block)
+    return ProcessExecutor(count, WORKER_COMMAND) if count > 1 else SerialExecutor(run_block)
 
 
-def _read(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
+def _read_study(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
     """Return a study with values of the command line; tell its warnings.
 
     Raises SpecError, and ValueError for a value of what the study gives one itself.
     """
     document = read_document(project.path_of(study))
-    scalars: dict[str, Scalar] = {
+    scalars: dict[str, ScalarNode] = {
         name: command_line_value(text, name=name) for name, text in values.items()
     }
     problems = Problems()
-    found = read_study(document, project, scalars, problems)
-    require_left_alone(found, scalars)
-    for problem in ordered(dict.fromkeys(problems.found)):
-        warn(render(problem))
-    return found
+    result = read_study(document, project, scalars, problems)
+    require_overridable(result, scalars)
+    for problem in sort_problems(dict.fromkeys(problems.reported)):
+        warn(render_problem(problem))
+    return result
 
 
-def _resampled(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
+def _override_sampling(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
     """Return a study with points of the command line; warn of a number that suits it badly."""
-    found = resampled(study, samples, seed)
-    fault = balance_fault(found.sampling.method, samples) if samples is not None else None
+    result = resample_study(study, samples, seed)
+    fault = find_imbalance(result.sampling.method, samples) if samples is not None else None
     if fault:
         warn(f"{fault[0]}; {fault[1]}")
-    return found
+    return result
 
 
 @contextmanager
-def _on_cluster(place: Address, credentials: Credentials) -> Iterator[Executor]:
+def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Executor]:
     """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
     try:
-        from sweep.cluster import Cluster
-        from sweep.clustering import Staff, connected
+        from sweep.cluster import DaskExecutor
+        from sweep.clustering import WorkerSetup, open_client
     except ImportError:
         advice = "pip install 'modewright[cluster]'"
-        raise ToolMissing(f"a cluster needs the package `distributed`: {advice}") from None
+        raise MissingToolError(f"a cluster needs the package `distributed`: {advice}") from None
     from modewright import cluster_worker
 
-    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
-    with connected(place, credentials, staff) as client:
-        yield Cluster(client, cluster_worker.compute)
+    staff = WorkerSetup(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with open_client(place, credentials, staff) as client:
+        yield DaskExecutor(client, cluster_worker.compute_block)
 
 
 def study_summary(out: str | Path) -> Summary:
@@ -137,9 +139,9 @@ def study_summary(out: str | Path) -> Summary:
 
 def study_pictures(out: str | Path) -> dict[str, Picture]:
     """Return the pictures that the study asks for, by name. Raises SpecError."""
-    from sweep.picture import pictures
+    from sweep.picture import draw_pictures
 
-    return pictures(read_store(Path(out)))
+    return draw_pictures(read_store(Path(out)))
 
 
 def sensitivity(out: str | Path) -> Sensitivity:
@@ -151,6 +153,6 @@ def sensitivity(out: str | Path) -> Sensitivity:
 
 def study_report(out: str | Path) -> bytes:
     """Return the results in a folder as one HTML page that needs nothing else. Raises SpecError."""
-    from modewright.study_page import report_page
+    from modewright.study_page import render_study_page
 
-    return report_page(read_store(Path(out)))
+    return render_study_page(read_store(Path(out)))

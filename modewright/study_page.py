@@ -12,31 +12,31 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from language.units import shown_unit
-from modewright.show_sensitivity import WHOLE, ordered_indices, untold_texts
-from modewright.show_study import failure_texts, interval_text, short
+from language.units import display_unit
+from modewright.show_sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
+from modewright.show_study import failure_texts, format_number, interval_text
 from sweep.block import DONE
 from sweep.manifest import Design, Manifest
-from sweep.measure import Column
-from sweep.picture import pictures
-from sweep.rows_file import arrow_module
+from sweep.measure import StoreColumn
+from sweep.picture import draw_pictures
+from sweep.rows_file import import_arrow
 from sweep.sensitivity import sensitivity_of
 from sweep.store import Store
-from sweep.summary import Summary, shown, summary_of
-from sweep.table import Table
+from sweep.summary import Summary, format_value, summary_of
+from sweep.table import StudyTable
 
-MOST_EXTREME, MOST_FAILED, MOST_INDICES = 5, 100, 300
+MAX_EXTREMES, MAX_FAILED, MAX_INDICES = 5, 100, 300
 """Rows of each table that grows with the study."""
-PLAIN = Column("", "real", "1")
+UNITLESS_COLUMN = StoreColumn("", "real", "1")
 """A number whose unit stands elsewhere."""
-HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
-METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
-OWN_NAME = re.compile(r"(\bid=\"|\"#|url\(#)")
+SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
+SVG_METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
+SVG_IDENTIFIER = re.compile(r"(\bid=\"|\"#|url\(#)")
 
 
-def report_page(store: Store) -> bytes:
+def render_study_page(store: Store) -> bytes:
     """Return the page of what a store holds so far. Raises SpecError, ToolMissing."""
-    table = Table(store)
+    table = StudyTable(store)
     summary, manifest = summary_of(store), store.manifest
     context = {
         "name": manifest.study,
@@ -44,52 +44,54 @@ def report_page(store: Store) -> bytes:
         "expected": manifest.count,
         "counts": list(summary.counts.items()),
         "varied": [column.name for column in manifest.varied],
-        "told": _told(manifest),
-        **_measures(summary),
-        **_sensitivity(store),
+        "told": _description_rows(manifest),
+        **_measures_context(summary),
+        **_sensitivity_context(store),
         "figures": [
-            (name, _embedded(name, picture.data("svg")))
-            for name, picture in pictures(store).items()
+            (name, _embed_svg(name, picture.data("svg")))
+            for name, picture in draw_pictures(store).items()
         ],
-        "extremes": _extremes(table),
+        "extremes": _extreme_variants(table),
         "reasons": failure_texts(summary),
-        **_failed(table),
+        **_failed_context(table),
         "version": metadata.version("modewright"),
         "digest": manifest.digest,
         "identity": sorted(manifest.identity.items()),
     }
-    return _page(context).encode()
+    return _render_template(context).encode()
 
 
-def _told(manifest: Manifest) -> list[tuple[str, list[tuple[str, str]]]]:
+def _description_rows(manifest: Manifest) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return what the study is, as its file says: sections, each with texts by name."""
     found = []
-    for key, said in manifest.description.items():
-        rows = [("", said)] if isinstance(said, str) else list(said.items())
+    for key, entry in manifest.description.items():
+        rows = [("", entry)] if isinstance(entry, str) else list(entry.items())
         found.append((key, rows))
-    drawn = manifest.design
-    if drawn.count:
-        found.append(("sampling", [(drawn.method, _drawn_text(drawn)), ("seed", str(drawn.seed))]))
-    if drawn.replicates > 1:
-        found.append(("replicates", [("", str(drawn.replicates))]))
+    design = manifest.design
+    if design.count:
+        found.append(
+            ("sampling", [(design.method, _design_text(design)), ("seed", str(design.seed))])
+        )
+    if design.replicates > 1:
+        found.append(("replicates", [("", str(design.replicates))]))
     return found
 
 
-def _drawn_text(drawn: Design) -> str:
-    if not drawn.has_indices:
-        return f"{drawn.count} points"
-    return f"{drawn.planned} {WHOLE[drawn.method]} of {drawn.each} points"
+def _design_text(design: Design) -> str:
+    if not design.has_indices:
+        return f"{design.count} points"
+    return f"{design.group_count} {DESIGN_UNITS[design.method]} of {design.group_size} points"
 
 
-def _measures(summary: Summary) -> dict[str, Any]:
+def _measures_context(summary: Summary) -> dict[str, Any]:
     lines = [
         {
             "group": list(line.group.values()), "measure": line.measure,
-            "unit": shown_unit(line.unit),
+            "unit": display_unit(line.unit),
             "cells": [
-                line.count, line.draws, short(line.median), interval_text(line.median_interval),
-                short(line.mean), interval_text(line.mean_interval),
-                *map(short, (line.deviation, line.p95, line.low, line.high)),
+                line.count, line.draws, format_number(line.median), interval_text(line.median_interval),
+                format_number(line.mean), interval_text(line.mean_interval),
+                *map(format_number, (line.deviation, line.p95, line.low, line.high)),
             ],
         }
         for line in summary.lines
@@ -98,7 +100,7 @@ def _measures(summary: Summary) -> dict[str, Any]:
         {
             "group": list(rate.group.values()), "measure": rate.measure,
             "cells": [
-                rate.hits, rate.count, rate.draws, short(rate.share),
+                rate.hits, rate.count, rate.draws, format_number(rate.share),
                 interval_text(rate.interval),
             ],
         }
@@ -110,35 +112,41 @@ def _measures(summary: Summary) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _sensitivity(store: Store) -> dict[str, Any]:
+def _sensitivity_context(store: Store) -> dict[str, Any]:
     sensitivity = sensitivity_of(store) if store.manifest.design.has_indices else None
     if sensitivity is None or not sensitivity.indices:
         return {"indices": [], "index_heads": [], "index_notes": []}
-    found = ordered_indices(sensitivity)
+    found = sort_indices(sensitivity)
     heads = [*found[0].group, "measure", "of"]
     heads += [text for name in found[0].values for text in (name, "interval")]
     rows = []
-    for one in found[:MOST_INDICES]:
+    for one in found[:MAX_INDICES]:
         ends = (interval_text(one.intervals[name]) for name in one.values)
-        cells = zip(map(short, one.values.values()), ends, strict=True)
+        cells = zip(map(format_number, one.values.values()), ends, strict=True)
         used = f"{one.used} of {one.count}"
         rows.append([*one.group.values(), one.measure, one.name, *itertools.chain(*cells), used])
-    heads.append(WHOLE[sensitivity.method])
-    return {"indices": rows, "index_heads": heads, "index_notes": untold_texts(sensitivity)}
+    heads.append(DESIGN_UNITS[sensitivity.method])
+    return {
+        "indices": rows,
+        "index_heads": heads,
+        "index_notes": incomplete_index_notes(sensitivity),
+    }
 
 
-def _extremes(table: Table) -> list[tuple[str, str, list[tuple[str, list[list[str]]]]]]:
+def _extreme_variants(
+    table: StudyTable,
+) -> list[tuple[str, str, list[tuple[str, list[list[str]]]]]]:
     """Return for each measure that is a number the variants with its highest and lowest values."""
     found = []
     for column in table.store.manifest.measures:
         if column.type not in ("real", "whole"):
             continue
-        values = np.where(table.is_done, table.reals(column.name), np.nan)
+        values = np.where(table.is_done, table.read_reals(column.name), np.nan)
         rising = np.argsort(values, kind="stable")[: int(np.sum(~np.isnan(values)))].tolist()
-        highest = rising[::-1][:MOST_EXTREME]
-        lowest = rising[: max(0, min(MOST_EXTREME, len(rising) - len(highest)))]
+        highest = rising[::-1][:MAX_EXTREMES]
+        lowest = rising[: max(0, min(MAX_EXTREMES, len(rising) - len(highest)))]
         ends = [
-            (name, _rows(table, kept, (column.name,)))
+            (name, _variant_rows(table, kept, (column.name,)))
             for name, kept in (("highest", highest), ("lowest", lowest))
             if kept
         ]
@@ -147,22 +155,22 @@ def _extremes(table: Table) -> list[tuple[str, str, list[tuple[str, list[list[st
     return found
 
 
-def _failed(table: Table) -> dict[str, Any]:
-    places, names = table.words("status")
+def _failed_context(table: StudyTable) -> dict[str, Any]:
+    places, names = table.read_categories("status")
     done = names.index(DONE) if DONE in names else -1
     failed = np.flatnonzero(places != done).tolist()
-    rows = _rows(table, failed[:MOST_FAILED], ("status", "message"))
-    return {"failed": rows, "more": max(0, len(failed) - MOST_FAILED)}
+    rows = _variant_rows(table, failed[:MAX_FAILED], ("status", "message"))
+    return {"failed": rows, "more": max(0, len(failed) - MAX_FAILED)}
 
 
-def _rows(table: Table, places: Sequence[int], last: Sequence[str]) -> list[list[str]]:
+def _variant_rows(table: StudyTable, places: Sequence[int], last: Sequence[str]) -> list[list[str]]:
     """Return the cells of some variants: number, variant, scenario, what varies, and others."""
     if not places:
         return []
     manifest = table.store.manifest
     columns = {column.name: column for column in manifest.varied}
     names = ["number", "variant", "scenario", *columns, *last]
-    parquet, first = arrow_module().parquet, 0
+    parquet, first = import_arrow().parquet, 0
     found: dict[int, dict[str, Any]] = {}
     for path in table.store.paths():
         count = parquet.read_metadata(path).num_rows
@@ -174,22 +182,24 @@ def _rows(table: Table, places: Sequence[int], last: Sequence[str]) -> list[list
     return [[_cell(found[place][name], columns.get(name)) for name in names] for place in places]
 
 
-def _cell(value: Any, column: Column | None) -> str:
+def _cell(value: Any, column: StoreColumn | None) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
-        return shown(value, column or PLAIN)
+        return format_value(value, column or UNITLESS_COLUMN)
     return str(value)
 
 
-def _embedded(name: str, data: bytes) -> str:
+def _embed_svg(name: str, data: bytes) -> str:
     """Return an SVG as a part of a page: its names are like no other's."""
     title = html.escape(name)
-    text = OWN_NAME.sub(lambda found: f"{found[1]}{title}-", METADATA.sub("", data.decode()))
-    return HEAD.sub(lambda _: f'<svg role="img" aria-label="{title}" ', text, count=1)
+    text = SVG_IDENTIFIER.sub(
+        lambda found: f"{found[1]}{title}-", SVG_METADATA.sub("", data.decode())
+    )
+    return SVG_HEAD.sub(lambda _: f'<svg role="img" aria-label="{title}" ', text, count=1)
 
 
-def _page(context: Mapping[str, Any]) -> str:
+def _render_template(context: Mapping[str, Any]) -> str:
     own = resources.files("modewright").joinpath("templates")
     shared = resources.files("diagnosis").joinpath("templates")
 

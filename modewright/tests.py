@@ -12,9 +12,9 @@ import numpy as np
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
 from expectation.expected import Test
-from expectation.judging import Outcome, judged
+from expectation.judging import Outcome, evaluate_test
 from expectation.reader import read_test
-from language.finding import HEAD
+from language.finding import HEAD_PATTERN
 from language.problem import Problems, Source, Span, SpecError
 from language.project import Project
 from modewright.checking import spec_files
@@ -42,11 +42,11 @@ class TestRun:
     @property
     def passed(self) -> bool:
         """Tell whether everything that was expected was so, in both runs."""
-        kept = all(outcome.passed for outcome in self.outcomes)
-        return kept and not self.difference and self.stopped is None
+        all_passed = all(outcome.passed for outcome in self.outcomes)
+        return all_passed and not self.difference and self.stopped is None
 
 
-def tests_of(root: Path | None = None) -> list[str]:
+def find_tests(root: Path | None = None) -> list[str]:
     """Return the files of all tests of a project, in the order of their paths."""
     return [str(path) for path in spec_files(root or Path()) if _is_test(path)]
 
@@ -59,12 +59,12 @@ def load_test(reference: str, root: Path | None = None) -> Test:
 
 def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:
     """Return tests. Raises SpecError with the problems of all of them."""
-    problems, found = Problems(), []
+    problems, tests = Problems(), []
     for reference in references:
-        with problems.collecting():
-            found.append(load_test(reference, root))
-    problems.stop_if_any()
-    return found
+        with problems.collect_errors():
+            tests.append(load_test(reference, root))
+    problems.raise_if_errors()
+    return tests
 
 
 def run_tests(
@@ -74,12 +74,12 @@ def run_tests(
 
     Raises SpecError before anything is run; ToolMissing where there is no compiler.
     """
-    named = list(references) or tests_of(root)
+    named = list(references) or find_tests(root)
     if not named:
         place = Span(Source("spec"), 1, 1)
         problems = Problems()
         problems.error("missing", place, "there is no test below spec/", "see docs/testing.md")
-        raise SpecError(problems.found)
+        raise SpecError(problems.reported)
     for test in load_tests(named, root):
         yield run_test(test, compiled=compiled)
 
@@ -88,18 +88,20 @@ def run_test(test: Test, *, compiled: bool = True) -> TestRun:
     """Return what became of a test on the engine and, if `compiled`, in C. Raises ToolMissing."""
     start = time.perf_counter()
     trajectory = simulate(test.system, test.scenario)
-    outcomes = judged(test, trajectory)
+    outcomes = evaluate_test(test, trajectory)
     means, difference = "", ""
     if compiled:
         other, means = run_in_c(test.system, test.scenario)
-        difference = _difference(outcomes, judged(test, other)) or _other_run(trajectory, other)
+        difference = _outcome_difference(
+            outcomes, evaluate_test(test, other)
+        ) or _trajectory_difference(trajectory, other)
     seconds = time.perf_counter() - start
     return TestRun(
         test, outcomes, means, difference, trajectory.stopped, trajectory.faults, seconds
     )
 
 
-def _difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> str:
+def _outcome_difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> str:
     """Return the first expectation that C did not decide as the engine did."""
     for mine, other in zip(ours, theirs, strict=True):
         if mine.passed != other.passed:
@@ -108,7 +110,7 @@ def _difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> str:
     return ""
 
 
-def _other_run(ours: Trajectory, theirs: Trajectory) -> str:
+def _trajectory_difference(ours: Trajectory, theirs: Trajectory) -> str:
     """Return in what the run in C was another: the first event, signal or end."""
     if ours.stopped != theirs.stopped:
         return f"C ended with {theirs.stopped or 'no stop'}, the engine with {ours.stopped}"
@@ -128,4 +130,4 @@ def _other_run(ours: Trajectory, theirs: Trajectory) -> str:
 
 def _is_test(path: Path) -> bool:
     text = path.read_text("utf-8", errors="replace")[:65536]
-    return any(match.group(1) == "test" for match in HEAD.finditer(text))
+    return any(match.group(1) == "test" for match in HEAD_PATTERN.finditer(text))

@@ -7,7 +7,7 @@ from contextlib import ContextDecorator
 from threadpoolctl import threadpool_limits
 
 
-class OneThread(ContextDecorator):
+class SingleThreadedBlas(ContextDecorator):
     """While it is entered, or a function that it decorates runs, BLAS takes one thread.
 
     More would wait for each other most of the time: a diagnosis takes half of the processor time

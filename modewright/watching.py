@@ -6,33 +6,33 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
-PAUSE = 0.2
+POLL_INTERVAL = 0.2
 """Seconds between two looks: an edit is seen at once, and looking costs nothing."""
-Stamps = dict[Path, tuple[int, int]]
+FileStamps = dict[Path, tuple[int, int]]
 
 
-def pause() -> None:
+def wait_for_poll() -> None:
     """Wait until the next look."""
-    time.sleep(PAUSE)
+    time.sleep(POLL_INTERVAL)
 
 
-def changes(
+def watch_changes(
     folders: Collection[Path], wait: Callable[[], None] | None = None
 ) -> Iterator[list[Path]]:
     """Yield the files that were written, made or removed, as often as there are some."""
-    before = stamps(folders)
+    before = read_stamps(folders)
     while True:
-        (wait or pause)()
-        now = stamps(folders)
+        (wait or wait_for_poll)()
+        now = read_stamps(folders)
         changed = sorted(path for path in before | now if before.get(path) != now.get(path))
         before = now
         if changed:
             yield changed
 
 
-def stamps(folders: Collection[Path]) -> Stamps:
+def read_stamps(folders: Collection[Path]) -> FileStamps:
     """Return when each spec below some folders was written [ns], and its size."""
-    found: Stamps = {}
+    found: FileStamps = {}
     for folder in folders:
         for path in folder.rglob("*.yaml"):
             try:
@@ -43,7 +43,7 @@ def stamps(folders: Collection[Path]) -> Stamps:
     return found
 
 
-def folders_of(names: Collection[str]) -> list[Path]:
+def spec_folders(names: Collection[str]) -> list[Path]:
     """Return the folders of specs: `spec/` of the project, and those of files that are named."""
     named = {Path(name).parent for name in names if name.endswith(".yaml")}
     inside = [folder for folder in sorted(named) if Path("spec") not in (folder, *folder.parents)]

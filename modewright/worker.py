@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from modewright.neighbours import claim_neighbours
+from modewright.neighbours import load_own_packages
 
 
 def main() -> None:
     """Answer blocks until who started us is gone."""
-    claim_neighbours()
+    load_own_packages()
     from modewright.compiled import run_block
-    from sweep.worker import serve
+    from sweep.worker import serve_blocks
 
-    serve(run_block)
+    serve_blocks(run_block)
 
 
 if __name__ == "__main__":

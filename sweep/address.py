@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-FORMS = "`local:4`, `tcp://host:8786` or `tls://host:8786`"
-LOCAL = re.compile(r"local:([1-9]\d{0,3})")
-REMOTE = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d{1,5})/?")
+ADDRESS_FORMS = "`local:4`, `tcp://host:8786` or `tls://host:8786`"
+LOCAL_PATTERN = re.compile(r"local:([1-9]\d{0,3})")
+REMOTE_PATTERN = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d{1,5})/?")
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Address:
     host: str = ""
 
     @property
-    def is_open(self) -> bool:
+    def is_unprotected(self) -> bool:
         """Tell whether others can read and write what goes there: no TLS, no loopback."""
         return self.url.startswith("tcp:") and not _is_loopback(self.host)
 
@@ -35,15 +35,15 @@ class Credentials:
     key: Path | None = None
 
 
-def address_of(text: str) -> Address:
+def parse_address(text: str) -> Address:
     """Return an address from its text. Raises ValueError."""
-    local = LOCAL.fullmatch(text)
+    local = LOCAL_PATTERN.fullmatch(text)
     if local:
         return Address(count=int(local[1]))
-    remote = REMOTE.fullmatch(text)
+    remote = REMOTE_PATTERN.fullmatch(text)
     if remote and int(remote[3]) < 1 << 16:
         return Address(url=text.rstrip("/"), host=remote[2].strip("[]"))
-    raise ValueError(f"`{text}` is no cluster: {FORMS}")
+    raise ValueError(f"`{text}` is no cluster: {ADDRESS_FORMS}")
 
 
 def _is_loopback(host: str) -> bool:

@@ -9,44 +9,44 @@ from dataclasses import dataclass, field
 from language.declaration import Formula
 from language.evaluate import evaluate
 from language.experiment import System
-from language.lower import assigned
+from language.lower import lower_assigned_value
 from language.operation import Expr, Ref, Value
-from sweep.point import Point
-from sweep.study import Kind, Study, Target, points_each
+from sweep.point import Variant
+from sweep.study import Study, SystemVariant, Target, design_group_size
 
 
 @dataclass(frozen=True)
-class Case:
+class VariantValues:
     """The values [SI] of one variant, by target; `refused` says why it cannot be simulated."""
 
-    point: Point
+    variant: Variant
     values: Mapping[Target, float]
     seed: int
-    refused: str = ""
-    structure: tuple[tuple[Target, float], ...] = field(default=())
+    refusal: str = ""
+    structural_values: tuple[tuple[Target, float], ...] = field(default=())
 
 
-def case_of(study: Study, point: Point) -> Case:
+def variant_values_of(study: Study, variant: Variant) -> VariantValues:
     """Return the values of a variant, with those that follow from what varies."""
-    kind = study.kinds[point.kind]
-    scenario = kind.courses[study.scenarios[point.scenario]].scenario
+    kind = study.system_variants[variant.system_variant]
+    scenario = kind.scenario_bindings[study.scenarios[variant.scenario]].scenario
     values: dict[Target, float] = {}
-    for varied in study.varied:
-        if varied.name in point.values:
-            values.update(dict.fromkeys(varied.targets, point.values[varied.name]))
+    for varied in study.variables:
+        if varied.name in variant.values:
+            values.update(dict.fromkeys(varied.targets, variant.values[varied.name]))
     for setting in study.settings:
-        names = [name for name in setting.formula.reads if name not in point.values]
+        names = [name for name in setting.formula.reads if name not in variant.values]
         if all(_is_parameter(kind.system, name) for name in names):
-            found = _value(setting.formula, point.values, values, kind.system)
+            found = _evaluate_setting(setting.formula, variant.values, values, kind.system)
             values.update(dict.fromkeys(setting.targets, found))
-    values = {target: value for target, value in values.items() if _has(kind.system, target)}
+    values = {target: value for target, value in values.items() if _has_target(kind.system, target)}
     changed = tuple((t, v) for t, v in values.items() if t.kind not in ("parameter", "initial"))
-    each = points_each(study.sampling.method, len(study.drawn))
-    seed = point.seed(scenario.seed, study.replicates, each)
-    return Case(point, values, seed, _refusal(kind, values), changed)
+    each = design_group_size(study.sampling.method, len(study.random_variables))
+    seed = variant.seed(scenario.seed, study.replicates, each)
+    return VariantValues(variant, values, seed, _find_refusal(kind, values), changed)
 
 
-def _has(system: System, target: Target) -> bool:
+def _has_target(system: System, target: Target) -> bool:
     """Tell whether a system has a place: of several variants, one may lack what others have."""
     owner = target.path[0]
     if target.kind in ("input", "sensor"):
@@ -64,41 +64,46 @@ def _is_parameter(system: System, name: str) -> bool:
     return any(each and short in each.automaton.parameters for each in instances)
 
 
-def _value(
-    formula: Formula, varied: Mapping[str, float], given: Mapping[Target, float], system: System
+def _evaluate_setting(
+    formula: Formula,
+    varied: Mapping[str, float],
+    target_values: Mapping[Target, float],
+    system: System,
 ) -> float:
     read: dict[str, float] = {}
-    known: dict[str, Expr] = {}
+    operands: dict[str, Expr] = {}
     for name in dict.fromkeys(formula.reads):
-        read[name] = varied[name] if name in varied else parameter_value(system, name, given)
-        known[name] = Ref(name)
-    return float(evaluate(assigned(formula.tree, known, False), read))
+        read[name] = (
+            varied[name] if name in varied else parameter_value(system, name, target_values)
+        )
+        operands[name] = Ref(name)
+    return float(evaluate(lower_assigned_value(formula.tree, operands, False), read))
 
 
-def parameter_value(system: System, name: str, given: Mapping[Target, float]) -> float:
+def parameter_value(system: System, name: str, target_values: Mapping[Target, float]) -> float:
     """Return the value [SI] of a parameter in a variant; of one name in several the first's."""
     owner, _, short = name.rpartition(".")
     if not owner:
         owner = next(o for o, i in system.instances.items() if short in i.automaton.parameters)
     target = Target("parameter", (owner, short))
-    if target in given:
-        return given[target]
+    if target in target_values:
+        return target_values[target]
     automaton = system.instances[owner].automaton
     parameter = automaton.parameters[short]
     if parameter.derived is None:
         return float(parameter.value or 0)
     read: dict[str, float] = {}
-    known: dict[str, Expr] = {}
+    operands: dict[str, Expr] = {}
     for inner in dict.fromkeys(parameter.derived.reads):
-        if inner in automaton.literals:
-            known[inner] = Value(automaton.literals[inner])
+        if inner in automaton.enum_literals:
+            operands[inner] = Value(automaton.enum_literals[inner])
         else:
-            known[inner] = Ref(inner)
-            read[inner] = parameter_value(system, f"{owner}.{inner}", given)
-    return float(evaluate(assigned(parameter.derived.tree, known, False), read))
+            operands[inner] = Ref(inner)
+            read[inner] = parameter_value(system, f"{owner}.{inner}", target_values)
+    return float(evaluate(lower_assigned_value(parameter.derived.tree, operands, False), read))
 
 
-def _refusal(kind: Kind, values: Mapping[Target, float]) -> str:
+def _find_refusal(system_variant: SystemVariant, values: Mapping[Target, float]) -> str:
     """Return why values cannot be used: not finite, outside a declared range, no time."""
     for target, value in values.items():
         name = ".".join(target.path)
@@ -106,7 +111,7 @@ def _refusal(kind: Kind, values: Mapping[Target, float]) -> str:
             return f"`{name}` is {value}"
         if target.kind == "parameter":
             owner, short = target.path
-            limits = kind.system.instances[owner].automaton.parameters[short].range
+            limits = system_variant.system.instances[owner].automaton.parameters[short].range
             low, high = map(float, limits) if limits else (-math.inf, math.inf)
             if not low <= value <= high:
                 return f"`{name}` = {value:.6g} is outside its range [{low:.6g}, {high:.6g}]"

@@ -18,118 +18,125 @@ from distributed import Client, Future, KilledWorker
 
 from sweep.block import Block
 from sweep.cluster_error import ClusterError
-from sweep.cluster_worker import Answer, packed
-from sweep.executor import Finished
+from sweep.cluster_worker import Answer, pack_study
+from sweep.executor import BlockResult
 from sweep.fingerprint import fingerprint
 from sweep.processes import WorkerError
 from sweep.study import Study
 
-Task = Callable[[Mapping[str, str], bytes, int, int], Answer]
+BlockTask = Callable[[Mapping[str, str], bytes, int, int], Answer]
 """What a worker does: with the client's fingerprint, a packed study, the ends of a block.
 
 It is sent by its name, so workers have it from their own installation.
 """
 
-HOLD: Callable[[bytes], bytes] = bytes
+PLACE_STUDY: Callable[[bytes], bytes] = bytes
 """What a worker does with the study, and then has it: of Python's own, so that workers with other
 code can do it, too, and refuse the rest.
 """
-IN_FLIGHT = 2
+BLOCKS_PER_THREAD = 2
 """Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
-MOST_GIVEN = 10
+MAX_STUDY_DEATHS = 10
 """How often workers may die that were given the study: then it is the study that they die of."""
-LOOK = 5.0
+POLL_INTERVAL = 5.0
 """Time [s] between two looks at how many workers there are."""
-PATIENCE = 60.0
+WORKER_TIMEOUT = 60.0
 """Time [s] without any worker, or an answer of the scheduler, after which a cluster is given up."""
 
 
 @dataclass(frozen=True)
-class Cluster:
+class DaskExecutor:
     """The workers of a client; each does `task`."""
 
     client: Client
-    task: Task
-    patience: float = PATIENCE
+    task: BlockTask
+    timeout: float = WORKER_TIMEOUT
 
-    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
         """Yield each block as it is finished; closing the iterator ends the work."""
-        flight = _Flight(self, packed(study))
+        flight = _DaskRun(self, pack_study(study))
         try:
-            flight.hold()
+            flight.place_study()
             suspects = []
-            for finished in flight.finished(blocks):
-                if finished.lost:
+            for finished in flight.iterate_results(blocks):
+                if finished.lost_reason:
                     suspects.append(finished.block)
                 else:
                     yield finished
             for block in suspects:
-                yield from flight.finished([block])
+                yield from flight.iterate_results([block])
         finally:
-            flight.end()
+            flight.cancel()
 
 
 @dataclass
-class _Flight:
+class _DaskRun:
     """What is under way: the `study` that workers hold, and the blocks that they have.
 
     `former` are the keys of what was held by workers that died.
     """
 
-    cluster: Cluster
+    executor: DaskExecutor
     study: bytes
-    held: Any = None
-    former: set[str] = field(default_factory=set)
-    under_way: dict[Future, Block] = field(default_factory=dict)
-    ended: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
-    looked: float = float("-inf")
-    seen: float = field(default_factory=time.monotonic)
+    study_future: Any = None
+    former_study_keys: set[str] = field(default_factory=set)
+    pending: dict[Future, Block] = field(default_factory=dict)
+    completed: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
+    checked_at: float = float("-inf")
+    workers_seen_at: float = field(default_factory=time.monotonic)
     threads: int = 0
 
-    def finished(self, blocks: Iterable[Block]) -> Iterator[Finished]:
+    def iterate_results(self, blocks: Iterable[Block]) -> Iterator[BlockResult]:
         """Yield blocks as they are finished; those that workers died of are lost."""
         waiting = iter(blocks)
         while True:
-            self._look()
-            room = max(1, IN_FLIGHT * self.threads) - len(self.under_way)
-            for block in itertools.islice(waiting, max(0, room)):
+            self._check_workers()
+            free = max(1, BLOCKS_PER_THREAD * self.threads) - len(self.pending)
+            for block in itertools.islice(waiting, max(0, free)):
                 self._submit(block)
-            if not self.under_way:
+            if not self.pending:
                 return
             try:
-                future = self.ended.get(timeout=LOOK)
+                future = self.completed.get(timeout=POLL_INTERVAL)
             except Empty:
                 continue
-            found = self._result(future)
+            found = self._collect_result(future)
             if found:
                 yield found
 
-    def hold(self) -> None:
+    def place_study(self) -> None:
         """Give the study to a worker, from which the others have it."""
-        if self.held:
-            self.former.add(self.held.key)
-        self.held = self.cluster.client.submit(HOLD, self.study, pure=False)
+        if self.study_future:
+            self.former_study_keys.add(self.study_future.key)
+        self.study_future = self.executor.client.submit(PLACE_STUDY, self.study, pure=False)
 
-    def end(self) -> None:
+    def cancel(self) -> None:
         """Take back what is under way."""
-        client = self.cluster.client
+        client = self.executor.client
         if client.status == "running":
-            client.cancel([*self.under_way, *([self.held] if self.held else [])], force=True)
-        self.under_way.clear()
+            client.cancel(
+                [*self.pending, *([self.study_future] if self.study_future else [])], force=True
+            )
+        self.pending.clear()
 
     def _submit(self, block: Block) -> None:
-        future = self.cluster.client.submit(
-            self.cluster.task, fingerprint(), self.held, block.start, block.stop, pure=False
+        future = self.executor.client.submit(
+            self.executor.task,
+            fingerprint(),
+            self.study_future,
+            block.start,
+            block.stop,
+            pure=False,
         )
-        self.under_way[future] = block
-        future.add_done_callback(self.ended.put)
+        self.pending[future] = block
+        future.add_done_callback(self.completed.put)
 
-    def _look(self) -> None:
+    def _check_workers(self) -> None:
         """See how many threads there are. Raises ClusterError where nobody is left to compute."""
-        client, patience = self.cluster.client, self.cluster.patience
+        client, patience = self.executor.client, self.executor.timeout
         if client.status in ("closing", "closed"):
             raise ClusterError("the connection to the scheduler is lost")
-        if time.monotonic() < self.looked + LOOK:
+        if time.monotonic() < self.checked_at + POLL_INTERVAL:
             return
         try:
             threads = client.nthreads(callback_timeout=patience)
@@ -138,36 +145,38 @@ class _Flight:
         except OSError as error:
             raise ClusterError(f"the scheduler does not answer any more: {error}") from None
         self.threads = sum(threads.values())
-        self.looked = time.monotonic()
+        self.checked_at = time.monotonic()
         if self.threads:
-            self.seen = self.looked
-        elif self.looked > self.seen + self.cluster.patience:
-            raise ClusterError(f"there is no worker any more for {self.cluster.patience:g} s")
+            self.workers_seen_at = self.checked_at
+        elif self.checked_at > self.workers_seen_at + self.executor.timeout:
+            raise ClusterError(f"there is no worker any more for {self.executor.timeout:g} s")
 
-    def _answer(self, future: Future) -> Answer:
+    def _wait_for_answer(self, future: Future) -> Answer:
         """Return an answer; it may be lost with its worker, and made again, which takes a while."""
         while True:
             try:
-                found: Answer = future.result(timeout=self.cluster.patience)
+                found: Answer = future.result(timeout=self.executor.timeout)
                 return found
             except TimeoutError:
-                self.looked = float("-inf")
-                self._look()
+                self.checked_at = float("-inf")
+                self._check_workers()
 
-    def _result(self, future: Future) -> Finished | None:
+    def _collect_result(self, future: Future) -> BlockResult | None:
         """Return what became of a block; None where it is under way again, since a worker died of
         another one while it was given the study.
         """
-        block = self.under_way.pop(future)
+        block = self.pending.pop(future)
         try:
-            answer = self._answer(future)
+            answer = self._wait_for_answer(future)
         except KilledWorker as error:
-            if error.task not in (self.held.key, *self.former):
-                return Finished(block, lost=_blame(error))
-            if len(self.former) + 1 >= MOST_GIVEN:
-                return Finished(block, lost=f"{MOST_GIVEN} workers died that were given the study")
-            if error.task == self.held.key:
-                self.hold()
+            if error.task not in (self.study_future.key, *self.former_study_keys):
+                return BlockResult(block, lost_reason=_death_message(error))
+            if len(self.former_study_keys) + 1 >= MAX_STUDY_DEATHS:
+                return BlockResult(
+                    block, lost_reason=f"{MAX_STUDY_DEATHS} workers died that were given the study"
+                )
+            if error.task == self.study_future.key:
+                self.place_study()
             self._submit(block)
             return None
         except ImportError as error:
@@ -178,9 +187,9 @@ class _Flight:
             raise ClusterError(f"a worker {answer.refusal}")
         if answer.defect:
             raise WorkerError(answer.defect)
-        return Finished(block, file=answer.file)
+        return BlockResult(block, file=answer.file)
 
 
-def _blame(error: KilledWorker) -> str:
+def _death_message(error: KilledWorker) -> str:
     deaths = int(error.allowed_failures) + 1
     return f"{deaths} worker{'s' * (deaths > 1)} died while it was computed alone"

@@ -14,15 +14,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from engine.batch import Runner
-from sweep.block import Block, block_rows
-from sweep.fingerprint import differences, fingerprint
+from engine.batch import BatchRunner
+from sweep.block import Block, compute_rows
+from sweep.fingerprint import describe_differences, fingerprint
 from sweep.manifest import Manifest, manifest_of
 from sweep.preparation import program_digests
-from sweep.rows_file import block_file
+from sweep.rows_file import encode_block
 from sweep.study import Study
 
-ONE_AT_A_TIME = threading.Lock()
+COMPUTE_LOCK = threading.Lock()
 """A process computes one block at a time, however many threads its worker has."""
 
 
@@ -35,30 +35,32 @@ class Answer:
     defect: str = ""
 
 
-def packed(study: Study) -> bytes:
+def pack_study(study: Study) -> bytes:
     """Return a prepared study as bytes that a worker takes."""
     return zlib.compress(pickle.dumps(study, protocol=pickle.HIGHEST_PROTOCOL))
 
 
-def answer(wanted: Mapping[str, str], held: bytes, block: Block, run: Runner) -> Answer:
+def answer_block(
+    client_fingerprint: Mapping[str, str], packed_study: bytes, block: Block, run: BatchRunner
+) -> Answer:
     """Return the file of a block of a packed study, for a client with a fingerprint."""
-    refusal = differences(wanted, fingerprint())
+    refusal = describe_differences(client_fingerprint, fingerprint())
     if refusal:  # before anything is unpickled: other code may have other classes
         return Answer(refusal=f"has other code: {refusal}")
     try:
-        with ONE_AT_A_TIME:
-            study, manifest, refusal = _known(held)
+        with COMPUTE_LOCK:
+            study, manifest, refusal = _unpack_study(packed_study)
             if refusal:
                 return Answer(refusal=refusal)
-            return Answer(block_file(manifest, block, block_rows(study, block, run)))
+            return Answer(encode_block(manifest, block, compute_rows(study, block, run)))
     except Exception:
         return Answer(defect=traceback.format_exc())
 
 
 @lru_cache(maxsize=2)
-def _known(held: bytes) -> tuple[Study, Manifest, str]:
+def _unpack_study(packed_study: bytes) -> tuple[Study, Manifest, str]:
     """Return a study, and why it must not be computed: its Programs are others here."""
-    study: Study = pickle.loads(zlib.decompress(held))
+    study: Study = pickle.loads(zlib.decompress(packed_study))
     other = [
         name for name, own in program_digests(study).items() if study.identity.get(name) != own
     ]

@@ -14,38 +14,38 @@ from distributed import Client, LocalCluster, Security
 
 from sweep.address import Address, Credentials
 from sweep.cluster_error import ClusterError
-from sweep.fingerprint import differences, fingerprint
-from sweep.fork_server import method
-from sweep.processes import MOST_DEATHS
+from sweep.fingerprint import describe_differences, fingerprint
+from sweep.fork_server import start_method
+from sweep.processes import MAX_DEATHS
 
-SECONDS = 30.0
+CONNECT_TIMEOUT = 30.0
 """How long [s] a scheduler may take to answer, and the first worker to join."""
-ASKED = 4
+CONNECT_ATTEMPTS = 4
 """How often a scheduler is asked whose first answer comes with something else."""
-TALKED_OVER = "its scheduler was asked {} times, and each answer came with something else"
-CLOSING = 5.0
+BUSY_SCHEDULER = "its scheduler was asked {} times, and each answer came with something else"
+CLOSE_TIMEOUT = 5.0
 """How long [s] a connection may take to end."""
-TALKATIVE = ("distributed", "tornado", "asyncio")
+DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 """Loggers that tell of a lost connection, each in its way."""
-NOWHERE = "127.0.0.1:0"
+DASHBOARD_ADDRESS = "127.0.0.1:0"
 """Dask serves its own pages on any free port of this machine alone."""
 NO_CREDENTIALS = (
     "TLS takes an authority, a certificate and its key: --tls-ca, --tls-cert and --tls-key, or "
     "distributed.comm.tls in the configuration of Dask"
 )
-DEATHS = "distributed.scheduler.allowed-failures"
-SETTINGS = {
+ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
+DASK_SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1 GB",
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.worker.profile.enabled": False,  # it looks into workers a hundred times a second
-    "distributed.worker.multiprocessing-method": method(),
+    "distributed.worker.multiprocessing-method": start_method(),
 }
 """What Dask does beside computing, seldom."""
 
 
 @dataclass(frozen=True)
-class Staff:
+class WorkerSetup:
     """What workers have: `fingerprint` is a function that tells theirs.
 
     `preload` is a module whose `dask_setup` each that is started here does first.
@@ -56,52 +56,54 @@ class Staff:
 
 
 @contextmanager
-def connected(
+def open_client(
     address: Address,
     credentials: Credentials,
-    staff: Staff,
-    seconds: float = SECONDS,
-    deaths: int = MOST_DEATHS,
+    worker_setup: WorkerSetup,
+    timeout: float = CONNECT_TIMEOUT,
+    max_deaths: int = MAX_DEATHS,
 ) -> Iterator[Client]:
     """Yield a client of a cluster; what was started for it ends with it.
 
-    `deaths` workers started here may die of a block before it is told.
+    `max_deaths` workers started here may die of a block before it is told.
     Raises ClusterError where nobody answers, no worker is there, or one has other code.
     """
-    with ExitStack() as stack, dask.config.set({**SETTINGS, DEATHS: deaths - 1}):
-        where: Any = address.url
+    with ExitStack() as stack, dask.config.set({**DASK_SETTINGS, ALLOWED_FAILURES: max_deaths - 1}):
+        scheduler: Any = address.url
         if address.count:
-            where = stack.enter_context(_local(address.count, staff.preload))
-        security = _security(address, credentials)
-        stack.enter_context(_quiet())
+            scheduler = stack.enter_context(_local_cluster(address.count, worker_setup.preload))
+        security = _tls_security(address, credentials)
+        stack.enter_context(_silence_dask_loggers())
         try:
-            client = _client(where, security, seconds)
+            client = _connect(scheduler, security, timeout)
         except AssertionError:
-            raise ClusterError(f"{address.url}: {TALKED_OVER.format(ASKED)}") from None
+            raise ClusterError(
+                f"{address.url}: {BUSY_SCHEDULER.format(CONNECT_ATTEMPTS)}"
+            ) from None
         except (OSError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterError(f"{address.url}: no scheduler answers: {reason}") from None
-        stack.callback(_end, client)
-        _require_workers(client, staff, seconds)
+        stack.callback(_close_client, client)
+        _require_workers(client, worker_setup, timeout)
         yield client
 
 
-def _client(where: Any, security: Security | None, seconds: float) -> Client:
+def _connect(scheduler: Any, security: Security | None, timeout: float) -> Client:
     """Return a client; a scheduler that is busy with another one's blocks is asked again.
 
     Dask asserts that the first answer comes alone, and a message to all clients may come with it.
     """
-    for _ in range(ASKED - 1):
+    for _ in range(CONNECT_ATTEMPTS - 1):
         with suppress(AssertionError):
-            return Client(where, security=security, timeout=seconds)
-    return Client(where, security=security, timeout=seconds)
+            return Client(scheduler, security=security, timeout=timeout)
+    return Client(scheduler, security=security, timeout=timeout)
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _silence_dask_loggers() -> Iterator[None]:
     """Leave it to us to tell what goes wrong: Dask would log it, with tracebacks."""
-    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in TALKATIVE]
-    loggers = [logging.getLogger(name) for name in (*TALKATIVE, *names)]
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in DASK_LOGGERS]
+    loggers = [logging.getLogger(name) for name in (*DASK_LOGGERS, *names)]
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
@@ -112,27 +114,27 @@ def _quiet() -> Iterator[None]:
             logger.setLevel(level)
 
 
-def _end(client: Client) -> None:
+def _close_client(client: Client) -> None:
     """Close a client; a scheduler that does not answer any more is not waited for."""
     with suppress(Exception):  # all is told by now, and the connection ends with us
-        client.close(timeout=CLOSING)
+        client.close(timeout=CLOSE_TIMEOUT)
 
 
 @contextmanager
-def _local(count: int, preload: str) -> Iterator[LocalCluster]:
+def _local_cluster(count: int, preload: str) -> Iterator[LocalCluster]:
     """Yield a cluster of processes of this machine, which tell nothing of their own."""
     with LocalCluster(
         n_workers=count,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=NOWHERE,
+        dashboard_address=DASHBOARD_ADDRESS,
         silence_logs=logging.CRITICAL,
         preload=[preload] if preload else [],
     ) as cluster:
         yield cluster
 
 
-def _security(address: Address, credentials: Credentials) -> Security | None:
+def _tls_security(address: Address, credentials: Credentials) -> Security | None:
     """Return the credentials of TLS, from files or from the configuration of Dask."""
     if not address.url.startswith("tls:"):
         return None
@@ -152,22 +154,22 @@ def _security(address: Address, credentials: Credentials) -> Security | None:
     return security
 
 
-def _require_workers(client: Client, staff: Staff, seconds: float) -> None:
+def _require_workers(client: Client, worker_setup: WorkerSetup, timeout: float) -> None:
     """Raise ClusterError unless a worker is there and all that are have our code."""
     try:
-        client.wait_for_workers(1, timeout=seconds)
+        client.wait_for_workers(1, timeout=timeout)
     except TimeoutError:
-        raise ClusterError(f"no worker has joined the scheduler within {seconds:g} s") from None
+        raise ClusterError(f"no worker has joined the scheduler within {timeout:g} s") from None
     try:
-        found = client.run(staff.fingerprint, on_error="return", callback_timeout=seconds)
+        found = client.run(worker_setup.fingerprint, on_error="return", callback_timeout=timeout)
     except OSError:
-        label = f"a worker does not tell its code, or the scheduler not answer, for {seconds:g} s"
+        label = f"a worker does not tell its code, or the scheduler not answer, for {timeout:g} s"
         raise ClusterError(label) from None
     for name, there in found.items():
         if isinstance(there, ImportError):
             raise ClusterError(f"worker {name} cannot import modewright: {there}")
         if isinstance(there, BaseException):
             raise ClusterError(f"worker {name}: {there!r}")
-        refusal = differences(fingerprint(), there)
+        refusal = describe_differences(fingerprint(), there)
         if refusal:
             raise ClusterError(f"worker {name} has other code: {refusal}")

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.document import Node, Scalar, Table
-from language.text import visible
-from language.tree import one_line
+from language.document import MappingNode, ScalarNode, YamlNode
+from language.text import escape_invisible
+from language.tree import format_inline
 
 Description = Mapping[str, str | Mapping[str, str]]
 """The sections of a study by key: a text, or texts by name."""
-SECTIONS = ("about", "of", "scenarios", "variants", "vary", "set", "measures", "record")
-NAMED = ("vary", "set", "measures")
+DESCRIBED_SECTIONS = ("about", "of", "scenarios", "variants", "vary", "set", "measures", "record")
+NAMED_SECTIONS = ("vary", "set", "measures")
 """Sections that are told name by name."""
 
 
-def description_of(tree: Table, overrides: Mapping[str, Scalar]) -> Description:
+def description_of(tree: MappingNode, overrides: Mapping[str, ScalarNode]) -> Description:
     """Return what the sections of a study say, as they are written, and what `--set` does."""
     found: dict[str, str | dict[str, str]] = {}
-    for key in SECTIONS:
+    for key in DESCRIBED_SECTIONS:
         node = tree.get(key)
-        if isinstance(node, Table) and key in NAMED:
+        if isinstance(node, MappingNode) and key in NAMED_SECTIONS:
             found[key] = {entry.key: _text_of(entry.node) for entry in node}
         elif node is not None:
             found[key] = _text_of(node)
@@ -29,6 +29,6 @@ def description_of(tree: Table, overrides: Mapping[str, Scalar]) -> Description:
     return found
 
 
-def _text_of(node: Node) -> str:
+def _text_of(node: YamlNode) -> str:
     """Return a node as one line; what is not seen is written as an escape."""
-    return visible(" ".join(one_line(node).split()))
+    return escape_invisible(" ".join(format_inline(node).split()))

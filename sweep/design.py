@@ -10,43 +10,43 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.study import LEVELS
+from sweep.study import MORRIS_LEVELS
 
 Reals = NDArray[np.float64]
-STRIDE = LEVELS // 2
+STRIDE = MORRIS_LEVELS // 2
 """Levels of one step of a path; so all levels come equally often."""
 
 
-def saltelli_shares(
+def saltelli_points(
     dimensions: int, samples: NDArray[np.int64], sobol: Callable[[int], Reals]
 ) -> Reals:
     """Return shares (n_samples, dimensions): A, B, then A with one column after the other of B.
 
     `sobol` gives a row of a sequence in twice as many dimensions.
     """
-    found = np.empty((len(samples), dimensions))
+    points = np.empty((len(samples), dimensions))
     for place, sample in enumerate(samples.tolist()):
         row, part = divmod(sample, dimensions + 2)
         both = sobol(row)
-        found[place] = both[dimensions:] if part == 1 else both[:dimensions]
+        points[place] = both[dimensions:] if part == 1 else both[:dimensions]
         if part > 1:
-            found[place, part - 2] = both[dimensions + part - 2]
-    return found
+            points[place, part - 2] = both[dimensions + part - 2]
+    return points
 
 
-def morris_shares(dimensions: int, samples: NDArray[np.int64], seed: int) -> Reals:
+def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Reals:
     """Return shares (n_samples, dimensions) along paths that change one thing after the other."""
     paths: dict[int, Reals] = {}
-    found = np.empty((len(samples), dimensions))
+    points = np.empty((len(samples), dimensions))
     for place, sample in enumerate(samples.tolist()):
         number, step = divmod(sample, dimensions + 1)
         if number not in paths:
-            paths[number] = _path(dimensions, seed, number)
-        found[place] = paths[number][step]
-    return found
+            paths[number] = _morris_path(dimensions, seed, number)
+        points[place] = paths[number][step]
+    return points
 
 
-def _path(dimensions: int, seed: int, number: int) -> Reals:
+def _morris_path(dimensions: int, seed: int, number: int) -> Reals:
     key = np.array([seed, number], dtype=np.uint64)
     source = np.random.Generator(np.random.Philox(key=key))
     order = source.permutation(dimensions)
@@ -55,4 +55,4 @@ def _path(dimensions: int, seed: int, number: int) -> Reals:
     levels = np.tile(np.where(is_up, low, low + STRIDE), (dimensions + 1, 1))
     for place, column in enumerate(order.tolist(), start=1):
         levels[place:, column] += STRIDE if is_up[column] else -STRIDE
-    return (levels + 0.5) / LEVELS
+    return (levels + 0.5) / MORRIS_LEVELS

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from engine.batch import Runner
-from sweep.block import Block, Row, block_rows
+from engine.batch import BatchRunner
+from sweep.block import Block, Row, compute_rows
 from sweep.study import Study
 
 
 @dataclass(frozen=True)
-class Finished:
+class BlockResult:
     """The rows of a block in the order of their numbers, or its `file` as another process made it.
 
     `lost` says why there is neither.
@@ -20,24 +20,24 @@ class Finished:
 
     block: Block
     rows: Sequence[Row] = ()
-    lost: str = ""
+    lost_reason: str = ""
     file: bytes = b""
 
 
 class Executor(Protocol):
     """Computes blocks; results do not depend on which executor does, nor on their order."""
 
-    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
         """Yield each block as it is finished; closing the iterator ends the work."""
 
 
 @dataclass(frozen=True)
-class InProcess:
+class SerialExecutor:
     """One block after another in this process."""
 
-    run: Runner
+    run: BatchRunner
 
-    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
         """Yield each block as it is finished."""
         for block in blocks:
-            yield Finished(block, block_rows(study, block, self.run))
+            yield BlockResult(block, compute_rows(study, block, self.run))

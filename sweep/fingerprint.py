@@ -9,11 +9,11 @@ from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-CODE = ("language", "engine", "codegen", "sweep")
-SUFFIXES = (".py", ".lark", ".txt", ".jinja", ".h")
-PACKAGES = ("numpy", "scipy", "filterpy", "pyarrow")
+CODE_PACKAGES = ("language", "engine", "codegen", "sweep")
+CODE_SUFFIXES = (".py", ".lark", ".txt", ".jinja", ".h")
+LIBRARIES = ("numpy", "scipy", "filterpy", "pyarrow")
 """Noise and Sobol points are numpy's and scipy's, gains filterpy's, files pyarrow's."""
-DIGITS = 12
+SHOWN_DIGITS = 12
 """Hexadecimal digits of a digest that are told."""
 
 
@@ -23,7 +23,7 @@ def fingerprint() -> Mapping[str, str]:
     found = {"modewright": _code_digest(Path(__file__).resolve().parent.parent)}
     found["Python"] = ".".join(platform.python_version_tuple()[:2])
     found["processor"] = platform.machine()
-    for name in PACKAGES:
+    for name in LIBRARIES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -31,21 +31,21 @@ def fingerprint() -> Mapping[str, str]:
     return found
 
 
-def differences(wanted: Mapping[str, str], there: Mapping[str, str]) -> str:
+def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str]) -> str:
     """Return in words which parts are others than those that are wanted; empty: none."""
     parts = [
-        f"{name} {there.get(name, 'unknown')[:DIGITS]} instead of {value[:DIGITS]}"
-        for name, value in wanted.items()
-        if there.get(name) != value
+        f"{name} {actual.get(name, 'unknown')[:SHOWN_DIGITS]} instead of {value[:SHOWN_DIGITS]}"
+        for name, value in expected.items()
+        if actual.get(name) != value
     ]
     return ", ".join(parts)
 
 
 def _code_digest(base: Path) -> str:
     total = hashlib.sha256()
-    for package in CODE:
+    for package in CODE_PACKAGES:
         for path in sorted((base / package).rglob("*")):
-            if path.suffix in SUFFIXES and path.is_file():
+            if path.suffix in CODE_SUFFIXES and path.is_file():
                 name = path.relative_to(base).as_posix()
                 total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()

@@ -9,8 +9,8 @@ import multiprocessing
 import os
 from multiprocessing import forkserver
 
-METHOD = "forkserver"
-ENVIRONMENT = {
+FORK_SERVER = "forkserver"
+WORKER_ENVIRONMENT = {
     "PYTHONSAFEPATH": "1",  # what stands in the user's folder is not taken for a library
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
@@ -18,17 +18,17 @@ ENVIRONMENT = {
 }
 
 
-def start(template: str) -> None:
+def start_fork_server(template: str) -> None:
     """Start it, to load the module `template` while this process goes on; once in a process.
 
     Nothing is done where a system has no such thing: workers are started by `method()`.
     """
-    if method() != METHOD:
+    if start_method() != FORK_SERVER:
         return
-    before = {name: os.environ.get(name) for name in ENVIRONMENT}
-    os.environ.update(ENVIRONMENT)
+    before = {name: os.environ.get(name) for name in WORKER_ENVIRONMENT}
+    os.environ.update(WORKER_ENVIRONMENT)
     try:
-        multiprocessing.get_context(METHOD).set_forkserver_preload([template])
+        multiprocessing.get_context(FORK_SERVER).set_forkserver_preload([template])
         forkserver.ensure_running()
     finally:
         for name, value in before.items():
@@ -38,6 +38,6 @@ def start(template: str) -> None:
                 os.environ[name] = value
 
 
-def method() -> str:
+def start_method() -> str:
     """Return how processes are started here."""
-    return METHOD if METHOD in multiprocessing.get_all_start_methods() else "spawn"
+    return FORK_SERVER if FORK_SERVER in multiprocessing.get_all_start_methods() else "spawn"

@@ -16,27 +16,27 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.moments import quantiles_of, scaled, unscaled
+from sweep.moments import quantiles_of, scale_to_squarable, undo_scale
 
 Interval = tuple[float, float] | None
 Reals = NDArray[np.float64]
-Places = NDArray[np.int64]
+DrawIndices = NDArray[np.int64]
 
 
-def by_draw(values: Reals, draws: Places) -> Reals:
+def sum_by_draw(values: Reals, draws: DrawIndices) -> Reals:
     """Return the total of the values (n,) of each draw that has some, in the order of draws."""
     _, places = np.unique(draws, return_inverse=True)
     return np.bincount(places.reshape(-1), values).astype(np.float64)
 
 
-def of_mean(values: Reals, draws: Places, confidence: float) -> Interval:
+def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> Interval:
     """Return the interval of a mean [unit of the values] (n,); None for fewer than two draws.
 
     None too where an end is more than a number can hold.
     """
     count = len(values)
-    own, exponent = scaled(values)
-    totals, sizes = by_draw(own, draws), by_draw(np.ones(count), draws)
+    own, exponent = scale_to_squarable(values)
+    totals, sizes = sum_by_draw(own, draws), sum_by_draw(np.ones(count), draws)
     number = len(sizes)
     if number < 2:
         return None
@@ -45,20 +45,24 @@ def of_mean(values: Reals, draws: Places, confidence: float) -> Interval:
     mean = math.fsum(own) / count
     spread = math.fsum((totals - mean * sizes) ** 2) * number / (number - 1)
     half = float(stdtrit(number - 1, 0.5 + confidence / 2.0)) * math.sqrt(spread) / count
-    low, high = unscaled(mean - half, exponent), unscaled(mean + half, exponent)
+    low, high = undo_scale(mean - half, exponent), undo_scale(mean + half, exponent)
     return (low, high) if math.isfinite(low) and math.isfinite(high) else None
 
 
-def of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
+def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
     """Return the interval of a rate: `hits` of `sizes` (n_draws,) were seen in each draw.
 
     None for fewer than two draws.
     """
-    count = effective_count(hits, sizes, confidence)
-    return wilson(count * float(np.sum(hits) / np.sum(sizes)), count, confidence) if count else None
+    count = effective_sample_size(hits, sizes, confidence)
+    return (
+        wilson_interval(count * float(np.sum(hits) / np.sum(sizes)), count, confidence)
+        if count
+        else None
+    )
 
 
-def effective_count(hits: Reals, sizes: Reals, confidence: float) -> float:
+def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float:
     """Return how many independent numbers say as much of a rate as `hits` of `sizes` (n_draws,).
 
     As many as there are numbers where each is a draw of its own, or where draws differ no more than
@@ -76,13 +80,13 @@ def effective_count(hits: Reals, sizes: Reals, confidence: float) -> float:
     from scipy.special import stdtrit
 
     spread = math.fsum((hits - share * sizes) ** 2) / count**2
-    found = share * (1.0 - share) / spread if spread > 0.0 else count
+    effective = share * (1.0 - share) / spread if spread > 0.0 else count
     level = 0.5 + confidence / 2.0
-    unsure = float(stdtrit(count - 1.0, level) / stdtrit(draws - 1.0, level))
-    return min(count, found) * min(1.0, unsure) ** 2
+    t_ratio = float(stdtrit(count - 1.0, level) / stdtrit(draws - 1.0, level))
+    return min(count, effective) * min(1.0, t_ratio) ** 2
 
 
-def wilson(hits: float, count: float, confidence: float) -> Interval:
+def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
     """Return the interval of a rate: `hits` of so many independent numbers; None without any."""
     if count == 0:
         return None
@@ -96,7 +100,9 @@ def wilson(hits: float, count: float, confidence: float) -> Interval:
     return max(0.0, low), 1.0 if hits == count else min(1.0, middle + half)
 
 
-def of_quantile(values: Reals, draws: Places, share: float, confidence: float) -> Interval:
+def interval_of_quantile(
+    values: Reals, draws: DrawIndices, level: float, confidence: float
+) -> Interval:
     """Return the interval of a quantile between two of the values (n,); None for too few.
 
     Of m independent numbers it is from the l-th to the u-th smallest: P(l <= B < u) >= confidence,
@@ -108,17 +114,17 @@ def of_quantile(values: Reals, draws: Places, share: float, confidence: float) -
     from scipy.stats import binom
 
     ordered = np.sort(values)
-    below = (values <= quantiles_of(ordered, (share,))[0]).astype(np.float64)
-    hits, sizes = by_draw(below, draws), by_draw(np.ones(count), draws)
-    effective = int(effective_count(hits, sizes, confidence) + SAME)
+    below = (values <= quantiles_of(ordered, (level,))[0]).astype(np.float64)
+    hits, sizes = sum_by_draw(below, draws), sum_by_draw(np.ones(count), draws)
+    effective = int(effective_sample_size(hits, sizes, confidence) + COUNT_ROUNDING)
     tail = (1.0 - confidence) / 2.0
-    low = int(binom.ppf(tail, effective, share)) if effective else 0
-    high = int(binom.ppf(1.0 - tail, effective, share)) + 1
+    low = int(binom.ppf(tail, effective, level)) if effective else 0
+    high = int(binom.ppf(1.0 - tail, effective, level)) + 1
     if low < 1 or high > effective:
         return None
     first, last = (low - 1) * count // effective, -(-high * count // effective) - 1
     return float(ordered[first]), float(ordered[last])
 
 
-SAME = 1e-6
+COUNT_ROUNDING = 1e-6
 """Relative to one number: what rounding takes of an effective number that is whole."""

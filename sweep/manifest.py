@@ -12,16 +12,22 @@ from typing import Any
 from language.problem import Problems, Source, Span, SpecError
 from sweep.block import Block
 from sweep.description import Description
-from sweep.measure import Column, columns_of
-from sweep.preparation import FORMAT, digest_of
-from sweep.study import Presentation, Study, Varied, points_each
+from sweep.measure import StoreColumn, columns_of
+from sweep.preparation import STORE_FORMAT, digest_of
+from sweep.study import Presentation, Study, SweepVariable, design_group_size
 
-MANIFEST = "study.json"
-MOST_BLOCKS = 100
-FEWEST_BLOCKS = 8
-MOST_IN_BLOCK = 5000
-LEAST_IN_BATCH = 200
-TYPES = {"real": "float64", "whole": "int64", "text": "string", "truth": "bool_", "list": "list_"}
+MANIFEST_NAME = "study.json"
+MAX_BLOCKS = 100
+MIN_BLOCKS = 8
+MAX_BLOCK_SIZE = 5000
+MIN_BATCH_SIZE = 200
+ARROW_TYPES = {
+    "real": "float64",
+    "whole": "int64",
+    "text": "string",
+    "truth": "bool_",
+    "list": "list_",
+}
 """What a column may hold, and the type that pyarrow has for it; a list is one of reals."""
 
 
@@ -39,19 +45,19 @@ class Design:
     replicates: int = 1
 
     @property
-    def each(self) -> int:
+    def group_size(self) -> int:
         """How many points belong together: those of a block or a path; else each is alone."""
-        return points_each(self.method, len(self.names))
+        return design_group_size(self.method, len(self.names))
 
     @property
-    def planned(self) -> int:
+    def group_count(self) -> int:
         """How many blocks or paths there will be; else points."""
-        return self.count // self.each
+        return self.count // self.group_size
 
     @property
     def has_indices(self) -> bool:
         """Tell whether indices of sensitivity are made of its points."""
-        return self.each > 1
+        return self.group_size > 1
 
 
 @dataclass(frozen=True)
@@ -65,10 +71,10 @@ class Manifest:
     digest: str
     identity: Mapping[str, str]
     count: int
-    block: int
-    varied: tuple[Column, ...]
+    block_size: int
+    varied: tuple[StoreColumn, ...]
     words: Mapping[str, Sequence[str]]
-    measures: tuple[Column, ...]
+    measures: tuple[StoreColumn, ...]
     presentation: Presentation
     design: Design = Design()
     description: Description = field(default_factory=dict)
@@ -76,25 +82,25 @@ class Manifest:
     @property
     def blocks(self) -> list[Block]:
         """All blocks in their order."""
-        starts = range(0, self.count, self.block)
-        return [Block(start, min(start + self.block, self.count)) for start in starts]
+        starts = range(0, self.count, self.block_size)
+        return [Block(start, min(start + self.block_size, self.count)) for start in starts]
 
     def has(self, block: Block) -> bool:
         """Tell whether this is one of the blocks."""
-        is_inside = 0 <= block.start < self.count and block.start % self.block == 0
-        return is_inside and block.stop == min(block.start + self.block, self.count)
+        is_inside = 0 <= block.start < self.count and block.start % self.block_size == 0
+        return is_inside and block.stop == min(block.start + self.block_size, self.count)
 
 
-def manifest_of(study: Study, block: int | None = None) -> Manifest:
+def manifest_of(study: Study, block_size: int | None = None) -> Manifest:
     """Return the manifest of a prepared study, in blocks of a size that suits it or is given."""
     return Manifest(
         study=study.name,
         digest=digest_of(study.identity),
         identity=study.identity,
         count=study.count,
-        block=block or block_size(study),
-        varied=tuple(map(_column_of, study.varied)),
-        words={varied.name: varied.words for varied in study.varied if varied.words},
+        block_size=block_size or choose_block_size(study),
+        varied=tuple(map(_column_of, study.variables)),
+        words={varied.name: varied.words for varied in study.variables if varied.words},
         measures=tuple(column for measure in study.measures for column in columns_of(measure)),
         presentation=study.presentation,
         design=_design_of(study),
@@ -102,39 +108,39 @@ def manifest_of(study: Study, block: int | None = None) -> Manifest:
     )
 
 
-def _column_of(varied: Varied) -> Column:
+def _column_of(varied: SweepVariable) -> StoreColumn:
     unit = varied.unit
     factor, offset = float(unit.factor), float(unit.offset)
-    return Column(varied.name, "real", str(unit.dimension), unit.text, factor, offset)
+    return StoreColumn(varied.name, "real", str(unit.dimension), unit.text, factor, offset)
 
 
 def _design_of(study: Study) -> Design:
-    names, sampling = tuple(varied.name for varied in study.drawn), study.sampling
+    names, sampling = tuple(varied.name for varied in study.random_variables), study.sampling
     return Design(sampling.method, names, sampling.count, sampling.seed, study.replicates)
 
 
-def block_size(study: Study) -> int:
+def choose_block_size(study: Study) -> int:
     """Return how many variants are computed and kept at once: about a hundred blocks.
 
     What goes through one batch is prepared once a block: such blocks are larger, if there are some
     for every worker.
     """
-    places = [target for varied in study.varied for target in varied.targets]
+    places = [target for varied in study.variables for target in varied.targets]
     places += [target for setting in study.settings for target in setting.targets]
     is_batch = all(place.kind in ("parameter", "initial", "input") for place in places)
-    least = min(LEAST_IN_BATCH, -(-study.count // FEWEST_BLOCKS)) if is_batch else 1
-    return min(MOST_IN_BLOCK, max(least, -(-study.count // MOST_BLOCKS)))
+    least = min(MIN_BATCH_SIZE, -(-study.count // MIN_BLOCKS)) if is_batch else 1
+    return min(MAX_BLOCK_SIZE, max(least, -(-study.count // MAX_BLOCKS)))
 
 
-def manifest_json(manifest: Manifest) -> bytes:
+def encode_manifest(manifest: Manifest) -> bytes:
     """Return a manifest as the bytes of its file."""
     shown = manifest.presentation
     data: dict[str, Any] = {
-        "modewright": FORMAT,
+        "modewright": STORE_FORMAT,
         "study": manifest.study,
         "digest": manifest.digest,
         "count": manifest.count,
-        "block": manifest.block,
+        "block": manifest.block_size,
         "identity": dict(sorted(manifest.identity.items())),
         "varied": [vars(column) for column in manifest.varied],
         "words": {name: list(words) for name, words in manifest.words.items()},
@@ -155,13 +161,13 @@ def seal_of(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
-def refused(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
+def store_error(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
     """Return a problem of a folder, to be raised."""
     problems = Problems()
-    problems.error(kind, start_of(folder), label, help)
-    return SpecError(problems.found)
+    problems.error(kind, file_span(folder), label, help)
+    return SpecError(problems.reported)
 
 
-def start_of(path: Path) -> Span:
+def file_span(path: Path) -> Span:
     """Return the place of a folder or file as a whole."""
     return Span(Source(str(path)), 1, 1)

@@ -9,109 +9,118 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from language.names import NAME
-from language.text import shortened, visible
+from language.names import NAME_PATTERN
+from language.text import escape_invisible, truncate
 from sweep.description import Description
-from sweep.manifest import MANIFEST, TYPES, Design, Manifest, refused, seal_of
-from sweep.measure import Column
-from sweep.preparation import FORMAT
-from sweep.presentation_reader import PLOTS
-from sweep.rows_file import END, PLACE
-from sweep.sampling_reader import LARGEST_SEED, METHODS, MOST_POINTS
-from sweep.study import LEAST_SURE, MOST_SURE, Presentation
+from sweep.manifest import ARROW_TYPES, MANIFEST_NAME, Design, Manifest, seal_of, store_error
+from sweep.measure import StoreColumn
+from sweep.preparation import STORE_FORMAT
+from sweep.presentation_reader import PLOT_OPTIONS
+from sweep.rows_file import LEADING_COLUMNS, STATUS_COLUMNS
+from sweep.sampling_reader import MAX_POINTS, MAX_SEED, METHODS
+from sweep.study import MAX_CONFIDENCE, MIN_CONFIDENCE, Presentation
 
-COLUMN = re.compile(r"[A-Za-z]\w*(\.\w+)*", re.ASCII)
-GROUPS = ("variant", "scenario")
+COLUMN_PATTERN = re.compile(r"[A-Za-z]\w*(\.\w+)*", re.ASCII)
+GROUP_COLUMNS = ("variant", "scenario")
 
 
 def read_manifest(folder: Path) -> Manifest:
     """Return what the store in a folder is of. Raises SpecError."""
     try:
-        data = json.loads((folder / MANIFEST).read_text("utf-8"))
-        if isinstance(data, dict) and data.get("modewright", FORMAT) != FORMAT:
+        data = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+        if isinstance(data, dict) and data.get("modewright", STORE_FORMAT) != STORE_FORMAT:
             label = "these results are in a form that is not known here"
-            raise refused(folder, "store", label, "run the study into another folder")
+            raise store_error(folder, "store", label, "run the study into another folder")
         return _manifest(data)
     except FileNotFoundError:
         label = "there are no results of a study here"
-        raise refused(folder, "store", label, "modewright sweep STUDY --out DIR") from None
+        raise store_error(folder, "store", label, "modewright sweep STUDY --out DIR") from None
     except (OSError, ValueError, RecursionError) as error:
-        label = f"`{MANIFEST}` cannot be read: {error}"
+        label = f"`{MANIFEST_NAME}` cannot be read: {error}"
         hint = "put back what modewright has written; the blocks are as they were"
-        raise refused(folder, "store", label, hint) from None
+        raise store_error(folder, "store", label, hint) from None
 
 
 def _manifest(data: Any) -> Manifest:
     """Return plain data as a manifest. Raises ValueError with the place of what is wrong."""
-    table = _table(data, MANIFEST)
-    _part(table, "modewright")
-    _require(_part(table, "seal") == seal_of(table), "it is not as it was written")
-    varied = _columns(_part(table, "varied"), "varied")
-    measures = _columns(_part(table, "measures"), "measures")
+    table = _table(data, MANIFEST_NAME)
+    _get(table, "modewright")
+    _require(_get(table, "seal") == seal_of(table), "it is not as it was written")
+    varied = _columns(_get(table, "varied"), "varied")
+    measures = _columns(_get(table, "measures"), "measures")
     names = [column.name for column in (*varied, *measures)]
-    names += [*PLACE, *END]
+    names += [*LEADING_COLUMNS, *STATUS_COLUMNS]
     _require(len(set(names)) == len(names), "`varied` and `measures` have a name twice")
     return Manifest(
-        study=_text(_part(table, "study"), "study"),
-        digest=_text(_part(table, "digest"), "digest"),
-        identity=_named_texts(_part(table, "identity"), "identity"),
-        count=_whole(_part(table, "count"), "count", 0, MOST_POINTS),
-        block=_whole(_part(table, "block"), "block", 1, None),
+        study=_text(_get(table, "study"), "study"),
+        digest=_text(_get(table, "digest"), "digest"),
+        identity=_named_texts(_get(table, "identity"), "identity"),
+        count=_whole(_get(table, "count"), "count", 0, MAX_POINTS),
+        block_size=_whole(_get(table, "block"), "block", 1, None),
         varied=varied,
-        words=_words(_part(table, "words"), varied),
+        words=_words(_get(table, "words"), varied),
         measures=measures,
-        presentation=_presentation(_part(table, "presentation"), varied, measures),
-        design=_design(_part(table, "design"), varied),
-        description=_description(_part(table, "description")),
+        presentation=_presentation(_get(table, "presentation"), varied, measures),
+        design=_design(_get(table, "design"), varied),
+        description=_description(_get(table, "description")),
     )
 
 
-def _presentation(data: Any, varied: Sequence[Column], measures: Sequence[Column]) -> Presentation:
+def _presentation(
+    data: Any, varied: Sequence[StoreColumn], measures: Sequence[StoreColumn]
+) -> Presentation:
     table = _table(data, "presentation")
-    groups = (*GROUPS, *(column.name for column in varied))
-    confidence = _real(_part(table, "confidence"), "confidence")
-    is_share = LEAST_SURE <= confidence <= MOST_SURE
-    _require(is_share, f"`confidence` is no share from {LEAST_SURE:g} to {MOST_SURE!r}")
+    groups = (*GROUP_COLUMNS, *(column.name for column in varied))
+    confidence = _real(_get(table, "confidence"), "confidence")
+    is_share = MIN_CONFIDENCE <= confidence <= MAX_CONFIDENCE
+    _require(is_share, f"`confidence` is no share from {MIN_CONFIDENCE:g} to {MAX_CONFIDENCE!r}")
     plots = {}
-    for name, plot in _table(_part(table, "plots"), "plots").items():
-        _require(NAME.fullmatch(name) is not None, f"`{_shown(name)}` is no name of a picture")
+    for name, plot in _table(_get(table, "plots"), "plots").items():
+        _require(
+            NAME_PATTERN.fullmatch(name) is not None, f"`{_quote(name)}` is no name of a picture"
+        )
         plots[name] = _plot(_table(plot, f"plots.{name}"), f"plots.{name}", varied, measures)
-    by = _known(_part(table, "by"), "by", groups)
+    by = _choices(_get(table, "by"), "by", groups)
     return Presentation(by, confidence, plots)
 
 
 def _plot(
-    table: Mapping[str, Any], where: str, varied: Sequence[Column], measures: Sequence[Column]
+    table: Mapping[str, Any],
+    where: str,
+    varied: Sequence[StoreColumn],
+    measures: Sequence[StoreColumn],
 ) -> dict[str, Any]:
     """Return the options of a picture, as sweep/presentation_reader.py makes them of a study."""
-    kind = _choice(_part(table, "kind"), f"{where}.kind", tuple(PLOTS))
+    kind = _choice(_get(table, "kind"), f"{where}.kind", tuple(PLOT_OPTIONS))
     types = ("real", "whole", "truth", *(("list",) if kind == "histogram" else ()))
-    of = _known(
-        _part(table, "of"), f"{where}.of", [one.name for one in measures if one.type in types]
+    of = _choices(
+        _get(table, "of"), f"{where}.of", [one.name for one in measures if one.type in types]
     )
     _require(kind == "parallel" or len(of) == 1, f"`{where}.of` is not one measure")
     found: dict[str, Any] = {"kind": kind, "of": list(of)}
     names = [column.name for column in varied]
     if kind == "heat_map":
-        found["over"] = list(_known(_part(table, "over"), f"{where}.over", names))
+        found["over"] = list(_choices(_get(table, "over"), f"{where}.over", names))
         _require(len(found["over"]) == 2, f"`{where}.over` is not two things that vary")
     if "by" in table:
-        found["by"] = list(_known(table["by"], f"{where}.by", (*GROUPS, *names)))
+        found["by"] = list(_choices(table["by"], f"{where}.by", (*GROUP_COLUMNS, *names)))
     return found
 
 
-def _design(data: Any, varied: Sequence[Column]) -> Design:
+def _design(data: Any, varied: Sequence[StoreColumn]) -> Design:
     table = _table(data, "design")
     known = [column.name for column in varied]
     made = Design(
-        method=_choice(_part(table, "method"), "design.method", METHODS),
-        names=_known(_part(table, "names"), "design.names", known),
-        count=_whole(_part(table, "count"), "design.count", 0, MOST_POINTS),
-        seed=_whole(_part(table, "seed"), "design.seed", 0, LARGEST_SEED),
-        replicates=_whole(_part(table, "replicates"), "design.replicates", 1, MOST_POINTS),
+        method=_choice(_get(table, "method"), "design.method", METHODS),
+        names=_choices(_get(table, "names"), "design.names", known),
+        count=_whole(_get(table, "count"), "design.count", 0, MAX_POINTS),
+        seed=_whole(_get(table, "seed"), "design.seed", 0, MAX_SEED),
+        replicates=_whole(_get(table, "replicates"), "design.replicates", 1, MAX_POINTS),
     )
     _require(bool(made.names) == bool(made.count), "`design` has points of nothing, or none")
-    _require(made.count % made.each == 0, f"`design.count` is {made.count}: some are not whole")
+    _require(
+        made.count % made.group_size == 0, f"`design.count` is {made.count}: some are not whole"
+    )
     return made
 
 
@@ -123,22 +132,22 @@ def _description(data: Any) -> Description:
     return found
 
 
-def _columns(data: Any, where: str) -> tuple[Column, ...]:
+def _columns(data: Any, where: str) -> tuple[StoreColumn, ...]:
     found = []
     for place, item in enumerate(_list(data, where)):
         here = f"{where}.{place}"
         table = _table(item, here)
-        name = _text(_part(table, "name"), f"{here}.name")
-        _require(COLUMN.fullmatch(name) is not None, f"`{here}.name` is no name")
-        kind = _choice(_part(table, "type"), f"{here}.type", tuple(TYPES))
-        unit, shown = (_text(_part(table, key), f"{here}.{key}") for key in ("unit", "shown"))
-        factor, offset = (_real(_part(table, key), f"{here}.{key}") for key in ("factor", "offset"))
+        name = _text(_get(table, "name"), f"{here}.name")
+        _require(COLUMN_PATTERN.fullmatch(name) is not None, f"`{here}.name` is no name")
+        kind = _choice(_get(table, "type"), f"{here}.type", tuple(ARROW_TYPES))
+        unit, shown = (_text(_get(table, key), f"{here}.{key}") for key in ("unit", "shown"))
+        factor, offset = (_real(_get(table, key), f"{here}.{key}") for key in ("factor", "offset"))
         _require(factor > 0.0, f"`{here}.factor` is {factor}, not above zero")
-        found.append(Column(name, kind, unit, shown, factor, offset))  # type: ignore[arg-type]
+        found.append(StoreColumn(name, kind, unit, shown, factor, offset))  # type: ignore[arg-type]
     return tuple(found)
 
 
-def _words(data: Any, varied: Sequence[Column]) -> dict[str, tuple[str, ...]]:
+def _words(data: Any, varied: Sequence[StoreColumn]) -> dict[str, tuple[str, ...]]:
     table = _table(data, "words")
     known = [column.name for column in varied]
     return {
@@ -152,12 +161,12 @@ def _words(data: Any, varied: Sequence[Column]) -> dict[str, tuple[str, ...]]:
 # What a value may be.
 
 
-def _require(is_fine: bool, label: str) -> None:
-    if not is_fine:
+def _require(condition: bool, label: str) -> None:
+    if not condition:
         raise ValueError(label)
 
 
-def _part(table: Mapping[str, Any], key: str) -> Any:
+def _get(table: Mapping[str, Any], key: str) -> Any:
     _require(key in table, f"`{key}` is missing")
     return table[key]
 
@@ -173,8 +182,8 @@ def _list(value: Any, where: str) -> list[Any]:
 
 
 def _text(value: Any, where: str) -> str:
-    is_text = isinstance(value, str) and visible(value) == value
-    _require(is_text, f"`{where}` is {_shown(value)}, no text")
+    is_text = isinstance(value, str) and escape_invisible(value) == value
+    _require(is_text, f"`{where}` is {_quote(value)}, no text")
     return str(value)
 
 
@@ -187,25 +196,25 @@ def _whole(value: Any, where: str, low: int, high: int | None) -> int:
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     is_fine = is_whole and low <= value and (high is None or value <= high)
     limits = f"from {low} on" if high is None else f"from {low} to {high}"
-    _require(is_fine, f"`{where}` is {_shown(value)}, no whole number {limits}")
+    _require(is_fine, f"`{where}` is {_quote(value)}, no whole number {limits}")
     return int(value)
 
 
 def _real(value: Any, where: str) -> float:
     is_real = isinstance(value, float) and math.isfinite(value)
-    _require(is_real, f"`{where}` is {_shown(value)}, no real number")
+    _require(is_real, f"`{where}` is {_quote(value)}, no real number")
     return float(value)
 
 
 def _choice(value: Any, where: str, known: Sequence[str]) -> str:
     is_known = isinstance(value, str) and value in known
-    _require(is_known, f"`{where}` is {_shown(value)}, not one of {', '.join(known) or 'nothing'}")
+    _require(is_known, f"`{where}` is {_quote(value)}, not one of {', '.join(known) or 'nothing'}")
     return str(value)
 
 
-def _known(value: Any, where: str, known: Sequence[str]) -> tuple[str, ...]:
+def _choices(value: Any, where: str, known: Sequence[str]) -> tuple[str, ...]:
     return tuple(_choice(item, where, known) for item in _list(value, where))
 
 
-def _shown(value: Any) -> str:
-    return visible(shortened(str(value), 40))
+def _quote(value: Any) -> str:
+    return escape_invisible(truncate(str(value), 40))

@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import Literal
 
 from language.declaration import Formula
-from language.event_name import EventName
+from language.event_name import ModeEntryEvent
 from language.problem import Span
-from language.units import shown_unit
+from language.units import display_unit
 
 SignalKind = Literal["peak", "max", "min", "mean", "rms", "final", "settling", "frequency"]
 Bound = Fraction | str | None
@@ -22,7 +22,7 @@ class EventMeasure:
 
     name: str
     kind: Literal["time", "count"]
-    event: EventName
+    event: ModeEntryEvent
     number: int
     since: Bound
     until: Bound
@@ -38,8 +38,8 @@ class DelayMeasure:
     """
 
     name: str
-    event: EventName
-    after: EventName
+    event: ModeEntryEvent
+    after: ModeEntryEvent
     number: int
     before: Fraction
     within: Fraction | None
@@ -59,8 +59,8 @@ class MatchMeasure:
     """
 
     name: str
-    event: EventName
-    truth: EventName
+    event: ModeEntryEvent
+    truth: ModeEntryEvent
     before: Fraction
     within: Fraction | None
     since: Bound
@@ -109,7 +109,7 @@ MATCH_PARTS = {
 
 
 @dataclass(frozen=True)
-class Column:
+class StoreColumn:
     """A column of the store; a list is one of reals, `unit` is in SI.
 
     It is shown in the unit `shown`: value in SI = factor * shown value + offset.
@@ -125,17 +125,17 @@ class Column:
     @property
     def label(self) -> str:
         """The unit in which it is shown, for readers."""
-        return shown_unit(self.shown or self.unit)
+        return display_unit(self.shown or self.unit)
 
 
-def columns_of(measure: Measure) -> tuple[Column, ...]:
+def columns_of(measure: Measure) -> tuple[StoreColumn, ...]:
     """Return the columns that a measure fills."""
     if isinstance(measure, MatchMeasure):
         return tuple(
-            Column(f"{measure.name}.{part}", kind, "1" if kind == "whole" else "s")  # type: ignore[arg-type]
+            StoreColumn(f"{measure.name}.{part}", kind, "1" if kind == "whole" else "s")  # type: ignore[arg-type]
             for part, kind in MATCH_PARTS.items()
         )
     if isinstance(measure, ValueMeasure) and measure.is_truth:
-        return (Column(measure.name, "truth", "1"),)
+        return (StoreColumn(measure.name, "truth", "1"),)
     is_count = isinstance(measure, EventMeasure) and measure.kind == "count"
-    return (Column(measure.name, "whole" if is_count else "real", measure.unit),)
+    return (StoreColumn(measure.name, "whole" if is_count else "real", measure.unit),)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from language.evaluate import evaluate
-from language.lower import assigned, expression
+from language.lower import lower_assigned_value, lower_expression
 from language.operation import Ref
 from sweep.measure import (
     Bound,
@@ -18,56 +18,58 @@ from sweep.measure import (
     ValueMeasure,
 )
 from sweep.observation import Observation
-from sweep.waveform import signal_number
+from sweep.waveform import evaluate_signal
 
 Cell = float | int | bool | str | list[float] | None
 Window = tuple[float, float] | None
 
 
-def measured(measures: Sequence[Measure], run: Observation) -> dict[str, Cell]:
+def evaluate_measures(measures: Sequence[Measure], run: Observation) -> dict[str, Cell]:
     """Return the value of every column of the measures."""
-    found: dict[str, Cell] = {}
+    cells: dict[str, Cell] = {}
     for measure in measures:
         if isinstance(measure, ValueMeasure):
-            found[measure.name] = _value(measure, found)
+            cells[measure.name] = _measure_value(measure, cells)
             continue
-        window = _window(measure.since, measure.until, found, run.horizon)
+        window = _resolve_window(measure.since, measure.until, cells, run.horizon)
         match measure:
             case EventMeasure():
-                found[measure.name] = _event(measure, run, window)
+                cells[measure.name] = _measure_event(measure, run, window)
             case DelayMeasure():
-                found[measure.name] = _delay(measure, run, window)
+                cells[measure.name] = _measure_delay(measure, run, window)
             case MatchMeasure():
-                found |= _match(measure, run, window)
+                cells |= _measure_match(measure, run, window)
             case SignalMeasure():
-                found[measure.name] = _signal(measure, run, window)
-    return found
+                cells[measure.name] = _measure_signal(measure, run, window)
+    return cells
 
 
-def _window(since: Bound, until: Bound, found: Mapping[str, Cell], horizon: float) -> Window:
+def _resolve_window(
+    since: Bound, until: Bound, cells: Mapping[str, Cell], horizon: float
+) -> Window:
     """Return from when to when [s]; None where an end is a measure that has no value."""
     ends = []
     for bound, default in ((since, 0.0), (until, horizon)):
-        value = found[bound] if isinstance(bound, str) else bound
+        value = cells[bound] if isinstance(bound, str) else bound
         if isinstance(bound, str) and value is None:
             return None
         ends.append(default if value is None else float(value))  # type: ignore[arg-type]
     return ends[0], ends[1]
 
 
-def _inside(times: Sequence[float], window: Window) -> list[float]:
+def _times_within(times: Sequence[float], window: Window) -> list[float]:
     return [] if window is None else [t for t in times if window[0] <= t <= window[1]]
 
 
-def _event(measure: EventMeasure, run: Observation, window: Window) -> Cell:
-    times = _inside(run.times_of(measure.event), window)
+def _measure_event(measure: EventMeasure, run: Observation, window: Window) -> Cell:
+    times = _times_within(run.times_of(measure.event), window)
     if measure.kind == "count":
         return None if window is None else len(times)
     return times[measure.number - 1] if len(times) >= measure.number else None
 
 
-def _delay(measure: DelayMeasure, run: Observation, window: Window) -> Cell:
-    truths = _inside(run.times_of(measure.after), window)
+def _measure_delay(measure: DelayMeasure, run: Observation, window: Window) -> Cell:
+    truths = _times_within(run.times_of(measure.after), window)
     if len(truths) < measure.number:
         return None
     truth = truths[measure.number - 1]
@@ -78,25 +80,25 @@ def _delay(measure: DelayMeasure, run: Observation, window: Window) -> Cell:
     return None
 
 
-def _match(measure: MatchMeasure, run: Observation, window: Window) -> dict[str, Cell]:
+def _measure_match(measure: MatchMeasure, run: Observation, window: Window) -> dict[str, Cell]:
     """Each truth takes the first detection in its window that no truth before has taken."""
     before, within = float(measure.before), measure.within
     longest = math.inf if within is None else float(within)
-    stays = run.stays(measure.truth)
-    spans = [(start, start - before, min(end, start + longest)) for start, end in stays]
+    intervals = run.dwell_intervals(measure.truth)
+    spans = [(start, start - before, min(end, start + longest)) for start, end in intervals]
     times = run.times_of(measure.event)
-    detections = _inside(times, window)
+    detections = _times_within(times, window)
     counted = [s for s in spans if window is not None and window[0] <= s[0] <= window[1]]
-    free = list(times)
+    unmatched = list(times)
     delays: list[float] = []
     firsts: list[float | None] = []
     for start, low, high in counted:
-        taken = next((time for time in free if low <= time <= high), None)
-        firsts.append(None if taken is None else taken - start)
-        if taken is not None:
-            free.remove(taken)
-            delays.append(taken - start)
-    near = [(start - before, end + before) for start, end in stays]
+        detection = next((time for time in unmatched if low <= time <= high), None)
+        firsts.append(None if detection is None else detection - start)
+        if detection is not None:
+            unmatched.remove(detection)
+            delays.append(detection - start)
+    near = [(start - before, end + before) for start, end in intervals]
     false = sum(not any(low <= t <= high for low, high in near) for t in detections)
     name = measure.name
     return {
@@ -111,23 +113,23 @@ def _match(measure: MatchMeasure, run: Observation, window: Window) -> dict[str,
     }
 
 
-def _signal(measure: SignalMeasure, run: Observation, window: Window) -> Cell:
+def _measure_signal(measure: SignalMeasure, run: Observation, window: Window) -> Cell:
     if window is None:
         return None
-    kept = (run.times >= window[0]) & (run.times <= window[1])
-    return signal_number(measure, run.times[kept], run.signals[measure.signal][kept])
+    inside = (run.times >= window[0]) & (run.times <= window[1])
+    return evaluate_signal(measure, run.times[inside], run.signals[measure.signal][inside])
 
 
-def _value(measure: ValueMeasure, found: Mapping[str, Cell]) -> Cell:
+def _measure_value(measure: ValueMeasure, cells: Mapping[str, Cell]) -> Cell:
     """Return an expression of measures; None where it reads one that has no value."""
     read: dict[str, float] = {}
     for name in dict.fromkeys(measure.formula.reads):
-        cell = found[name]
+        cell = cells[name]
         if cell is None or isinstance(cell, list):
             return None
         read[name] = cell if isinstance(cell, bool) else float(cell)
-    known = {name: Ref(name) for name in read}
+    operands = {name: Ref(name) for name in read}
     if measure.is_truth:
-        return bool(evaluate(expression(measure.formula.tree, known), read))
-    value = float(evaluate(assigned(measure.formula.tree, known, False), read))
+        return bool(evaluate(lower_expression(measure.formula.tree, operands), read))
+    value = float(evaluate(lower_assigned_value(measure.formula.tree, operands, False), read))
     return value if math.isfinite(value) else None

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.batch import NO_EVENT, BatchResult, EventKind
-from language.event_name import EventName
+from language.event_name import ModeEntryEvent
 
 Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Happening:
+class ModeChange:
     """A transition at a time [s] between two modes."""
 
     time: float
@@ -30,39 +30,41 @@ class Observation:
     `times` [s] and signals end where the run stopped; `horizon` [s] is where it should have.
     """
 
-    happenings: Mapping[tuple[str, str], Sequence[Happening]]
+    mode_changes: Mapping[tuple[str, str], Sequence[ModeChange]]
     times: Reals
     signals: Mapping[str, Reals]
     horizon: float
 
-    def times_of(self, event: EventName) -> list[float]:
+    def times_of(self, event: ModeEntryEvent) -> list[float]:
         """Return when an event happened [s]."""
         return [
             happening.time
-            for happening in self.happenings.get((event.instance, event.region), ())
+            for happening in self.mode_changes.get((event.instance, event.region), ())
             if happening.target == event.target and event.source in ("", happening.source)
         ]
 
-    def stays(self, event: EventName) -> list[tuple[float, float]]:
+    def dwell_intervals(self, event: ModeEntryEvent) -> list[tuple[float, float]]:
         """Return from when to when [s] the mode of an event was active, for each event."""
-        found = []
-        line = self.happenings.get((event.instance, event.region), ())
-        for place, happening in enumerate(line):
+        intervals = []
+        changes = self.mode_changes.get((event.instance, event.region), ())
+        for place, happening in enumerate(changes):
             if happening.target == event.target and event.source in ("", happening.source):
-                later = (other.time for other in line[place + 1 :] if other.source == event.target)
-                found.append((happening.time, next(later, self.horizon)))
-        return found
+                later = (
+                    other.time for other in changes[place + 1 :] if other.source == event.target
+                )
+                intervals.append((happening.time, next(later, self.horizon)))
+        return intervals
 
 
-def observed(result: BatchResult, variant: int, horizon: float) -> Observation:
+def observe_variant(result: BatchResult, variant: int, horizon: float) -> Observation:
     """Return one variant of a batch."""
-    line: dict[tuple[str, str], list[Happening]] = {}
+    mode_changes: dict[tuple[str, str], list[ModeChange]] = {}
     for place, time in zip(result.event_kinds[variant], result.event_times[variant], strict=True):
         if place == NO_EVENT:
             break
         kind: EventKind = result.kinds[place]
         if kind.kind == "transition":
-            where = line.setdefault((kind.instance, kind.region), [])
-            where.append(Happening(float(time), kind.source, kind.target))
+            where = mode_changes.setdefault((kind.instance, kind.region), [])
+            where.append(ModeChange(float(time), kind.source, kind.target))
     signals = {name: values[variant] for name, values in result.outputs.items()}
-    return Observation(line, result.times, signals, horizon)
+    return Observation(mode_changes, result.times, signals, horizon)

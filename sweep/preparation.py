@@ -9,18 +9,18 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from engine.starting import programs_of
-from engine.stimulus import resolved
+from engine.stimulus import resolve_recording
 from language.experiment import Scenario
 from language.printing import digest as program_digest
-from sweep.sampling_reader import LARGEST_SEED, MOST_POINTS
-from sweep.study import Course, Kind, Study, points_each
+from sweep.sampling_reader import MAX_POINTS, MAX_SEED
+from sweep.study import ScenarioBinding, Study, SystemVariant, design_group_size
 from sweep.study_reader import signals_of
 
-FORMAT = 2
+STORE_FORMAT = 2
 """Form of the results: those of another one are not continued."""
 
 
-def prepared(study: Study) -> Study:
+def prepare_study(study: Study) -> Study:
     """Return a study that needs its files no longer, with the digest of every Program.
 
     Raises SpecError: for what is wrong with a recording, or a Program that cannot be made.
@@ -29,29 +29,29 @@ def prepared(study: Study) -> Study:
     identity = dict(study.identity)
     identity["sampling"] = " ".join(str(value) for value in vars(sampling).values())
     kinds = []
-    for kind in study.kinds:
+    for kind in study.system_variants:
         courses = {}
-        for name, course in kind.courses.items():
-            scenario = _rows(study, resolved(kind.system, course.scenario))
-            courses[name] = Course(scenario, course.document)
+        for name, course in kind.scenario_bindings.items():
+            scenario = _with_row_period(study, resolve_recording(kind.system, course.scenario))
+            courses[name] = ScenarioBinding(scenario, course.document)
             identity |= _recording_digest(name, scenario)
-        kinds.append(Kind(kind.name, kind.system, courses))
-    made = dataclasses.replace(study, kinds=tuple(kinds))
+        kinds.append(SystemVariant(kind.name, kind.system, courses))
+    made = dataclasses.replace(study, system_variants=tuple(kinds))
     return dataclasses.replace(made, identity={**identity, **program_digests(made)})
 
 
 def program_digests(study: Study) -> dict[str, str]:
     """Return the digest of every Program of a prepared study, by what it is of."""
     found = {}
-    for kind in study.kinds:
-        for name, course in kind.courses.items():
+    for kind in study.system_variants:
+        for name, course in kind.scenario_bindings.items():
             for instance, program in programs_of(kind.system, course.scenario).items():
                 key = f"Program of `{instance}` in variant `{kind.name}`, scenario `{name}`"
                 found[key] = program_digest(program)
     return found
 
 
-def resampled(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
+def resample_study(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
     """Return a study with another number of drawn points, or another seed.
 
     Raises ValueError for what the file of a study could not say either.
@@ -59,25 +59,27 @@ def resampled(study: Study, samples: int | None = None, seed: int | None = None)
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:
         raise ValueError(f"`{study.name}` draws nothing: it has no samples and no seed")
-    if samples is not None and not 1 <= samples <= MOST_POINTS:
-        raise ValueError(f"{samples} samples are not from 1 to {MOST_POINTS}")
-    if seed is not None and not 0 <= seed <= LARGEST_SEED:
-        raise ValueError(f"the seed {seed} is not from 0 to {LARGEST_SEED}")
-    each = points_each(old.method, len(study.drawn))
+    if samples is not None and not 1 <= samples <= MAX_POINTS:
+        raise ValueError(f"{samples} samples are not from 1 to {MAX_POINTS}")
+    if seed is not None and not 0 <= seed <= MAX_SEED:
+        raise ValueError(f"the seed {seed} is not from 0 to {MAX_SEED}")
+    each = design_group_size(old.method, len(study.random_variables))
     count = old.count if samples is None else samples * each
     new = dataclasses.replace(old, count=count, seed=old.seed if seed is None else seed)
     made = dataclasses.replace(study, sampling=new)
-    if made.count > MOST_POINTS:
-        raise ValueError(f"the study would have {made.count} variants; at most {MOST_POINTS}")
+    if made.count > MAX_POINTS:
+        raise ValueError(f"the study would have {made.count} variants; at most {MAX_POINTS}")
     return made
 
 
 def digest_of(identity: Mapping[str, str]) -> str:
     """Return the SHA-256 of all that results depend on."""
-    return hashlib.sha256(json.dumps([FORMAT, dict(sorted(identity.items()))]).encode()).hexdigest()
+    return hashlib.sha256(
+        json.dumps([STORE_FORMAT, dict(sorted(identity.items()))]).encode()
+    ).hexdigest()
 
 
-def _rows(study: Study, scenario: Scenario) -> Scenario:
+def _with_row_period(study: Study, scenario: Scenario) -> Scenario:
     """Return the scenario with the rows that the study asks for; two where it reads no signal."""
     assert scenario.horizon is not None
     every = study.every or scenario.every

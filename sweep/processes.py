@@ -15,11 +15,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from sweep.block import Block
-from sweep.executor import Finished
+from sweep.executor import BlockResult
 from sweep.study import Study
-from sweep.worker import receive, send
+from sweep.worker import receive_message, send_message
 
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 """Workers that may die of one block."""
 
 
@@ -28,13 +28,13 @@ class WorkerError(Exception):
 
 
 @dataclass(frozen=True)
-class Processes:
+class ProcessExecutor:
     """`count` processes that are started by `command`, see sweep/worker.py."""
 
     count: int
     command: Sequence[str]
 
-    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
         """Yield each block as it is finished; closing the iterator ends all processes."""
         pool = _Pool(study, self.command, deque(blocks))
         try:
@@ -50,16 +50,16 @@ class _Pool:
     study: Study
     command: Sequence[str]
     waiting: deque[Block]
-    answers: queue.Queue[Finished | BaseException | None] = field(default_factory=queue.Queue)
+    answers: queue.Queue[BlockResult | BaseException | None] = field(default_factory=queue.Queue)
     running: list[subprocess.Popen[bytes]] = field(default_factory=list)
     deaths: dict[Block, int] = field(default_factory=dict)
     lock: threading.Lock = field(default_factory=threading.Lock)
-    is_over: bool = False
+    is_stopped: bool = False
 
-    def results(self, count: int) -> Iterator[Finished]:
+    def results(self, count: int) -> Iterator[BlockResult]:
         count = max(1, min(count, len(self.waiting)))
         for _ in range(count):
-            threading.Thread(target=self._look_after, daemon=True).start()
+            threading.Thread(target=self._serve_process, daemon=True).start()
         ended = 0
         while ended < count:
             answer = self.answers.get()
@@ -73,43 +73,43 @@ class _Pool:
     def stop(self) -> None:
         """End all processes now."""
         with self.lock:
-            self.is_over = True
+            self.is_stopped = True
             running = list(self.running)
         for process in running:
             process.kill()
         for process in running:
             process.wait()
 
-    def _look_after(self) -> None:
+    def _serve_process(self) -> None:
         """Give blocks to one process after another of our own until there are none."""
         process: subprocess.Popen[bytes] | None = None
         try:
             while True:
-                block = self._next()
+                block = self._next_block()
                 if block is None:
                     break
                 try:
-                    process = process or self._started()
-                    self._one(process, block)
+                    process = process or self._start_process()
+                    self._compute_block(process, block)
                 except (EOFError, OSError):
                     if process is not None:
-                        _end(process)
+                        _close_process(process)
                     process = None
-                    self._died(block)
+                    self._retry_block(block)
         except BaseException as error:
             self.answers.put(error)
         finally:
             if process is not None:
-                _end(process)
+                _close_process(process)
             self.answers.put(None)
 
-    def _next(self) -> Block | None:
+    def _next_block(self) -> Block | None:
         with self.lock:
-            return self.waiting.popleft() if self.waiting and not self.is_over else None
+            return self.waiting.popleft() if self.waiting and not self.is_stopped else None
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start_process(self) -> subprocess.Popen[bytes]:
         with self.lock:
-            if self.is_over:
+            if self.is_stopped:
                 raise EOFError
             pipe = subprocess.PIPE
             process = subprocess.Popen(
@@ -117,31 +117,31 @@ class _Pool:
             )
             self.running.append(process)
         assert process.stdin
-        send(process.stdin, self.study)
+        send_message(process.stdin, self.study)
         return process
 
-    def _one(self, process: subprocess.Popen[bytes], block: Block) -> None:
+    def _compute_block(self, process: subprocess.Popen[bytes], block: Block) -> None:
         assert process.stdin and process.stdout
-        send(process.stdin, block)
-        answer = receive(process.stdout)
+        send_message(process.stdin, block)
+        answer = receive_message(process.stdout)
         if isinstance(answer, str):
             raise WorkerError(answer)
-        self.answers.put(Finished(block, file=answer))
+        self.answers.put(BlockResult(block, file=answer))
 
-    def _died(self, block: Block) -> None:
+    def _retry_block(self, block: Block) -> None:
         """Give the block to another worker, at most three times."""
         with self.lock:
-            if self.is_over:
+            if self.is_stopped:
                 return
             self.deaths[block] = self.deaths.get(block, 0) + 1
-            if self.deaths[block] < MOST_DEATHS:
+            if self.deaths[block] < MAX_DEATHS:
                 self.waiting.append(block)
                 return
-        reason = f"{MOST_DEATHS} worker processes died while they computed it"
-        self.answers.put(Finished(block, lost=reason))
+        reason = f"{MAX_DEATHS} worker processes died while they computed it"
+        self.answers.put(BlockResult(block, lost_reason=reason))
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _close_process(process: subprocess.Popen[bytes]) -> None:
     """Close the input of a process, which ends it."""
     with contextlib.suppress(OSError):
         if process.stdin:

@@ -7,66 +7,66 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
 
-from language.document import Node, Scalar
+from language.document import ScalarNode, YamlNode
 from language.reader import Reader
-from sweep.study import LEVELS, Distribution, Sampling, Varied, points_each
+from sweep.study import MORRIS_LEVELS, Distribution, Sampling, SweepVariable, design_group_size
 
 METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
-MOST_POINTS = 10_000_000
+MAX_POINTS = 10_000_000
 """Most variants of a study: at 10 000 per second a quarter of an hour, 2 GB of results."""
-LARGEST_SEED = 2**31 - 1
+MAX_SEED = 2**31 - 1
 
 
 class SamplingReader(Reader):
     """How points are drawn; what contradicts `vary` is reported."""
 
-    def sampling(self, node: Node | None, varied: Sequence[Varied]) -> Sampling:
+    def sampling(self, node: YamlNode | None, varied: Sequence[SweepVariable]) -> Sampling:
         """Return what the section says of what varies."""
-        drawn = [each for each in varied if each.is_drawn]
-        if node is None or isinstance(node, Scalar):
-            return self._no_draw(node, drawn)
-        told = len(self.problems.found)
-        table = self.table(node, "sampling", (*METHODS, "seed"))
+        drawn = [each for each in varied if each.is_random]
+        if node is None or isinstance(node, ScalarNode):
+            return self._grid_sampling(node, drawn)
+        problem_count = len(self.problems.reported)
+        table = self.read_mapping(node, "sampling", (*METHODS, "seed"))
         methods = [key for key in table.entries if key in METHODS]
         if len(methods) != 1:
             label = f"`sampling` has one of {', '.join(METHODS)}"
-            if len(self.problems.found) == told:
+            if len(self.problems.reported) == problem_count:
                 self.problems.error("form", node.span, label, "like `{sobol: 256, seed: 1}`")
             return Sampling()
         method = methods[0]
         place = table.entries[method]
-        count = self.whole(place.node, method, 1, 1, MOST_POINTS)
+        count = self.read_integer(place.node, method, 1, 1, MAX_POINTS)
         if not drawn and not self.problems.has_errors:
             label = "nothing in `vary` is drawn: `sampling` has no work"
             self.problems.error("form", place.span, label, "`replicates` repeats with other noise")
-        unbalanced = balance_fault(method, count)
+        unbalanced = find_imbalance(method, count)
         if unbalanced:
             self.problems.warning("sampling", place.node.span, *unbalanced)
         for each in drawn if method == "morris" else ():
-            self._missed(each)
-        seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
-        count *= points_each(method, len(drawn))
+            self._warn_unreached_choices(each)
+        seed = self.read_integer(table.get("seed"), "seed", 0, 0, MAX_SEED)
+        count *= design_group_size(method, len(drawn))
         return Sampling(method, count, seed)  # type: ignore[arg-type]
 
-    def _missed(self, drawn: Varied) -> None:
+    def _warn_unreached_choices(self, variable: SweepVariable) -> None:
         """Warn of values of a choice that no level of a path draws."""
-        course = drawn.course
+        course = variable.distribution
         if not isinstance(course, Distribution) or course.shape != "choice":
             return
         ends = list(accumulate(course.weights or [1.0] * len(course.numbers)))
-        levels = [(k + 0.5) / LEVELS * ends[-1] for k in range(LEVELS)]
+        levels = [(k + 0.5) / MORRIS_LEVELS * ends[-1] for k in range(MORRIS_LEVELS)]
         reached = {bisect_right(ends[:-1], level) for level in levels}
         missed = len(course.numbers) - len(reached)
         if missed:
             words = "1 value" if missed == 1 else f"{missed} values"
-            label = (
-                f"paths of Morris draw {words} of `{drawn.name}` never: {LEVELS} levels see shares"
-            )
+            label = f"paths of Morris draw {words} of `{variable.name}` never: {MORRIS_LEVELS} levels see shares"
             hint = "weights that are more alike, or `saltelli`"
-            self.problems.warning("sampling", drawn.span, f"{label} of {1 / LEVELS:g} each", hint)
+            self.problems.warning(
+                "sampling", variable.span, f"{label} of {1 / MORRIS_LEVELS:g} each", hint
+            )
 
-    def _no_draw(self, node: Node | None, drawn: Sequence[Varied]) -> Sampling:
-        word = self.choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
+    def _grid_sampling(self, node: YamlNode | None, drawn: Sequence[SweepVariable]) -> Sampling:
+        word = self.read_choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
         if drawn:
             first = drawn[0]
             label = f"`{first.name}` is drawn, and `sampling` does not say how many points"
@@ -75,7 +75,7 @@ class SamplingReader(Reader):
         return Sampling(one_at_a_time=word == "one_at_a_time")
 
 
-def balance_fault(method: str, count: int) -> tuple[str, str] | None:
+def find_imbalance(method: str, count: int) -> tuple[str, str] | None:
     """Return what is wrong with a number of points of a sequence, and what helps; None: nothing."""
     if method not in ("sobol", "saltelli") or not count & (count - 1):
         return None

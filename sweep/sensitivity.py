@@ -16,24 +16,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.design import STRIDE, morris_shares
+from sweep.design import STRIDE, morris_points
 from sweep.interval import Interval
-from sweep.manifest import Design, refused
-from sweep.measure import Column
-from sweep.moments import scaled
+from sweep.manifest import Design, store_error
+from sweep.measure import StoreColumn
+from sweep.moments import scale_to_squarable
 from sweep.store import Store
-from sweep.study import LEVELS
+from sweep.study import MORRIS_LEVELS
 from sweep.summary import group_values
-from sweep.table import Reals, Table
+from sweep.table import Reals, StudyTable
 
-REPLICATES = 500
+BOOTSTRAP_REPLICATES = 500
 """Of the bootstrap: the ends of an interval at 95 % stand on a dozen of them each."""
-SEED = 1
-AT_ONCE = 1 << 17
+BOOTSTRAP_SEED = 1
+MAX_RESAMPLED = 1 << 17
 """Numbers that are drawn again at once: as many as a cache holds."""
-FEWEST = 4
+MIN_COMPLETE = 4
 """Complete blocks or paths below which nothing is told."""
-NAMES = {"saltelli": ("first", "total"), "morris": ("mu_star", "mu", "sigma")}
+INDEX_NAMES = {"saltelli": ("first", "total"), "morris": ("mu_star", "mu", "sigma")}
 """The indices of a design."""
 
 
@@ -77,7 +77,7 @@ class Sensitivity:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         groups = list(self.indices[0].group) if self.indices else []
-        names = NAMES[self.method]
+        names = INDEX_NAMES[self.method]
         ends = [f"{name}_{end}" for name in names for end in ("from", "to")]
         writer.writerow([*groups, "measure", "unit", "name", *names, *ends, "used", "count"])
         for one in self.indices:
@@ -89,12 +89,12 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Group:
+class DesignGroup:
     """What has a design of its own: its names, its variants (n_variants,), and what moved there."""
 
-    named: Mapping[str, str]
-    chosen: NDArray[np.bool_]
-    moved: frozenset[str]
+    labels: Mapping[str, str]
+    mask: NDArray[np.bool_]
+    varying: frozenset[str]
 
 
 def sensitivity_of(store: Store) -> Sensitivity:
@@ -103,14 +103,14 @@ def sensitivity_of(store: Store) -> Sensitivity:
     if not design.has_indices:
         label = f"the points of `{manifest.study}` are no design of which indices are made"
         hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
-        raise refused(store.folder, "store", label, hint)
-    table = Table(store)
-    groups = list(_groups(table, design))
+        raise store_error(store.folder, "store", label, hint)
+    table = StudyTable(store)
+    groups = list(_design_groups(table, design))
     found = [
         index
         for column in manifest.measures
         if column.type != "list"
-        for index in _of_measure(table, design, column, groups)
+        for index in _measure_indices(table, design, column, groups)
     ]
     return Sensitivity(
         study=manifest.study,
@@ -144,86 +144,96 @@ def morris_indices(effects: Reals) -> dict[str, Reals]:
         }
 
 
-def elementary_effects(results: Reals, shares: Reals) -> Reals:
+def elementary_effects(results: Reals, points: Reals) -> Reals:
     """Return effects (n, d) of results (n, d + 1) at shares (n, d + 1, d) of paths.
 
     Each step changes the share of one thing by the stride, whatever becomes of its value: one that
     draws the same value again has no effect.
     """
-    moved = np.diff(shares, axis=1)
+    moved = np.diff(points, axis=1)
     changed = np.argmax(np.abs(moved), axis=2)
     sign = np.sign(np.take_along_axis(moved, changed[:, :, None], axis=2)[:, :, 0])
     found = np.full(changed.shape, np.nan)
     with np.errstate(over="ignore", invalid="ignore"):
-        steps = sign * np.diff(results, axis=1) * LEVELS / STRIDE
+        steps = sign * np.diff(results, axis=1) * MORRIS_LEVELS / STRIDE
     np.put_along_axis(found, changed, steps, axis=1)
     return found
 
 
-def _of_measure(
-    table: Table, design: Design, column: Column, groups: Iterable[Group]
+def _measure_indices(
+    table: StudyTable, design: Design, column: StoreColumn, groups: Iterable[DesignGroup]
 ) -> Iterator[Index]:
     """Yield the indices of a measure in each group: variant, scenario, point of the grid."""
     size = len(design.names)
-    samples = table.reals("sample").astype(np.int64)
-    values = np.where(table.is_done, table.reals(column.name), np.nan)
+    samples = table.read_reals("sample").astype(np.int64)
+    values = np.where(table.is_done, table.read_reals(column.name), np.nan)
     confidence = table.store.manifest.presentation.confidence
     for group in groups:
-        chosen = group.chosen
-        results = _at(samples[chosen], values[chosen], design)
+        chosen = group.mask
+        results = _arrange_results(samples[chosen], values[chosen], design)
         fine = np.flatnonzero(~np.isnan(results).any(axis=1))
-        used, _ = scaled(results[fine])  # shares of a variance have no unit
+        used, _ = scale_to_squarable(results[fine])  # shares of a variance have no unit
         estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
         if design.method == "morris":
-            numbers = (fine[:, None] * design.each + np.arange(design.each)).reshape(-1)
-            shares = morris_shares(size, numbers, design.seed)
-            shares = shares.reshape(len(fine), design.each, size)
+            numbers = (fine[:, None] * design.group_size + np.arange(design.group_size)).reshape(-1)
+            shares = morris_points(size, numbers, design.seed)
+            shares = shares.reshape(len(fine), design.group_size, size)
             used = elementary_effects(results[fine], shares)
             estimate = morris_indices
-        found = {name: np.full(size, np.nan) for name in NAMES[design.method]}
+        found = {name: np.full(size, np.nan) for name in INDEX_NAMES[design.method]}
         ends: dict[str, tuple[Reals, Reals]] = {}
-        if len(used) >= FEWEST:
-            found, ends = estimate(used), _intervals(used, estimate, confidence)
+        if len(used) >= MIN_COMPLETE:
+            found, ends = estimate(used), _bootstrap_intervals(used, estimate, confidence)
         for place, name in enumerate(design.names):
             own: dict[str, float] = dict.fromkeys(found, np.nan)
             sure: dict[str, Interval] = dict.fromkeys(found)
-            if name in group.moved:
+            if name in group.varying:
                 own = {key: float(numbers[place]) for key, numbers in found.items()}
                 sure |= {
-                    key: _interval(low[place], high[place]) for key, (low, high) in ends.items()
+                    key: _finite_interval(low[place], high[place])
+                    for key, (low, high) in ends.items()
                 }
             yield Index(
-                group.named, column.name, column.unit, name, own, sure, len(used), design.planned
+                group.labels,
+                column.name,
+                column.unit,
+                name,
+                own,
+                sure,
+                len(used),
+                design.group_count,
             )
 
 
-def _has_moved(drawn: Reals) -> bool:
+def _is_varying(values: Reals) -> bool:
     """Tell whether drawn values (n,) are not all one: of what never changed nothing is known."""
-    return len(drawn) > 0 and float(np.min(drawn)) < float(np.max(drawn))
+    return len(values) > 0 and float(np.min(values)) < float(np.max(values))
 
 
-def _interval(low: float, high: float) -> Interval:
+def _finite_interval(low: float, high: float) -> Interval:
     """Return an interval, None where an end is no number."""
     return (float(low), float(high)) if np.isfinite(low) and np.isfinite(high) else None
 
 
-def _at(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:
+def _arrange_results(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:
     """Return values (n, each) by their place in the design, the mean over all replicates."""
     total = np.bincount(samples, values, design.count)
     times = np.bincount(samples, minlength=design.count)
     means = total / np.where(times == design.replicates, times, np.nan)
-    return np.asarray(means.reshape(-1, design.each))
+    return np.asarray(means.reshape(-1, design.group_size))
 
 
-def _groups(table: Table, design: Design) -> Iterator[Group]:
+def _design_groups(table: StudyTable, design: Design) -> Iterator[DesignGroup]:
     """Yield what has a design of its own: told by name where there are several."""
-    drawn = {name: table.reals(name) for name in design.names}
-    for named, chosen in _chosen(table, design):
-        moved = {name for name, values in drawn.items() if _has_moved(values[chosen])}
-        yield Group(named, chosen, frozenset(moved))
+    drawn = {name: table.read_reals(name) for name in design.names}
+    for named, chosen in _group_masks(table, design):
+        moved = {name for name, values in drawn.items() if _is_varying(values[chosen])}
+        yield DesignGroup(named, chosen, frozenset(moved))
 
 
-def _chosen(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
+def _group_masks(
+    table: StudyTable, design: Design
+) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
     """Yield the names of each group, and which variants (n_variants,) are its own."""
     axes = [c.name for c in table.store.manifest.varied if c.name not in design.names]
     keys = {name: group_values(table, name) for name in ("variant", "scenario", *axes)}
@@ -237,15 +247,17 @@ def _chosen(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDAr
         yield named, np.all(stacked == row, axis=1)
 
 
-def _intervals(
-    used: Reals, estimate: Callable[[Reals], dict[str, Reals]], confidence: float
+def _bootstrap_intervals(
+    samples: Reals, estimate: Callable[[Reals], dict[str, Reals]], confidence: float
 ) -> dict[str, tuple[Reals, Reals]]:
     """Return the ends (d,) of the intervals of indices: whole blocks or paths are drawn again."""
-    source, count = np.random.default_rng(SEED), len(used)
-    size = max(1, AT_ONCE // used.size)
+    source, count = np.random.default_rng(BOOTSTRAP_SEED), len(samples)
+    size = max(1, MAX_RESAMPLED // samples.size)
     drawn = [
-        estimate(used[source.integers(0, count, (min(size, REPLICATES - first), count))])
-        for first in range(0, REPLICATES, size)
+        estimate(
+            samples[source.integers(0, count, (min(size, BOOTSTRAP_REPLICATES - first), count))]
+        )
+        for first in range(0, BOOTSTRAP_REPLICATES, size)
     ]
     rest = (1.0 - confidence) / 2.0
     found = {}

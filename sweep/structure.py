@@ -8,21 +8,21 @@ from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
-from language.document import Entry, Node, Scalar, Table
+from language.document import Entry, MappingNode, ScalarNode, YamlNode
 from language.experiment import Scenario, System
 from language.project import Project
 from language.scenario import read_scenario
-from language.tree import at, put
-from sweep.study import NANOSECONDS, Course, Target
+from language.tree import find_node, put_node
+from sweep.study import TIME_DECIMALS, ScenarioBinding, Target
 
-Values = Iterable[tuple[Target, float]]
+TargetValues = Iterable[tuple[Target, float]]
 
 
-def structured(system: System, values: Values) -> System:
+def apply_to_system(system: System, values: TargetValues) -> System:
     """Return a system with other stages of sensors, periods, steps and offsets."""
     sensors, instances = dict(system.sensors), dict(system.instances)
     for target, value in values:
-        exact = exact_value(value)
+        exact = exact_fraction(value)
         if target.kind == "sensor":
             name, field = target.path
             sensors[name] = dataclasses.replace(sensors[name], **{field: exact})  # type: ignore[arg-type]
@@ -37,44 +37,46 @@ def structured(system: System, values: Values) -> System:
     return dataclasses.replace(system, sensors=sensors, instances=instances)
 
 
-def stimulated(course: Course, system: System, values: Values) -> Scenario:
+def apply_to_scenario(binding: ScenarioBinding, system: System, values: TargetValues) -> Scenario:
     """Return the scenario with other parts of inputs. Raises SpecError (steps out of order)."""
-    given = [(target, value) for target, value in values if target.kind == "input"]
-    if not given:
-        return course.scenario
-    assert course.document is not None
-    root = course.document.root
-    for target, value in given:
-        root = _with_part(root, target, value, system)
-    document = dataclasses.replace(course.document, root=root)
+    input_values = [(target, value) for target, value in values if target.kind == "input"]
+    if not input_values:
+        return binding.scenario
+    assert binding.document is not None
+    root = binding.document.root
+    for target, value in input_values:
+        root = _with_input_part(root, target, value, system)
+    document = dataclasses.replace(binding.document, root=root)
     found = read_scenario(document, Project(Path()), system)
-    kept = course.scenario
+    kept = binding.scenario
     return dataclasses.replace(
         kept, inputs=found.inputs, horizon=kept.horizon, seed=kept.seed, initial=kept.initial
     )
 
 
-def _with_part(root: Table, target: Target, value: float, system: System) -> Table:
+def _with_input_part(
+    root: MappingNode, target: Target, value: float, system: System
+) -> MappingNode:
     name, *part = target.path
     is_time = target.is_input_time
-    value = round(value, NANOSECONDS) if is_time else value
+    value = round(value, TIME_DECIMALS) if is_time else value
     unit = "s" if is_time else str(system.inputs[name].unit.dimension)
-    text = f"{decimal(value)} {unit}" if unit != "1" else decimal(value)
-    node = at(root, ("inputs", name))
+    text = f"{format_decimal(value)} {unit}" if unit != "1" else format_decimal(value)
+    node = find_node(root, ("inputs", name))
     assert node is not None
     if part and part[0] in ("steps", "table", "times"):
-        assert isinstance(node, Table)
+        assert isinstance(node, MappingNode)
         form = "steps" if node.get("steps") is not None else "table"
         table = node.get(form)
-        assert isinstance(table, Table)
+        assert isinstance(table, MappingNode)
         changed = _with_point(table, int(part[1]), text, part[0] == "times")
-        return put(root, ("inputs", name, form), changed)
-    inner = at(root, ("inputs", name, *part))
+        return put_node(root, ("inputs", name, form), changed)
+    inner = find_node(root, ("inputs", name, *part))
     assert inner is not None
-    return put(root, ("inputs", name, *part), Scalar(text, inner.span))
+    return put_node(root, ("inputs", name, *part), ScalarNode(text, inner.span))
 
 
-def _with_point(table: Table, number: int, text: str, is_time: bool) -> Table:
+def _with_point(table: MappingNode, number: int, text: str, is_time: bool) -> MappingNode:
     """Return steps or points of a table in which the n-th has another time or value."""
     made: dict[str, Entry] = {}
     for place, entry in enumerate(table, start=1):
@@ -83,18 +85,18 @@ def _with_point(table: Table, number: int, text: str, is_time: bool) -> Table:
             key = text if is_time else key
             node = node if is_time else _scalar(node, text)
         made[key] = Entry(key, entry.span, node)
-    return Table(made, table.span)
+    return MappingNode(made, table.span)
 
 
-def _scalar(node: Node, text: str) -> Scalar:
-    return Scalar(text, node.span)
+def _scalar(node: YamlNode, text: str) -> ScalarNode:
+    return ScalarNode(text, node.span)
 
 
-def decimal(value: float) -> str:
+def format_decimal(value: float) -> str:
     """Return the shortest decimal of a number, without an exponent: as the language reads it."""
     return format(Decimal(repr(value)), "f")
 
 
-def exact_value(value: float) -> Fraction:
+def exact_fraction(value: float) -> Fraction:
     """Return the shortest decimal of a number, exactly: 0.001 is 1/1000."""
-    return Fraction(decimal(value))
+    return Fraction(format_decimal(value))

@@ -15,12 +15,12 @@ from language.units import Unit
 from sweep.description import Description
 from sweep.measure import Measure
 
-Method = Literal["random", "latin_hypercube", "sobol", "saltelli", "morris"]
+SamplingMethod = Literal["random", "latin_hypercube", "sobol", "saltelli", "morris"]
 TargetKind = Literal["parameter", "initial", "input", "sensor", "clock"]
 Shape = Literal["uniform", "log_uniform", "normal", "lognormal", "choice"]
 
 
-NANOSECONDS = 9
+TIME_DECIMALS = 9
 """Decimals of a drawn time [s] in an input: so all times of a run are multiples of one tick."""
 
 
@@ -63,7 +63,7 @@ class Distribution:
 
 
 @dataclass(frozen=True)
-class Varied:
+class SweepVariable:
     """Something that varies: `targets` is empty for a name that only `set` reads.
 
     `words` are the values of an enumeration; values are in SI, `unit` is the one they are written
@@ -71,16 +71,16 @@ class Varied:
     """
 
     name: str
-    course: Axis | Distribution
+    distribution: Axis | Distribution
     targets: tuple[Target, ...]
     unit: Unit
     span: Span
     words: tuple[str, ...] = ()
 
     @property
-    def is_drawn(self) -> bool:
+    def is_random(self) -> bool:
         """Tell whether values are drawn, not taken from a list."""
-        return isinstance(self.course, Distribution)
+        return isinstance(self.distribution, Distribution)
 
 
 @dataclass(frozen=True)
@@ -102,14 +102,14 @@ class Sampling:
     `one_at_a_time`: instead of the product of the axes, each value with all others left alone.
     """
 
-    method: Method = "random"
+    method: SamplingMethod = "random"
     count: int = 0
     seed: int = 0
     one_at_a_time: bool = False
 
 
 @dataclass(frozen=True)
-class Course:
+class ScenarioBinding:
     """A scenario as one system reads it; `document` is there where parts of inputs vary."""
 
     scenario: Scenario
@@ -117,17 +117,17 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Kind:
+class SystemVariant:
     """One of the variants of a study: a system with the study's scenarios for it."""
 
     name: str
     system: System
-    courses: Mapping[str, Course] = field(repr=False)
+    scenario_bindings: Mapping[str, ScenarioBinding] = field(repr=False)
 
 
-LEAST_SURE, MOST_SURE = 0.5, 0.999999
+MIN_CONFIDENCE, MAX_CONFIDENCE = 0.5, 0.999999
 """Shares that a confidence is between: of less an interval is empty, of more without end."""
-LEVELS = 4
+MORRIS_LEVELS = 4
 """Of each thing that varies in a path of Morris: the middles of so many equal shares."""
 
 
@@ -149,9 +149,9 @@ class Study:
     """
 
     name: str
-    kinds: tuple[Kind, ...]
+    system_variants: tuple[SystemVariant, ...]
     scenarios: tuple[str, ...]
-    varied: tuple[Varied, ...]
+    variables: tuple[SweepVariable, ...]
     settings: tuple[Setting, ...]
     sampling: Sampling
     replicates: int
@@ -163,19 +163,23 @@ class Study:
     description: Description = field(default_factory=dict)
 
     @property
-    def axes(self) -> tuple[Varied, ...]:
+    def grid_variables(self) -> tuple[SweepVariable, ...]:
         """What takes its values from a list."""
-        return tuple(varied for varied in self.varied if not varied.is_drawn)
+        return tuple(varied for varied in self.variables if not varied.is_random)
 
     @property
-    def drawn(self) -> tuple[Varied, ...]:
+    def random_variables(self) -> tuple[SweepVariable, ...]:
         """What is drawn."""
-        return tuple(varied for varied in self.varied if varied.is_drawn)
+        return tuple(varied for varied in self.variables if varied.is_random)
 
     @property
     def grid_count(self) -> int:
         """The number of points of the grid, 1 where there are no axes."""
-        sizes = [len(v.course.values) for v in self.axes if isinstance(v.course, Axis)]
+        sizes = [
+            len(v.distribution.values)
+            for v in self.grid_variables
+            if isinstance(v.distribution, Axis)
+        ]
         if self.sampling.one_at_a_time:
             return 1 + sum(sizes)
         total = 1
@@ -188,9 +192,9 @@ class Study:
         """The number of variants."""
         samples = max(1, self.sampling.count)
         shared = self.grid_count * samples * self.replicates
-        return len(self.kinds) * len(self.scenarios) * shared
+        return len(self.system_variants) * len(self.scenarios) * shared
 
 
-def points_each(method: str, dimensions: int) -> int:
+def design_group_size(method: str, dimensions: int) -> int:
     """Return how many points belong together: those of a block or a path; else each is alone."""
     return {"saltelli": dimensions + 2, "morris": dimensions + 1}.get(method, 1)

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 
 from sweep.block import Block
-from sweep.executor import Executor, Finished
+from sweep.executor import BlockResult, Executor
 from sweep.manifest import Manifest, manifest_of
-from sweep.store import Store, locked, open_store, require_own
+from sweep.store import Store, lock_folder, open_store, require_same_study
 from sweep.study import Study
 
 Progress = Callable[[int, int, int], None]
@@ -24,16 +24,16 @@ class StudyRun:
     """The store after a run; `lost` are blocks that could not be computed, with the reason."""
 
     store: Store
-    before: int
+    reused: int
     computed: int
-    lost: tuple[tuple[Block, str], ...] = ()
+    lost_blocks: tuple[tuple[Block, str], ...] = ()
 
 
 def run_study(
     study: Study,
     folder: Path,
     executor: Executor,
-    block: int | None = None,
+    block_size: int | None = None,
     progress: Progress | None = None,
     warn: Warn | None = None,
 ) -> StudyRun:
@@ -41,13 +41,15 @@ def run_study(
 
     Raises SpecError where the folder is of another study, OSError where it cannot be written.
     """
-    return fill(manifest_of(study, block), folder, partial(executor, study), progress, warn)
+    return fill_store(
+        manifest_of(study, block_size), folder, partial(executor, study), progress, warn
+    )
 
 
-def fill(
+def fill_store(
     manifest: Manifest,
     folder: Path,
-    compute: Callable[[Iterable[Block]], Iterator[Finished]],
+    compute: Callable[[Iterable[Block]], Iterator[BlockResult]],
     progress: Progress | None = None,
     warn: Warn | None = None,
 ) -> StudyRun:
@@ -56,28 +58,28 @@ def fill(
     What is damaged is. Raises SpecError where the folder is of something else, OSError where it
     cannot be written.
     """
-    require_own(folder, manifest)  # before anything is made there, a lock too
-    with locked(folder):
+    require_same_study(folder, manifest)  # before anything is made there, a lock too
+    with lock_folder(folder):
         store = open_store(folder, manifest)
         total = manifest.count
-        there = _whole(store, warn or _silent)
-        missing = [each for each in store.manifest.blocks if each.start not in there]
+        complete = _complete_starts(store, warn or _ignore)
+        missing = [each for each in store.manifest.blocks if each.start not in complete]
         before = total - sum(each.stop - each.start for each in missing)
         done, lost = before, []
-        tell = progress or _silent
-        tell(done, before, total)
+        report = progress or _ignore
+        report(done, before, total)
         finished = compute(missing)
         try:
             for part in finished:
-                if part.lost:
-                    lost.append((part.block, part.lost))
+                if part.lost_reason:
+                    lost.append((part.block, part.lost_reason))
                     continue
                 if part.file:
-                    store.keep(part.block, part.file)
+                    store.write_block_file(part.block, part.file)
                 else:
-                    store.write(part.block, part.rows)
+                    store.write_rows(part.block, part.rows)
                 done += part.block.stop - part.block.start
-                tell(done, before, total)
+                report(done, before, total)
         finally:
             close = getattr(finished, "close", None)
             if close:
@@ -85,13 +87,13 @@ def fill(
         return StudyRun(store, before, done - before, tuple(lost))
 
 
-def _whole(store: Store, warn: Warn) -> set[int]:
+def _complete_starts(store: Store, warn: Warn) -> set[int]:
     """Return the starts of the blocks that are there; tell which are damaged."""
-    found = store.found()
+    found = store.scan()
     for path in found.damaged:
         warn(f"{path} is damaged: its variants are computed again")
-    return {block.start for block in found.whole}
+    return {block.start for block in found.complete}
 
 
-def _silent(*told: object) -> None:
+def _ignore(*arguments: object) -> None:
     """Tell nobody."""

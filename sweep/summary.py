@@ -16,22 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.failure import Failure, failures_of
-from sweep.interval import Interval, by_draw, of_mean, of_quantile, of_rate
-from sweep.measure import Column
+from sweep.interval import (
+    Interval,
+    interval_of_mean,
+    interval_of_quantile,
+    interval_of_rate,
+    sum_by_draw,
+)
+from sweep.measure import StoreColumn
 from sweep.moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store import Store
-from sweep.table import Reals, Table, in_unit
+from sweep.table import Reals, StudyTable, to_display_unit
 
-RATES = {"missed": "truths", "first_missed": ""}
+RATE_DENOMINATORS = {"missed": "truths", "first_missed": ""}
 """Parts of a match that are rates: of how many; an empty text: of the variants that have one."""
 
-NUMBERS = ("mean", "deviation", "median", "p5", "p95", "low", "high", "total")
-SHARES = ("hits", "share")
+LINE_FIELDS = ("mean", "deviation", "median", "p5", "p95", "low", "high", "total")
+RATE_FIELDS = ("hits", "share")
 """What a line, and what a rate, has in a table beside its intervals."""
 
 
 @dataclass(frozen=True)
-class Line:
+class SummaryLine:
     """One measure in one group: `count` numbers [unit], and what they are like; NaN: too few.
 
     They come from so many independent `draws`. `mean_interval`, `median_interval` are at the
@@ -82,50 +88,52 @@ class Summary:
     counts: Mapping[str, int]
     failures: tuple[Failure, ...]
     confidence: float
-    lines: tuple[Line, ...]
+    lines: tuple[SummaryLine, ...]
     rates: tuple[Rate, ...]
 
     def csv(self) -> str:
         """Return lines and rates as CSV, numbers in SI; what one of them has not is empty."""
         text = io.StringIO()
-        told: list[Line | Rate] = [*self.lines, *self.rates]
-        groups = list(told[0].group) if told else []
+        entries: list[SummaryLine | Rate] = [*self.lines, *self.rates]
+        groups = list(entries[0].group) if entries else []
         ends = [f"{of}_{end}" for of in ("mean", "median", "share") for end in ("from", "to")]
-        heads = ("measure", "unit", "count", "draws", *NUMBERS, *SHARES, *ends)
+        heads = ("measure", "unit", "count", "draws", *LINE_FIELDS, *RATE_FIELDS, *ends)
         writer = csv.DictWriter(text, (*groups, *heads), restval="", lineterminator="\n")
         writer.writeheader()
         for line in self.lines:
-            own = {name: value for name in NUMBERS if (value := getattr(line, name)) == value}
+            own = {name: value for name in LINE_FIELDS if (value := getattr(line, name)) == value}
             own |= {"measure": line.measure, "unit": line.unit, "count": line.count}
-            own |= _ends("mean", line.mean_interval) | _ends("median", line.median_interval)
+            own |= _interval_columns("mean", line.mean_interval) | _interval_columns(
+                "median", line.median_interval
+            )
             writer.writerow({**line.group, **own, "draws": line.draws})
         for rate in self.rates:
             own = {"measure": rate.measure, "unit": "1", "count": rate.count, "draws": rate.draws}
             own |= {"hits": rate.hits, "share": rate.share if rate.count else ""}
-            writer.writerow({**rate.group, **own, **_ends("share", rate.interval)})
+            writer.writerow({**rate.group, **own, **_interval_columns("share", rate.interval)})
         return text.getvalue()
 
 
-def _ends(name: str, interval: Interval) -> dict[str, float]:
+def _interval_columns(name: str, interval: Interval) -> dict[str, float]:
     return {f"{name}_from": interval[0], f"{name}_to": interval[1]} if interval else {}
 
 
 def summary_of(store: Store) -> Summary:
     """Return the summary of what a store holds so far. Raises SpecError, ToolMissing."""
-    table = Table(store)
+    table = StudyTable(store)
     manifest = store.manifest
     confidence = manifest.presentation.confidence
-    lines: list[Line] = []
+    lines: list[SummaryLine] = []
     rates: list[Rate] = []
-    groups = list(_groups(table))
+    groups = list(_group_masks(table))
     for column in (each for each in manifest.measures if each.type not in ("text", "truth")):
-        pooled = table.pooled(column.name)
+        pooled = table.read_pooled(column.name)
         for name, chosen in groups:
             own = chosen[pooled.rows]
             draws = table.draws[pooled.rows[own]]
-            lines.append(_line(name, column, pooled.values[own], draws, confidence))
+            lines.append(_summarise_column(name, column, pooled.values[own], draws, confidence))
     for column in manifest.measures:
-        rates += _rates(table, column, groups, confidence)
+        rates += _count_rates(table, column, groups, confidence)
     return Summary(
         study=manifest.study,
         digest=manifest.digest,
@@ -138,7 +146,7 @@ def summary_of(store: Store) -> Summary:
     )
 
 
-def _groups(table: Table) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
+def _group_masks(table: StudyTable) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
     """Yield each group that has variants: its names, and which variants (n_variants,) count."""
     keys = [group_values(table, name) for name in group_names(table)]
     for places in itertools.product(*(range(len(names)) for _, names in keys)):
@@ -150,55 +158,55 @@ def _groups(table: Table) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
             yield dict(zip(group_names(table), names, strict=True)), chosen
 
 
-def group_names(table: Table) -> list[str]:
+def group_names(table: StudyTable) -> list[str]:
     """Return what is told apart: what the study says, else variants and scenarios if several."""
     if table.store.manifest.presentation.by:
         return list(table.store.manifest.presentation.by)
-    return [name for name in ("variant", "scenario") if len(table.words(name)[1]) > 1]
+    return [name for name in ("variant", "scenario") if len(table.read_categories(name)[1]) > 1]
 
 
-def group_values(table: Table, name: str) -> tuple[NDArray[np.int64], list[str]]:
+def group_values(table: StudyTable, name: str) -> tuple[NDArray[np.int64], list[str]]:
     """Return the places (n_variants,) of a column in the list of its different values."""
     if name in ("variant", "scenario"):
-        return table.words(name)
+        return table.read_categories(name)
     manifest = table.store.manifest
-    values, places = np.unique(table.reals(name), return_inverse=True)
+    values, places = np.unique(table.read_reals(name), return_inverse=True)
     column = next(column for column in manifest.varied if column.name == name)
     words = manifest.words.get(name)
-    names = [words[int(v)] if words else shown(float(v), column) for v in values]
+    names = [words[int(v)] if words else format_value(float(v), column) for v in values]
     return places.reshape(-1), names
 
 
-def shown(value: float, column: Column) -> str:
+def format_value(value: float, column: StoreColumn) -> str:
     """Return a value [SI] of a column to six digits, with the unit in which it is shown."""
     if math.isnan(value):
         return "-"
-    number = f"{in_unit(value, column):.6g}"
+    number = f"{to_display_unit(value, column):.6g}"
     return number if column.label == "1" else f"{number} {column.label}"
 
 
-def _line(
+def _summarise_column(
     group: Mapping[str, str],
-    column: Column,
+    column: StoreColumn,
     values: Reals,
     draws: NDArray[np.int64],
     confidence: float,
-) -> Line:
+) -> SummaryLine:
     count = len(values)
     ordered = np.sort(values)
     nothing = math.nan
     p5, median, p95 = quantiles_of(ordered, (0.05, 0.5, 0.95)) if count else (nothing,) * 3
-    return Line(
+    return SummaryLine(
         group=group,
         measure=column.name,
         unit=column.unit,
         count=count,
         draws=len(np.unique(draws)),
         mean=mean_of(values) if count else nothing,
-        mean_interval=of_mean(values, draws, confidence),
+        mean_interval=interval_of_mean(values, draws, confidence),
         deviation=deviation_of(values) if count > 1 else nothing,
         median=median,
-        median_interval=of_quantile(values, draws, 0.5, confidence),
+        median_interval=interval_of_quantile(values, draws, 0.5, confidence),
         p5=p5,
         p95=p95,
         low=float(ordered[0]) if count else nothing,
@@ -207,23 +215,23 @@ def _line(
     )
 
 
-def _rates(
-    table: Table,
-    column: Column,
+def _count_rates(
+    table: StudyTable,
+    column: StoreColumn,
     groups: Sequence[tuple[dict[str, str], NDArray[np.bool_]]],
     confidence: float,
 ) -> Iterator[Rate]:
     """Yield how often something is the case; how many truths, how often the first, were missed."""
     base, _, part = column.name.rpartition(".")
-    if column.type != "truth" and part not in RATES:
+    if column.type != "truth" and part not in RATE_DENOMINATORS:
         return
-    hits = table.reals(column.name)
-    whole = RATES.get(part, "") if column.type != "truth" else ""
-    of = table.reals(f"{base}.{whole}") if whole else (hits == hits).astype(np.float64)
+    hits = table.read_reals(column.name)
+    whole = RATE_DENOMINATORS.get(part, "") if column.type != "truth" else ""
+    of = table.read_reals(f"{base}.{whole}") if whole else (hits == hits).astype(np.float64)
     for group, chosen in groups:
         known = chosen & (np.nan_to_num(of) > 0.0)
         draws = table.draws[known]
-        own, sizes = by_draw(hits[known], draws), by_draw(of[known], draws)
+        own, sizes = sum_by_draw(hits[known], draws), sum_by_draw(of[known], draws)
         seen, count = int(np.sum(own)), int(np.sum(sizes))
-        interval = of_rate(own, sizes, confidence)
+        interval = interval_of_rate(own, sizes, confidence)
         yield Rate(group, column.name, seen, count, len(sizes), interval)

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.document import Document, Scalar, Table
+from language.document import Document, MappingNode, ScalarNode
 from language.experiment import System
-from language.kind import Type
+from language.kind import TypeName
 from language.units import Unit, parse_unit
 from sweep.study import Target
 
@@ -22,7 +22,7 @@ CLOCKS = ("period", "step", "offset")
 
 
 @dataclass(frozen=True)
-class Place:
+class TargetInfo:
     """What a name means: where its values go, and what they are.
 
     `is_width`: a difference, which is in no unit with a zero of its own.
@@ -30,20 +30,20 @@ class Place:
 
     targets: tuple[Target, ...]
     unit: Unit
-    type: Type = "real"
+    type: TypeName = "real"
     values: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
     is_width: bool = False
 
 
-def places_of(system: System, scenarios: list[Document]) -> dict[str, Place]:
+def find_targets(system: System, scenarios: list[Document]) -> dict[str, TargetInfo]:
     """Return every place of a system and of the (expanded) scenarios, by name.
 
     A parameter without an instance is that of all instances that have it.
     """
-    found: dict[str, Place] = {}
-    for name, place in (*_parameters(system), *_starts(system), *_sensors(system)):
+    found: dict[str, TargetInfo] = {}
+    for name, place in (*_parameters(system), *_initial_values(system), *_sensors(system)):
         found[name] = place
     for name, place in _clocks(system):
         found[name] = place
@@ -56,7 +56,7 @@ def places_of(system: System, scenarios: list[Document]) -> dict[str, Place]:
             elif found[short].targets[0].kind == "parameter" and "." in name:
                 targets = dict.fromkeys((*found[short].targets, *place.targets))
                 found[short] = dataclasses.replace(found[short], targets=tuple(targets))
-    alone = system.alone
+    alone = system.sole_instance
     for name, place in list(found.items()):
         if alone and name.startswith(f"initial.{alone}."):
             found[f"initial.{name.rpartition('.')[2]}"] = place
@@ -65,30 +65,30 @@ def places_of(system: System, scenarios: list[Document]) -> dict[str, Place]:
     return found
 
 
-def _parameters(system: System) -> Iterator[tuple[str, Place]]:
+def _parameters(system: System) -> Iterator[tuple[str, TargetInfo]]:
     for owner, instance in system.instances.items():
         for name, parameter in instance.automaton.parameters.items():
             if parameter.derived is None and parameter.table is None:
                 target = Target("parameter", (owner, name))
                 limits = parameter.range
                 low, high = map(float, limits) if limits else (None, None)
-                place = Place(
+                place = TargetInfo(
                     (target,), parameter.unit, parameter.type, parameter.values, low, high
                 )
                 yield f"{owner}.{name}", place
 
 
-def _starts(system: System) -> Iterator[tuple[str, Place]]:
+def _initial_values(system: System) -> Iterator[tuple[str, TargetInfo]]:
     for owner, instance in system.instances.items():
         for name, state in instance.automaton.states.items():
             if state.type == "real":
                 yield (
                     f"initial.{owner}.{name}",
-                    Place((Target("initial", (owner, name)),), state.unit),
+                    TargetInfo((Target("initial", (owner, name)),), state.unit),
                 )
 
 
-def _sensors(system: System) -> Iterator[tuple[str, Place]]:
+def _sensors(system: System) -> Iterator[tuple[str, TargetInfo]]:
     for name, sensor in system.sensors.items():
         for path, field in SENSOR_FIELDS.items():
             if getattr(sensor, field):
@@ -97,50 +97,50 @@ def _sensors(system: System) -> Iterator[tuple[str, Place]]:
                     TIME if is_time else Unit(str(sensor.dimension), TIME.factor, sensor.dimension)
                 )
                 target = Target("sensor", (name, field))
-                yield f"{name}.{path}", Place((target,), unit, is_width=True)
+                yield f"{name}.{path}", TargetInfo((target,), unit, is_width=True)
 
 
-def _clocks(system: System) -> Iterator[tuple[str, Place]]:
+def _clocks(system: System) -> Iterator[tuple[str, TargetInfo]]:
     for owner, instance in system.instances.items():
         for clock in CLOCKS:
             is_sampled = instance.automaton.is_sampled
             if clock == "offset" or (clock == "period") == is_sampled:
-                yield f"{owner}.{clock}", Place((Target("clock", (owner, clock)),), TIME)
+                yield f"{owner}.{clock}", TargetInfo((Target("clock", (owner, clock)),), TIME)
 
 
-def _inputs(system: System, document: Document) -> Iterator[tuple[str, Place]]:
+def _inputs(system: System, document: Document) -> Iterator[tuple[str, TargetInfo]]:
     """Yield the parts of the inputs that a scenario gives: `inputs.<name>.<part>`."""
     node = document.root.get("inputs")
-    for entry in node if isinstance(node, Table) else ():
+    for entry in node if isinstance(node, MappingNode) else ():
         thing = system.inputs.get(entry.key)
         if thing is None or thing.type != "real":
             continue
         for part, unit in _parts(entry.node, thing.unit):
             path = (entry.key, *part)
             is_width = part[-1:] == ("amplitude",)
-            own = _without_zero(unit) if is_width else unit
-            place = Place((Target("input", path),), own, is_width=is_width)
+            own = _difference_unit(unit) if is_width else unit
+            place = TargetInfo((Target("input", path),), own, is_width=is_width)
             yield "inputs." + ".".join(path), place
 
 
-def _without_zero(unit: Unit) -> Unit:
+def _difference_unit(unit: Unit) -> Unit:
     """Return the unit of differences of what is in a unit: K for degC."""
     return Unit(str(unit.dimension), unit.factor, unit.dimension) if unit.offset else unit
 
 
 def _parts(node: object, unit: Unit) -> Iterator[tuple[tuple[str, ...], Unit]]:
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         yield (), unit
-    if not isinstance(node, Table):
+    if not isinstance(node, MappingNode):
         return
     if node.get("start") is not None:
         yield ("start",), unit
     for form in ("steps", "table"):
         points = node.get(form)
-        for number, _ in enumerate(points if isinstance(points, Table) else (), start=1):
+        for number, _ in enumerate(points if isinstance(points, MappingNode) else (), start=1):
             yield (form, str(number)), unit
             yield ("times", str(number)), TIME
     for form, keys in (("ramp", ("from", "to", "value")), ("chirp", ("from", "to", "amplitude"))):
         table = node.get(form)
-        for key in keys if isinstance(table, Table) else ():
+        for key in keys if isinstance(table, MappingNode) else ():
             yield (form, key), TIME if key in ("from", "to") else unit

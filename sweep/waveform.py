@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.measure import SignalMeasure
-from sweep.moments import mean_of, root_mean_square, scaled
+from sweep.moments import mean_of, root_mean_square, scale_to_squarable
 
 Reals = NDArray[np.float64]
-FEWEST = 8
+MIN_SPECTRUM_ROWS = 8
 """Rows of the shortest spectrum."""
-ROUNDING = 1.0e-12
+FLATNESS_TOLERANCE = 1.0e-12
 """A signal that is as near to a line as this share of its peak is one: thousands of roundings."""
 
 
-def signal_number(measure: SignalMeasure, times: Reals, values: Reals) -> float | None:
+def evaluate_signal(measure: SignalMeasure, times: Reals, values: Reals) -> float | None:
     """Return the number of a signal [its unit] (n,) over times [s] (n,); None if there is none."""
     if not len(values) or not np.all(np.isfinite(values)):
         return None
@@ -38,23 +38,23 @@ def signal_number(measure: SignalMeasure, times: Reals, values: Reals) -> float 
         case "rms":
             return root_mean_square(values)
         case "settling":
-            return settling(times, values, measure.within)
+            return settling_time(times, values, measure.within)
         case "frequency":
-            find = by_spectrum if measure.by == "spectrum" else by_crossings
-            return find(times, scaled(values)[0])
+            find = frequency_by_spectrum if measure.by == "spectrum" else frequency_by_crossings
+            return find(times, scale_to_squarable(values)[0])
 
 
-def settling(times: Reals, values: Reals, within: float) -> float:
+def settling_time(times: Reals, values: Reals, band: float) -> float:
     """Return the time [s] from the start until the signal stays in a band around its last value."""
     with np.errstate(over="ignore"):  # of a difference of the largest: it is outside
-        outside = np.flatnonzero(np.abs(values - values[-1]) > within)
+        outside = np.flatnonzero(np.abs(values - values[-1]) > band)
     first = int(outside[-1]) + 1 if len(outside) else 0
     return float(times[first] - times[0])
 
 
-def by_crossings(times: Reals, values: Reals) -> float | None:
+def frequency_by_crossings(times: Reals, values: Reals) -> float | None:
     """Return the frequency [1/s] from upward crossings of the straight line through the signal."""
-    level = _without_line(times, values)
+    level = _detrend(times, values)
     if not len(level):
         return None
     ups = np.flatnonzero((level[:-1] < 0.0) & (level[1:] >= 0.0))
@@ -65,14 +65,14 @@ def by_crossings(times: Reals, values: Reals) -> float | None:
     return float((len(ups) - 1) / (instants[-1] - instants[0]))
 
 
-def by_spectrum(times: Reals, values: Reals) -> float | None:
+def frequency_by_spectrum(times: Reals, values: Reals) -> float | None:
     """Return the dominant frequency [1/s]: the peak of the spectrum under a Hann window.
 
     Between bins by the parabola through the logarithms (Smith and Serra, PARSHL, 1987).
     """
     count = len(values)
-    level = _without_line(times, values)
-    if len(level) < FEWEST:
+    level = _detrend(times, values)
+    if len(level) < MIN_SPECTRUM_ROWS:
         return None
     power = np.abs(np.fft.rfft(level * np.hanning(count))) ** 2
     top = int(np.argmax(power[1:-1])) + 1
@@ -85,7 +85,7 @@ def by_spectrum(times: Reals, values: Reals) -> float | None:
     return float((top + shift) / (count * step))
 
 
-def _without_line(times: Reals, values: Reals) -> Reals:
+def _detrend(times: Reals, values: Reals) -> Reals:
     """Return a signal (n,) without the line that fits it best (least squares).
 
     Empty where nothing but rounding is left.
@@ -96,5 +96,5 @@ def _without_line(times: Reals, values: Reals) -> Reals:
     spread = math.fsum(away * away)
     slope = math.fsum(away * values) / spread if spread else 0.0
     level = np.asarray(values - (mean + slope * away))
-    is_flat = np.max(np.abs(level)) <= ROUNDING * np.max(np.abs(values))
+    is_flat = np.max(np.abs(level)) <= FLATNESS_TOLERANCE * np.max(np.abs(values))
     return level[:0] if is_flat else level

@@ -17,57 +17,57 @@ import threading
 import traceback
 from typing import IO, Any
 
-from engine.batch import Runner
-from sweep.block import Block, block_rows
+from engine.batch import BatchRunner
+from sweep.block import Block, compute_rows
 from sweep.manifest import manifest_of
-from sweep.rows_file import block_file
+from sweep.rows_file import encode_block
 
-LENGTH = struct.Struct(">Q")
+LENGTH_PREFIX = struct.Struct(">Q")
 
 
-def send(stream: IO[bytes], message: object) -> None:
+def send_message(stream: IO[bytes], message: object) -> None:
     """Write a message. Raises OSError where nobody reads it."""
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    stream.write(LENGTH.pack(len(data)) + data)
+    stream.write(LENGTH_PREFIX.pack(len(data)) + data)
     stream.flush()
 
 
-def receive(stream: IO[bytes]) -> Any:
+def receive_message(stream: IO[bytes]) -> Any:
     """Read a message. Raises EOFError where there is no other one."""
-    head = stream.read(LENGTH.size)
-    if len(head) < LENGTH.size:
+    head = stream.read(LENGTH_PREFIX.size)
+    if len(head) < LENGTH_PREFIX.size:
         raise EOFError
-    (length,) = LENGTH.unpack(head)
+    (length,) = LENGTH_PREFIX.unpack(head)
     data = stream.read(length)
     if len(data) < length:
         raise EOFError
     return pickle.loads(data)
 
 
-def serve(run: Runner) -> None:
+def serve_blocks(run: BatchRunner) -> None:
     """Answer blocks until the input ends. What is printed meanwhile goes to stderr."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us tells us when to end
     source = os.fdopen(os.dup(0), "rb")
     target = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     messages: queue.Queue[Any] = queue.Queue()
-    threading.Thread(target=_listen, args=(source, messages), daemon=True).start()
+    threading.Thread(target=_forward_messages, args=(source, messages), daemon=True).start()
     study = messages.get()
     manifest = manifest_of(study)
     while True:
         block: Block = messages.get()
         try:
-            answer: object = block_file(manifest, block, block_rows(study, block, run))
+            answer: object = encode_block(manifest, block, compute_rows(study, block, run))
         except Exception:
             answer = traceback.format_exc()
-        send(target, answer)
+        send_message(target, answer)
 
 
-def _listen(source: IO[bytes], messages: queue.Queue[Any]) -> None:
+def _forward_messages(source: IO[bytes], messages: queue.Queue[Any]) -> None:
     """Put messages into the queue; where they end, end the process."""
     while True:
         try:
-            messages.put(receive(source))
+            messages.put(receive_message(source))
         except (EOFError, OSError):
             sys.stderr.flush()
             os._exit(0)

@@ -13,14 +13,14 @@ import typer
 from hypothesis import settings
 
 from language import load
-from modewright.garbage import look_rarely
-from tests.once import lowered_once, shipped_once
+from modewright.garbage import raise_gc_threshold
+from tests.once import memoise_lowering, memoise_shipped
 
-load.program_of = lowered_once(load.program_of)  # before it is imported by name
+load.program_of = memoise_lowering(load.program_of)  # before it is imported by name
 from modewright import api  # noqa: E402
 
 for name in ("load", "program"):
-    setattr(api, name, shipped_once(getattr(api, name)))
+    setattr(api, name, memoise_shipped(getattr(api, name)))
 settings.register_profile("ci", derandomize=True, max_examples=30, deadline=None)
 settings.register_profile("verify", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
@@ -36,7 +36,7 @@ def pytest_collection_finish() -> None:
     """Leave what was imported out of every later search for garbage."""
     gc.collect()
     gc.freeze()
-    look_rarely()
+    raise_gc_threshold()
 
 
 def pytest_sessionfinish() -> None:

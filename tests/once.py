@@ -20,7 +20,7 @@ Made = TypeVar("Made")
 Lower = Callable[[Automaton, Collection[str]], Program]
 
 
-def shipped_once(load: Callable[Given, Made]) -> Callable[Given, Made]:
+def memoise_shipped(load: Callable[Given, Made]) -> Callable[Given, Made]:
     """Return what loads by names, and remembers what it has made of specs that are shipped."""
     known: dict[str, Made] = {}
 
@@ -36,7 +36,7 @@ def shipped_once(load: Callable[Given, Made]) -> Callable[Given, Made]:
     return loaded
 
 
-def lowered_once(lower: Callable[..., Program]) -> Callable[..., Program]:
+def memoise_lowering(lower: Callable[..., Program]) -> Callable[..., Program]:
     """Return what lowers automata, and remembers the Program of each as long as there is one."""
     known: dict[int, dict[frozenset[str], Program]] = {}
 

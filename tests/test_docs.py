@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import modewright as mw
 from codegen.build import compile_program
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -133,7 +133,7 @@ def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
     )
     for line in block.splitlines():
         command = partial(app, shlex.split(line)[1:], standalone_mode=False)
-        assert exit_code(command) == 0, line
+        assert run_with_exit_code(command) == 0, line
     assert (tmp_path / "replay.png").exists()
 
 
@@ -158,7 +158,7 @@ def test_the_commands_and_the_python_of_the_guide_work_as_it_says(
         told = re.search(r"# exit code (\d+)$", line)
         expected = int(told[1]) if told else 0
         command = partial(app, words[1:], standalone_mode=False)
-        assert exit_code(command) == expected, line
+        assert run_with_exit_code(command) == expected, line
     for block in re.findall(r"```python\n(.*?)```", guide, re.DOTALL):
         exec(compile(block, "guide.md", "exec"), {})
     for name in re.findall(r"--(?:out|plot) ([\w./]+)", guide):
@@ -183,7 +183,7 @@ def test_the_commands_and_the_page_on_calibration_are_as_it_says(
     for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL):
         for line in block.splitlines():
             command = partial(app, shlex.split(line)[1:], standalone_mode=False)
-            assert exit_code(command) == 0, line
+            assert run_with_exit_code(command) == 0, line
     (told,) = re.findall(r"```\n(\d+ of \d+ solved.*?)```", page, re.DOTALL)
     assert told in capsys.readouterr().out
     written = Path("page.dcm").read_text()

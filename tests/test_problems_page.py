@@ -11,7 +11,7 @@ from language.codes import CODES
 from language.problem import render_all
 from tests.refused.book import ROOT, cases, problems_of
 from tests.refused.kinds import kinds
-from tests.refused.made import MADE
+from tests.refused.made import GENERATED_CASES
 
 PAGE = ROOT / "docs" / "problems.md"
 HEAD = """# Problems and their codes
@@ -42,10 +42,10 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     texts = [case.expected.read_text("utf-8") for case in cases()]
     found = first_told(texts)
     folder = tmp_path_factory.mktemp("made")
-    for name in MADE if len(found) < len(CODES) else ():
+    for name in GENERATED_CASES if len(found) < len(CODES) else ():
         own = folder / name
         own.mkdir()
-        told = render_all(problems_of(MADE[name](own)[0]))
+        told = render_all(problems_of(GENERATED_CASES[name](own)[0]))
         found = first_told([told.replace(str(folder), "/home/user")]) | found
     return found
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from language.program import TICKS, Constant, Program, Variable, fired_variable
-from language.units import shown_unit
+from language.program import TICK_UNIT, Constant, Program, Variable, fired_variable
+from language.units import display_unit
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Conversion:
 
 TRUTH = Conversion(names=((0, "false"), (1, "true")))
 COUNT = Conversion()
-PER_SECOND = 1000
+MS_PER_SECOND = 1000
 """A counter of ticks is shown in ms."""
 
 
@@ -31,29 +31,31 @@ def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
     if item.values:
         return Conversion(names=tuple(enumerate(item.values)))
     if item.type == "real":
-        return Conversion("" if item.unit == "1" else shown_unit(item.unit))
+        return Conversion("" if item.unit == "1" else display_unit(item.unit))
     if item.type == "truth":
         return TRUTH
-    is_count = item.name.startswith("timer.") or item.unit == TICKS
+    is_count = item.name.startswith("timer.") or item.unit == TICK_UNIT
     if is_count and program.period:
-        return Conversion("ms", float(program.period * PER_SECOND))
-    return _numbered(program).get(item.name, COUNT)
+        return Conversion("ms", float(program.period * MS_PER_SECOND))
+    return _enumerated_variables(program).get(item.name, COUNT)
 
 
-def _numbered(program: Program) -> dict[str, Conversion]:
+def _enumerated_variables(program: Program) -> dict[str, Conversion]:
     """Return the variables that hold numbers of modes and transitions."""
-    found = {
+    conversions = {
         variable: Conversion(names=tuple((m.number, m.name) for m in program.modes_of(region)))
         for region, variable in program.mode_variables().items()
     }
     for region in program.mode_variables():
-        taken = [(t.number, t.name) for t in program.transitions if t.region == region]
-        found[fired_variable(region)] = Conversion(names=((0, "none"), *_apart(taken)))
+        transitions = [(t.number, t.name) for t in program.transitions if t.region == region]
+        conversions[fired_variable(region)] = Conversion(
+            names=((0, "none"), *_disambiguate(transitions))
+        )
     run = tuple((mode.number, mode.name) for mode in program.run_modes)
-    return {**found, "memory.run_mode": Conversion(names=run)} if run else found
+    return {**conversions, "memory.run_mode": Conversion(names=run)} if run else conversions
 
 
-def _apart(named: list[tuple[int, str]]) -> list[tuple[int, str]]:
+def _disambiguate(names: list[tuple[int, str]]) -> list[tuple[int, str]]:
     """Return names of numbers, those that several have with the number."""
-    count = Counter(name for _, name in named)
-    return [(n, f"{name} {n}" if count[name] > 1 else name) for n, name in named]
+    count = Counter(name for _, name in names)
+    return [(n, f"{name} {n}" if count[name] > 1 else name) for n, name in names]

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 from codegen.asam.conversion import COUNT, TRUTH, Conversion, conversion_of
 from codegen.names import CNames, c_type
-from codegen.source import stepped
-from language.number import LARGEST
+from codegen.source import restrict_to_step
+from language.number import MAX_FINITE
 from language.printing import digest
 from language.program import Constant, Program, Variable
-from language.units import shown_unit
+from language.units import display_unit
 
-SELF, PAGE = "Self", "Cal"
+INSTANCE_STRUCT, PAGE_STRUCT = "Self", "Cal"
 """The structures of a module that a tool reads and writes, as the end of their C type."""
-LIMITS: Mapping[str, tuple[float, float]] = {
-    "double": (-LARGEST["float64"], LARGEST["float64"]),
-    "float": (-LARGEST["float32"], LARGEST["float32"]),
+TYPE_LIMITS: Mapping[str, tuple[float, float]] = {
+    "double": (-MAX_FINITE["float64"], MAX_FINITE["float64"]),
+    "float": (-MAX_FINITE["float32"], MAX_FINITE["float32"]),
     "bool": (0, 1),
     "uint8_t": (0, 2**8 - 1),
     "uint16_t": (0, 2**16 - 1),
@@ -26,9 +26,9 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "int32_t": (-(2**31), 2**31 - 1),
     "uint32_t": (0, 2**32 - 1),
 }
-GROUP = {"latched": "input", "timer": "memory"}
+TOOL_GROUP = {"latched": "input", "timer": "memory"}
 """Where a tool finds variables that are not grouped as they are named."""
-MEMBER = re.compile(r"^(self->|cal->)")
+POINTER_PREFIX = re.compile(r"^(self->|cal->)")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Characteristic:
 
 
 @dataclass(frozen=True)
-class Description:
+class ModuleDescription:
     """All that a tool may see of one automaton."""
 
     name: str
@@ -81,67 +81,79 @@ class Description:
     @property
     def groups(self) -> dict[str, list[Measurement | Characteristic]]:
         """What belongs together, in order."""
-        found: dict[str, list[Measurement | Characteristic]] = {}
+        by_group: dict[str, list[Measurement | Characteristic]] = {}
         every: list[Measurement | Characteristic] = [*self.characteristics, *self.measurements]
         for one in every:
-            found.setdefault(one.group, []).append(one)
-        return found
+            by_group.setdefault(one.group, []).append(one)
+        return by_group
 
 
-def described(program: Program) -> Description:
+def describe_module(program: Program) -> ModuleDescription:
     """Return what a tool may measure and calibrate in the C of a Program."""
-    used = stepped(program)
-    place = CNames(used, solved="cal->solved.")
+    step_program = restrict_to_step(program)
+    c_names = CNames(step_program, solved_prefix="cal->solved.")
     measured = [
         found
-        for variable in used.variables
-        if (found := _measurement(variable, used, place)) is not None
+        for variable in step_program.variables
+        if (found := _measurement(variable, step_program, c_names)) is not None
     ]
-    derived = [_derived(c, used, place) for c in used.constants if c.kind == "derived"]
+    derived = [
+        _derived_measurement(c, step_program, c_names)
+        for c in step_program.constants
+        if c.kind == "derived"
+    ]
     page = [
-        _characteristic(c, used, place) for c in used.constants if c.kind in ("tunable", "solved")
+        _characteristic(c, step_program, c_names)
+        for c in step_program.constants
+        if c.kind in ("tunable", "solved")
     ]
-    pace = f"every {float(used.period):g} s" if used.period else "every major step"
-    return Description(
-        used.name,
+    pace = f"every {float(step_program.period):g} s" if step_program.period else "every major step"
+    return ModuleDescription(
+        step_program.name,
         digest(program),
-        f"{used.name}, {pace}",
-        (*measured, *derived, *_faults(used)),
+        f"{step_program.name}, {pace}",
+        (*measured, *derived, *_fault_measurements(step_program)),
         tuple(page),
     )
 
 
-def _measurement(variable: Variable, program: Program, place: CNames) -> Measurement | None:
+def _measurement(variable: Variable, program: Program, c_names: CNames) -> Measurement | None:
     """Return a variable that the instance keeps; None for others."""
-    text = place(variable.name)
+    text = c_names(variable.name)
     if not text.startswith("self->"):
         return None
     group = variable.name.partition(".")[0]
-    kind = c_type(variable, program.number)
-    path = MEMBER.sub("", text)
+    kind = c_type(variable, program.number_type)
+    path = POINTER_PREFIX.sub("", text)
     return Measurement(
         f"{program.name}.{variable.name}",
-        variable.about or f"{shown_unit(variable.unit)}",
-        GROUP.get(group, group),
+        variable.about or f"{display_unit(variable.unit)}",
+        TOOL_GROUP.get(group, group),
         path,
         kind,
         conversion_of(variable, program),
-        variable.range or LIMITS[kind],
+        variable.range or TYPE_LIMITS[kind],
         variable.size,
     )
 
 
-def _derived(constant: Constant, program: Program, place: CNames) -> Measurement:
-    path = MEMBER.sub("", place(constant.name))
-    kind = c_type(constant, program.number)
-    shown = conversion_of(constant, program)
+def _derived_measurement(constant: Constant, program: Program, c_names: CNames) -> Measurement:
+    path = POINTER_PREFIX.sub("", c_names(constant.name))
+    kind = c_type(constant, program.number_type)
+    conversion = conversion_of(constant, program)
     about = constant.about or constant.key
     return Measurement(
-        f"{program.name}.{constant.name}", about, "derived", path, kind, shown, LIMITS[kind]
+        f"{program.name}.{constant.name}",
+        about,
+        "derived",
+        path,
+        kind,
+        conversion,
+        TYPE_LIMITS[kind],
     )
 
 
-def _faults(program: Program) -> list[Measurement]:
+def _fault_measurements(program: Program) -> list[Measurement]:
     """Return the bits of the fault word, each by its name."""
     name, kind = f"{program.name}.memory.faults", "uint32_t"
     return [
@@ -152,9 +164,9 @@ def _faults(program: Program) -> list[Measurement]:
     ]
 
 
-def _characteristic(constant: Constant, program: Program, place: CNames) -> Characteristic:
-    path = MEMBER.sub("", place(constant.name))
-    kind = c_type(constant, program.number)
+def _characteristic(constant: Constant, program: Program, c_names: CNames) -> Characteristic:
+    path = POINTER_PREFIX.sub("", c_names(constant.name))
+    kind = c_type(constant, program.number_type)
     table = constant.name.partition(".")[2]
     axes = [c for c in program.constants if re.fullmatch(rf"axis\.{re.escape(table)}_\d", c.name)]
     return Characteristic(
@@ -164,7 +176,7 @@ def _characteristic(constant: Constant, program: Program, place: CNames) -> Char
         path,
         kind,
         conversion_of(constant, program) if constant.kind == "tunable" else COUNT,
-        constant.range or LIMITS[kind],
+        constant.range or TYPE_LIMITS[kind],
         tuple(Axis(conversion_of(axis, program), axis.items) for axis in axes)
         if constant.items
         else (),

@@ -7,16 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 
 if TYPE_CHECKING:
     from elftools.dwarf.die import DIE
     from elftools.elf.elffile import ELFFile
 
-MOST_ELEMENTS = 64
+MAX_ARRAY_ELEMENTS = 64
 """Elements of an array of instances that are looked at."""
-THROUGH = ("DW_TAG_const_type", "DW_TAG_volatile_type", "DW_TAG_typedef", "DW_TAG_restrict_type")
-ADDRESS = 0x03
+TRANSPARENT_TAGS = (
+    "DW_TAG_const_type",
+    "DW_TAG_volatile_type",
+    "DW_TAG_typedef",
+    "DW_TAG_restrict_type",
+)
+DW_OP_ADDR = 0x03
 """DW_OP_addr: an address follows."""
 
 
@@ -25,7 +30,7 @@ class ImageError(ValueError):
 
 
 @dataclass(frozen=True)
-class Place:
+class StructLocation:
     """A structure in memory: the `symbol` that names it, like `app.selves[1]`, its address, and the
     offsets and sizes [bytes] of its members by path, like `state.w_em`. One that `is_fixed` nobody
     writes to.
@@ -34,7 +39,7 @@ class Place:
     symbol: str
     address: int
     members: Mapping[str, tuple[int, int]]
-    is_fixed: bool = False
+    is_const: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,25 +47,27 @@ class Image:
     """A linked program: `places` of structures by their C type, and addresses of symbols."""
 
     path: Path
-    places: Mapping[str, tuple[Place, ...]]
+    structures: Mapping[str, tuple[StructLocation, ...]]
     symbols: Mapping[str, int]
-    texts: Mapping[str, str]
+    strings: Mapping[str, str]
     is_little_endian: bool
 
-    def chosen(self, kind: str, found: Sequence[Place], symbol: str | None) -> Place:
+    def select_structure(
+        self, kind: str, candidates: Sequence[StructLocation], symbol: str | None
+    ) -> StructLocation:
         """Return the one place that was found, or the one with a symbol. Raises ImageError."""
-        chosen = [place for place in found if symbol in (None, place.symbol)]
+        chosen = [place for place in candidates if symbol in (None, place.symbol)]
         if len(chosen) == 1:
             return chosen[0]
-        if not found:
+        if not candidates:
             raise ImageError(f"{self.path}: no {kind}: is its code linked, and compiled with -g?")
-        known = ", ".join(place.symbol for place in found)
+        known = ", ".join(place.symbol for place in candidates)
         if symbol and not chosen:
             raise ImageError(f"{self.path}: no {kind} is called `{symbol}`; there are: {known}")
         raise ImageError(f"{self.path}: one {kind} is needed, name it; there are: {known}")
 
 
-def image_of(path: Path, types: tuple[str, ...], texts: tuple[str, ...] = ()) -> Image:
+def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ...] = ()) -> Image:
     """Read where structures of some types lie in a linked program, and the texts at symbols.
 
     Raises ImageError, ToolMissing.
@@ -69,7 +76,7 @@ def image_of(path: Path, types: tuple[str, ...], texts: tuple[str, ...] = ()) ->
         from elftools.common.exceptions import ELFError
         from elftools.elf.elffile import ELFFile
     except ModuleNotFoundError:
-        raise ToolMissing(
+        raise MissingToolError(
             "reading an ELF needs pyelftools: pip install 'modewright[elf]'"
         ) from None
     try:
@@ -77,10 +84,12 @@ def image_of(path: Path, types: tuple[str, ...], texts: tuple[str, ...] = ()) ->
             elf = ELFFile(file)
             if not elf.has_dwarf_info():
                 raise ImageError(f"{path}: it has no debug information; compile with -g")
-            places = _places(elf, types)
+            structures = _find_structures(elf, types)
             symbols = _symbols(elf)
-            read = {name: _text(elf, symbols[name]) for name in texts if name in symbols}
-            return Image(path, places, symbols, read, elf.little_endian)
+            strings = {
+                name: _string_at(elf, symbols[name]) for name in string_symbols if name in symbols
+            }
+            return Image(path, structures, symbols, strings, elf.little_endian)
     except OSError as error:
         raise ImageError(f"{path}: {error.strerror}") from None
     except (ELFError, KeyError, IndexError, ValueError, AssertionError) as error:
@@ -89,88 +98,94 @@ def image_of(path: Path, types: tuple[str, ...], texts: tuple[str, ...] = ()) ->
         raise ImageError(f"{path}: this is not a linked program (ELF): {error}") from None
 
 
-def _places(elf: ELFFile, types: tuple[str, ...]) -> dict[str, tuple[Place, ...]]:
-    found: dict[str, dict[str, Place]] = {name: {} for name in types}
+def _find_structures(elf: ELFFile, types: tuple[str, ...]) -> dict[str, tuple[StructLocation, ...]]:
+    by_type: dict[str, dict[str, StructLocation]] = {name: {} for name in types}
     for unit in elf.get_dwarf_info().iter_CUs():
         for die in unit.iter_DIEs():
-            address = _address(die, elf)
-            declared = _origin(die)
+            address = _address_of(die, elf)
+            declared = _declaration_of(die)
             if address is None or "DW_AT_type" not in declared.attributes:
                 continue
-            variable = _name(declared)
-            is_fixed = _is_fixed(_type(declared))
-            for kind, symbol, start, made in _inside(_type(declared), variable, address, types):
+            variable = _name_of(declared)
+            is_fixed = _is_const(_type_of(declared))
+            for kind, symbol, start, made in _nested_structures(
+                _type_of(declared), variable, address, types
+            ):
                 members = {path: (at, size) for path, at, size in _members(made, "", 0)}
-                found[kind].setdefault(symbol, Place(symbol, start, members, is_fixed))
-    return {kind: tuple(by_symbol.values()) for kind, by_symbol in found.items()}
+                by_type[kind].setdefault(symbol, StructLocation(symbol, start, members, is_fixed))
+    return {kind: tuple(by_symbol.values()) for kind, by_symbol in by_type.items()}
 
 
-def _inside(
+def _nested_structures(
     kind: DIE | None, symbol: str, address: int, types: tuple[str, ...]
 ) -> Iterator[tuple[str, str, int, DIE]]:
     """Yield what of some types is in a variable: type, symbol, address, its structure."""
-    while kind is not None and kind.tag in THROUGH:
-        if kind.tag == "DW_TAG_typedef" and _name(kind) in types:
-            structure = _bare(kind)
+    while kind is not None and kind.tag in TRANSPARENT_TAGS:
+        if kind.tag == "DW_TAG_typedef" and _name_of(kind) in types:
+            structure = _strip_qualifiers(kind)
             if structure is not None:
-                yield _name(kind), symbol, address, structure
+                yield _name_of(kind), symbol, address, structure
             return
-        kind = _type(kind)
+        kind = _type_of(kind)
     if kind is None:
         return
     if kind.tag == "DW_TAG_structure_type":
-        for member in _fields(kind):
-            place = address + _offset(member)
-            yield from _inside(_type(member), f"{symbol}.{_name(member)}", place, types)
+        for member in _struct_fields(kind):
+            place = address + _offset_of(member)
+            yield from _nested_structures(
+                _type_of(member), f"{symbol}.{_name_of(member)}", place, types
+            )
     elif kind.tag == "DW_TAG_array_type":
-        size = _size(_type(kind))
-        for k in range(min(_count(kind), MOST_ELEMENTS) if size else 0):
-            yield from _inside(_type(kind), f"{symbol}[{k}]", address + k * size, types)
+        size = _byte_size(_type_of(kind))
+        for k in range(min(_element_count(kind), MAX_ARRAY_ELEMENTS) if size else 0):
+            yield from _nested_structures(
+                _type_of(kind), f"{symbol}[{k}]", address + k * size, types
+            )
 
 
 def _members(structure: DIE, above: str, start: int) -> Iterator[tuple[str, int, int]]:
     """Yield the path, offset and size of each member that is no structure."""
-    for member in _fields(structure):
-        path, place = f"{above}{_name(member)}", start + _offset(member)
-        kind = _bare(_type(member))
+    for member in _struct_fields(structure):
+        path, place = f"{above}{_name_of(member)}", start + _offset_of(member)
+        kind = _strip_qualifiers(_type_of(member))
         if kind is not None and kind.tag == "DW_TAG_structure_type":
             yield from _members(kind, f"{path}.", place)
         else:
-            yield path, place, _size(kind)
+            yield path, place, _byte_size(kind)
 
 
-def _fields(structure: DIE) -> Iterator[DIE]:
+def _struct_fields(structure: DIE) -> Iterator[DIE]:
     return (child for child in structure.iter_children() if child.tag == "DW_TAG_member")
 
 
-def _bare(kind: DIE | None) -> DIE | None:
+def _strip_qualifiers(kind: DIE | None) -> DIE | None:
     """Return a type without its qualifiers and other names."""
-    while kind is not None and kind.tag in THROUGH:
-        kind = _type(kind)
+    while kind is not None and kind.tag in TRANSPARENT_TAGS:
+        kind = _type_of(kind)
     return kind
 
 
-def _is_fixed(kind: DIE | None) -> bool:
+def _is_const(kind: DIE | None) -> bool:
     """Tell whether a type is `const` and not `volatile`."""
     tags = []
-    while kind is not None and kind.tag in THROUGH:
+    while kind is not None and kind.tag in TRANSPARENT_TAGS:
         tags.append(kind.tag)
-        kind = _type(kind)
+        kind = _type_of(kind)
     return "DW_TAG_const_type" in tags and "DW_TAG_volatile_type" not in tags
 
 
-def _size(kind: DIE | None) -> int:
+def _byte_size(kind: DIE | None) -> int:
     """Return the bytes of a type, 0 where it does not say."""
-    kind = _bare(kind)
+    kind = _strip_qualifiers(kind)
     if kind is None:
         return 0
     if kind.tag == "DW_TAG_array_type":
-        return _count(kind) * _size(_type(kind))
+        return _element_count(kind) * _byte_size(_type_of(kind))
     size = kind.attributes.get("DW_AT_byte_size")
     return int(size.value) if size else 0
 
 
-def _count(array: DIE) -> int:
+def _element_count(array: DIE) -> int:
     total = 1
     for child in array.iter_children():
         if child.tag == "DW_TAG_subrange_type":
@@ -179,12 +194,12 @@ def _count(array: DIE) -> int:
     return total
 
 
-def _type(die: DIE) -> DIE | None:
+def _type_of(die: DIE) -> DIE | None:
     has_one = "DW_AT_type" in die.attributes
     return die.get_DIE_from_attribute("DW_AT_type") if has_one else None
 
 
-def _origin(die: DIE) -> DIE:
+def _declaration_of(die: DIE) -> DIE:
     """Return the declaration that a definition completes, where it does."""
     for name in ("DW_AT_specification", "DW_AT_abstract_origin"):
         if name in die.attributes and "DW_AT_type" not in die.attributes:
@@ -192,20 +207,24 @@ def _origin(die: DIE) -> DIE:
     return die
 
 
-def _name(die: DIE) -> str:
+def _name_of(die: DIE) -> str:
     name = die.attributes.get("DW_AT_name")
     return name.value.decode() if name else ""
 
 
-def _offset(member: DIE) -> int:
+def _offset_of(member: DIE) -> int:
     at = member.attributes.get("DW_AT_data_member_location")
     return int(at.value) if at else 0
 
 
-def _address(die: DIE, elf: ELFFile) -> int | None:
+def _address_of(die: DIE, elf: ELFFile) -> int | None:
     """Return where a variable lies, None for all else."""
     at = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
-    if at is None or at.form not in ("DW_FORM_exprloc", "DW_FORM_block1") or at.value[0] != ADDRESS:
+    if (
+        at is None
+        or at.form not in ("DW_FORM_exprloc", "DW_FORM_block1")
+        or at.value[0] != DW_OP_ADDR
+    ):
         return None
     return int.from_bytes(bytes(at.value[1:]), "little" if elf.little_endian else "big")
 
@@ -217,7 +236,7 @@ def _symbols(elf: ELFFile) -> dict[str, int]:
     return {one.name: int(one["st_value"]) for table in tables for one in table.iter_symbols()}
 
 
-def _text(elf: ELFFile, address: int) -> str:
+def _string_at(elf: ELFFile, address: int) -> str:
     """Return the text that begins at an address, as far as it is printable."""
     for section in elf.iter_sections():
         start = section["sh_addr"]

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
-from codegen.exchange.characteristic import Axis, Cell, Characteristic, turned
-from language.text import visible
+from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic, transpose_map
+from language.text import escape_invisible
 
 CATEGORIES = ("VALUE", "CURVE", "MAP")
 """What a characteristic is called, by its number of axes."""
@@ -31,66 +31,70 @@ TAIL = """        </SW-INSTANCE-TREE>
   </SW-SYSTEMS>
 </MSRSW>
 """
-DEEP = " " * 10
+INDENT = " " * 10
 
 
-def cdfx_text(title: str, heading: Sequence[str], page: Sequence[Characteristic]) -> str:
+def format_cdfx(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
     """Return a page as a CDFX file."""
-    told = escape(", ".join(heading)).replace("--", "- -")
-    lines = [f"{DEEP}{line}\n" for one in page for line in _instance(one)]
-    return HEAD.format(title=escape(title), heading=told) + "".join(lines) + TAIL
+    comment = escape(", ".join(heading)).replace("--", "- -")
+    lines = [f"{INDENT}{line}\n" for one in page for line in _format_instance(one)]
+    return HEAD.format(title=escape(title), heading=comment) + "".join(lines) + TAIL
 
 
-def _instance(one: Characteristic) -> Iterator[str]:
-    is_truth = one.is_text and not one.axes and one.values[0].text in ("false", "true")
+def _format_instance(characteristic: FileCharacteristic) -> Iterator[str]:
+    is_truth = (
+        characteristic.is_text
+        and not characteristic.axes
+        and characteristic.values[0].text in ("false", "true")
+    )
     yield "<SW-INSTANCE>"
-    yield f"  <SHORT-NAME>{escape(one.name.text)}</SHORT-NAME>"
-    if one.about:
-        yield f"  <LONG-NAME>{escape(visible(' '.join(one.about.split())))}</LONG-NAME>"
-    yield f"  <CATEGORY>{'BOOLEAN' if is_truth else CATEGORIES[len(one.axes)]}</CATEGORY>"
+    yield f"  <SHORT-NAME>{escape(characteristic.name.text)}</SHORT-NAME>"
+    if characteristic.about:
+        yield f"  <LONG-NAME>{escape(escape_invisible(' '.join(characteristic.about.split())))}</LONG-NAME>"
+    yield f"  <CATEGORY>{'BOOLEAN' if is_truth else CATEGORIES[len(characteristic.axes)]}</CATEGORY>"
     yield "  <SW-VALUE-CONT>"
-    yield from _unit(one.unit)
+    yield from _format_unit(characteristic.unit)
     yield "    <SW-VALUES-PHYS>"
-    yield from _values(one)
+    yield from _format_values(characteristic)
     yield "    </SW-VALUES-PHYS>"
     yield "  </SW-VALUE-CONT>"
-    if one.axes:
+    if characteristic.axes:
         yield "  <SW-AXIS-CONTS>"
-        for axis in one.axes:
-            yield from _axis(axis)
+        for axis in characteristic.axes:
+            yield from _format_axis(axis)
         yield "  </SW-AXIS-CONTS>"
     yield "</SW-INSTANCE>"
 
 
-def _values(one: Characteristic) -> Iterator[str]:
-    tag = "VT" if one.is_text else "V"
-    if len(one.axes) < 2:
-        yield from (f"      {_cell(cell, tag)}" for cell in one.values)
+def _format_values(characteristic: FileCharacteristic) -> Iterator[str]:
+    tag = "VT" if characteristic.is_text else "V"
+    if len(characteristic.axes) < 2:
+        yield from (f"      {_format_cell(cell, tag)}" for cell in characteristic.values)
         return
-    first, second = one.axes
-    values = turned(one.values, len(second.points))
+    first, second = characteristic.axes
+    values = transpose_map(characteristic.values, len(second.points))
     for number, point in enumerate(second.points):
         yield "      <VG>"
         yield f"        <LABEL>{escape(point.text)}</LABEL>"
         row = values[number * len(first.points) : (number + 1) * len(first.points)]
-        yield from (f"        {_cell(cell, tag)}" for cell in row)
+        yield from (f"        {_format_cell(cell, tag)}" for cell in row)
         yield "      </VG>"
 
 
-def _axis(axis: Axis) -> Iterator[str]:
+def _format_axis(axis: FileAxis) -> Iterator[str]:
     yield "    <SW-AXIS-CONT>"
     yield "      <CATEGORY>FIX_AXIS</CATEGORY>"
-    yield from (f"  {line}" for line in _unit(axis.unit))
+    yield from (f"  {line}" for line in _format_unit(axis.unit))
     yield "      <SW-VALUES-PHYS>"
-    yield from (f"        {_cell(cell, 'V')}" for cell in axis.points)
+    yield from (f"        {_format_cell(cell, 'V')}" for cell in axis.points)
     yield "      </SW-VALUES-PHYS>"
     yield "    </SW-AXIS-CONT>"
 
 
-def _unit(unit: Cell | None) -> Iterator[str]:
+def _format_unit(unit: Cell | None) -> Iterator[str]:
     if unit:
         yield f"    <UNIT-DISPLAY-NAME>{escape(unit.text)}</UNIT-DISPLAY-NAME>"
 
 
-def _cell(cell: Cell, tag: str) -> str:
+def _format_cell(cell: Cell, tag: str) -> str:
     return f"<{tag}>{escape(cell.text)}</{tag}>"

@@ -22,7 +22,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Axis:
+class FileAxis:
     """An axis of a table; `unit` is None where none is told."""
 
     points: tuple[Cell, ...]
@@ -30,7 +30,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Characteristic:
+class FileCharacteristic:
     """A parameter with its values; of a table the last axis varies fastest.
 
     `unit` is None where the file tells none. `is_text`: the values are words, not numbers.
@@ -39,7 +39,7 @@ class Characteristic:
     name: Cell
     values: tuple[Cell, ...]
     unit: Cell | None = None
-    axes: tuple[Axis, ...] = ()
+    axes: tuple[FileAxis, ...] = ()
     is_text: bool = False
     about: str = ""
 
@@ -49,18 +49,18 @@ class PageFile:
     """What a file of calibration data holds: its source and the characteristics in their order."""
 
     source: Source
-    characteristics: tuple[Characteristic, ...]
+    characteristics: tuple[FileCharacteristic, ...]
 
 
-def turned(values: Sequence[Cell], columns: int) -> tuple[Cell, ...]:
+def transpose_map(values: Sequence[Cell], columns: int) -> tuple[Cell, ...]:
     """Return the values of a map with its axes exchanged: rows of so many columns, by column."""
     return tuple(cell for column in range(columns) for cell in values[column::columns])
 
 
-def report_twice(found: Iterable[Characteristic], problems: Problems) -> None:
+def report_duplicates(characteristics: Iterable[FileCharacteristic], problems: Problems) -> None:
     """Report names that stand twice in a file."""
     first: dict[str, Span] = {}
-    for one in found:
+    for one in characteristics:
         place = first.setdefault(one.name.text, one.name.span)
         if place is not one.name.span:
             label = f"`{one.name.text}` stands here twice"
@@ -69,5 +69,5 @@ def report_twice(found: Iterable[Characteristic], problems: Problems) -> None:
 
 def stop_if_many(problems: Problems) -> None:
     """Raise SpecError where a file has so many problems that more would not help."""
-    if sum(problem.severity == "error" for problem in problems.found) >= MAX_PROBLEMS:
-        problems.stop_if_any()
+    if sum(problem.severity == "error" for problem in problems.reported) >= MAX_PROBLEMS:
+        problems.raise_if_errors()

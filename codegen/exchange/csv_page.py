@@ -9,56 +9,56 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from codegen.exchange.characteristic import (
-    Axis,
     Cell,
-    Characteristic,
+    FileAxis,
+    FileCharacteristic,
     PageFile,
     stop_if_many,
 )
-from codegen.exchange.owned import Owned
-from language.problem import Problems, Source, Span, nearest
+from codegen.exchange.owned import NameFilter
+from language.problem import Problems, Source, Span, suggest_name
 
 COLUMNS = ("name", "value", "unit", "x", "x_unit", "y", "y_unit")
-NEEDED = ("name", "value")
+REQUIRED_COLUMNS = ("name", "value")
 SEPARATORS = ",;\t"
 
 Row = Mapping[str, Cell]
 
 
 @dataclass(frozen=True)
-class _Reading:
+class _ReadContext:
     source: Source
     problems: Problems
-    owned: Owned
+    name_filter: NameFilter
 
 
-def csv_text(title: str, heading: Sequence[str], page: Sequence[Characteristic]) -> str:
+def format_csv(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
     """Return a page as CSV; `title` and `heading` have no place in it."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for one in page:
-        writer.writerows(_rows(one))
+        writer.writerows(_format_rows(one))
     return text.getvalue()
 
 
-def _rows(one: Characteristic) -> Iterator[tuple[str, ...]]:
-    unit = one.unit.text if one.unit else ""
+def _format_rows(characteristic: FileCharacteristic) -> Iterator[tuple[str, ...]]:
+    unit = characteristic.unit.text if characteristic.unit else ""
     points: list[tuple[str, ...]] = [()]
-    for axis in one.axes:
+    for axis in characteristic.axes:
         beside = axis.unit.text if axis.unit else ""
         points = [(*before, point.text, beside) for before in points for point in axis.points]
-    for cell, at in zip(one.values, points, strict=True):
-        row = (one.name.text, cell.text, unit, *at)
+    for cell, coordinates in zip(characteristic.values, points, strict=True):
+        row = (characteristic.name.text, cell.text, unit, *coordinates)
         yield row + ("",) * (len(COLUMNS) - len(row))
 
 
-def read_csv(source: Source, text: str, problems: Problems, owned: Owned) -> PageFile:
-    """Read what is `owned` of a page in CSV; problems are reported, at last with SpecError."""
-    reading = _Reading(source, problems, owned)
+def read_csv(source: Source, text: str, problems: Problems, name_filter: NameFilter) -> PageFile:
+    """Read what is `name_filter` of a page in CSV; problems are reported, at last with SpecError."""
+    context = _ReadContext(source, problems, name_filter)
     groups: dict[str, list[Row]] = {}
     last = ""
-    for row in _read_rows(reading, text):
+    for row in _read_rows(context, text):
         name = row["name"]
         if name.text in groups and name.text != last:
             label = f"`{name.text}` stands here twice"
@@ -67,53 +67,53 @@ def read_csv(source: Source, text: str, problems: Problems, owned: Owned) -> Pag
             stop_if_many(problems)
         groups.setdefault(name.text, []).append(row)
         last = name.text
-    problems.stop_if_any()
-    found = [_characteristic(rows, problems) for rows in groups.values()]
-    problems.stop_if_any()
-    return PageFile(source, tuple(found))
+    problems.raise_if_errors()
+    characteristics = [_parse_characteristic(rows, problems) for rows in groups.values()]
+    problems.raise_if_errors()
+    return PageFile(source, tuple(characteristics))
 
 
-def _read_rows(reading: _Reading, text: str) -> Iterator[Row]:
+def _read_rows(context: _ReadContext, text: str) -> Iterator[Row]:
     """Yield the cells of each line by their column."""
-    first = reading.source.lines[0]
+    first = context.source.lines[0]
     separator = max(SEPARATORS, key=first.count)
     lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
     columns: list[str] = []
     try:
         for cells in lines:
-            span = Span(reading.source, lines.line_num, 1)
+            span = Span(context.source, lines.line_num, 1)
             if not columns:
                 columns = [cell.strip().lower() for cell in cells]
-                _require_columns(columns, span, reading.problems)
+                _require_columns(columns, span, context.problems)
             elif any(cell.strip() for cell in cells):
-                yield from _row(columns, cells, span, reading)
+                yield from _parse_row(columns, cells, span, context)
     except csv.Error as error:
-        span = Span(reading.source, max(1, lines.line_num), 1)
-        reading.problems.error("form", span, f"this is not CSV: {error}")
-    stop_if_many(reading.problems)
+        span = Span(context.source, max(1, lines.line_num), 1)
+        context.problems.error("form", span, f"this is not CSV: {error}")
+    stop_if_many(context.problems)
 
 
 def _require_columns(columns: Sequence[str], span: Span, problems: Problems) -> None:
-    for column in NEEDED:
+    for column in REQUIRED_COLUMNS:
         if column not in columns:
             problems.error("column", span, f"the first line has no column `{column}`")
     for number, column in enumerate(columns):
         if column not in COLUMNS:
-            hint = nearest(column, COLUMNS) or f"known: {', '.join(COLUMNS)}"
+            hint = suggest_name(column, COLUMNS) or f"known: {', '.join(COLUMNS)}"
             problems.error("column", span, f"`{column}` is not a column of a page", hint)
         elif column in columns[:number]:
             problems.error("column", span, f"the column `{column}` stands here twice")
-    problems.stop_if_any()
+    problems.raise_if_errors()
 
 
-def _row(
-    columns: Sequence[str], cells: Sequence[str], span: Span, reading: _Reading
+def _parse_row(
+    columns: Sequence[str], cells: Sequence[str], span: Span, context: _ReadContext
 ) -> Iterator[Row]:
     """Yield the one row of a line, or none with the problem reported; none of another's."""
-    texts, problems = [cell.strip() for cell in cells], reading.problems
+    texts, problems = [cell.strip() for cell in cells], context.problems
     place = columns.index("name")
     name = texts[place] if place < len(texts) else ""
-    if name and not reading.owned.has(Cell(name, span)):
+    if name and not context.name_filter.accepts(Cell(name, span)):
         return
     if len(texts) != len(columns):
         label = f"this line has {len(texts)} cells, the first one has {len(columns)}"
@@ -123,27 +123,27 @@ def _row(
     else:
         at = span.source.lines[span.line - 1] if span.line <= len(span.source.lines) else ""
         yield {
-            column: Cell(text, _inside(span, at, text))
+            column: Cell(text, _cell_span(span, at, text))
             for column, text in zip(columns, texts, strict=True)
         }
     stop_if_many(problems)
 
 
-def _inside(span: Span, line: str, text: str) -> Span:
+def _cell_span(span: Span, line: str, text: str) -> Span:
     """Return where a cell stands in its line, as near as can be told."""
     start = max(line.find(text), 0) if text else 0
-    return span.inside(start, len(text))
+    return span.subspan(start, len(text))
 
 
-def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
+def _parse_characteristic(rows: Sequence[Row], problems: Problems) -> FileCharacteristic:
     """Return the rows of one name as a characteristic; their points are a grid."""
     first = rows[0]
-    axes: list[Axis] = []
+    axes: list[FileAxis] = []
     for letter in "xy":
         if letter in first and first[letter].text:
             points = {row[letter].text: row[letter] for row in rows}
             unit = first.get(f"{letter}_unit")
-            axes.append(Axis(tuple(points.values()), unit if unit and unit.text else None))
+            axes.append(FileAxis(tuple(points.values()), unit if unit and unit.text else None))
     if not axes and len(rows) > 1:
         label = f"`{first['name'].text}` stands here twice"
         place = f"first at {first['name'].span}"
@@ -154,7 +154,9 @@ def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
     _require_one_unit(rows, problems)
     unit = first.get("unit")
     values = tuple(row["value"] for row in rows)
-    return Characteristic(first["name"], values, unit if unit and unit.text else None, tuple(axes))
+    return FileCharacteristic(
+        first["name"], values, unit if unit and unit.text else None, tuple(axes)
+    )
 
 
 def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
@@ -169,7 +171,7 @@ def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
             problems.error("form", other.span, label, "a table is in one unit")
 
 
-def _is_grid(rows: Sequence[Row], axes: Sequence[Axis]) -> bool:
+def _is_grid(rows: Sequence[Row], axes: Sequence[FileAxis]) -> bool:
     """Tell whether the points of the rows are those of a table, the last axis fastest."""
     if math.prod(len(axis.points) for axis in axes) != len(rows):
         return False

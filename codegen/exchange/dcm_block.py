@@ -6,26 +6,26 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from codegen.exchange.characteristic import Axis, Cell, Characteristic, turned
+from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic, transpose_map
 from language.problem import Problems
 
-SHARED = "STUETZSTELLENVERTEILUNG"
-LINES = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")
-MAPS = ("KENNFELD", "FESTKENNFELD", "GRUPPENKENNFELD")
+SHARED_AXIS = "STUETZSTELLENVERTEILUNG"
+CURVE_KINDS = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")
+MAP_KINDS = ("KENNFELD", "FESTKENNFELD", "GRUPPENKENNFELD")
 SIZES: Mapping[str, tuple[int, ...]] = {
     "FESTWERT": (0,),
     "TEXTSTRING": (0,),
     "FESTWERTEBLOCK": (1, 2),
-    SHARED: (1,),
-    **dict.fromkeys(LINES, (1,)),
-    **dict.fromkeys(MAPS, (2,)),
+    SHARED_AXIS: (1,),
+    **dict.fromkeys(CURVE_KINDS, (1,)),
+    **dict.fromkeys(MAP_KINDS, (2,)),
 }
 """How many sizes stand behind the name of each kind."""
-MOST_VALUES = 1_000_000
+MAX_VALUES = 1_000_000
 
 
 @dataclass(frozen=True)
-class Block:
+class DcmBlock:
     """The lines of a block, by what they hold, in their order."""
 
     head: Cell
@@ -41,10 +41,10 @@ class Block:
 
 def is_count(text: str) -> bool:
     """Tell whether a text is a number of values."""
-    return text.isascii() and text.isdecimal() and len(text) < 8 and 0 < int(text) <= MOST_VALUES
+    return text.isascii() and text.isdecimal() and len(text) < 8 and 0 < int(text) <= MAX_VALUES
 
 
-def characteristic_of(block: Block, problems: Problems) -> Characteristic | None:
+def characteristic_of(block: DcmBlock, problems: Problems) -> FileCharacteristic | None:
     """Return what a block is, or None with the problem reported."""
     sizes = block.sizes or ()
     values = block.numbers or block.texts
@@ -53,24 +53,26 @@ def characteristic_of(block: Block, problems: Problems) -> Characteristic | None
         problems.error("form", block.texts[0].span, label)
         return None
     kind = block.head.text
-    if kind == SHARED:
+    if kind == SHARED_AXIS:
         values = block.points_x
-    is_whole = _has(values, math.prod(sizes), "values", block, problems)
+    is_complete = _has_count(values, math.prod(sizes), "values", block, problems)
     axes = []
-    if kind in LINES or kind in MAPS:
-        is_whole &= _has(block.points_x, sizes[0], "points `ST/X`", block, problems)
-        axes.append(Axis(tuple(block.points_x), block.units.get("X")))
-    if kind in MAPS:
-        is_whole &= _has(block.points_y, sizes[1], "points `ST/Y`", block, problems)
-        axes.append(Axis(tuple(block.points_y), block.units.get("Y")))
-    if not is_whole:
+    if kind in CURVE_KINDS or kind in MAP_KINDS:
+        is_complete &= _has_count(block.points_x, sizes[0], "points `ST/X`", block, problems)
+        axes.append(FileAxis(tuple(block.points_x), block.units.get("X")))
+    if kind in MAP_KINDS:
+        is_complete &= _has_count(block.points_y, sizes[1], "points `ST/Y`", block, problems)
+        axes.append(FileAxis(tuple(block.points_y), block.units.get("Y")))
+    if not is_complete:
         return None
-    ordered = turned(values, sizes[0]) if len(sizes) == 2 else tuple(values)
+    ordered = transpose_map(values, sizes[0]) if len(sizes) == 2 else tuple(values)
     unit, about = block.units.get("W"), " ".join(block.about)
-    return Characteristic(block.name, ordered, unit, tuple(axes), bool(block.texts), about)
+    return FileCharacteristic(block.name, ordered, unit, tuple(axes), bool(block.texts), about)
 
 
-def _has(cells: list[Cell], count: int, what: str, block: Block, problems: Problems) -> bool:
+def _has_count(
+    cells: list[Cell], count: int, what: str, block: DcmBlock, problems: Problems
+) -> bool:
     if len(cells) == count:
         return True
     place = cells[count].span if len(cells) > count else block.name.span

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from codegen.exchange.characteristic import Cell, Characteristic
-from codegen.exchange.exact import exact, unit_of
+from codegen.exchange.characteristic import Cell, FileCharacteristic
+from codegen.exchange.exact import parse_cell_number, parse_unit_cell
 from language.declaration import Parameter
 from language.model import Automaton
-from language.number import NumberType, decimal, rounded
+from language.number import NumberType, round_to_type, shortest_decimal
 from language.problem import Problems, Span
 from language.units import Unit
 
@@ -28,7 +28,7 @@ class Remark:
 
 
 @dataclass(frozen=True)
-class Desk:
+class ImportContext:
     """What is compared with, and what was found until now."""
 
     automaton: Automaton
@@ -36,50 +36,63 @@ class Desk:
     problems: Problems
     remarks: list[Remark] = field(default_factory=list)
 
-    def remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
+    def add_remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
         """Tell what is worth knowing of a cell."""
         self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
 
 
-def real_of(
-    one: Characteristic, cell: Cell, unit: Unit, parameter: Parameter, desk: Desk
+def convert_real(
+    characteristic: FileCharacteristic,
+    cell: Cell,
+    unit: Unit,
+    parameter: Parameter,
+    context: ImportContext,
 ) -> float | None:
     """Return a value of a parameter, single or of a table, that is in a unit."""
-    number = exact(cell, desk.problems)
-    value = None if number is None else in_type(number, unit, cell, desk)
+    number = parse_cell_number(cell, context.problems)
+    value = None if number is None else convert_to_si(number, unit, cell, context)
     if number is None or value is None:
         return None
-    shown = decimal(value, desk.number)
+    shown = shortest_decimal(value, context.number)
     if unit.factor != 1 or unit.offset:
         si = f"{shown} {unit.dimension}".removesuffix(" 1")
-        text = f"`{cell.text} {one.unit.text if one.unit else ''}` is {si}"
-        desk.remark("converted", one.name, text, cell.span)
+        text = f"`{cell.text} {characteristic.unit.text if characteristic.unit else ''}` is {si}"
+        context.add_remark("converted", characteristic.name, text, cell.span)
     elif number not in (Fraction(shown), Fraction(value)):
-        text = f"`{cell.text}` is rounded to {shown}, its {desk.number}"
-        desk.remark("rounded", one.name, text, cell.span)
+        text = f"`{cell.text}` is rounded to {shown}, its {context.number}"
+        context.add_remark("rounded", characteristic.name, text, cell.span)
     limits = parameter.range
     if limits:
-        low, high = (rounded(limit, desk.number) for limit in limits)
+        low, high = (round_to_type(limit, context.number) for limit in limits)
         if not low <= value <= high:
-            ends = f"{decimal(low, desk.number)} to {decimal(high, desk.number)}"
-            label = f"`{one.name.text}` = {shown} is outside its range, {ends} in SI"
-            desk.problems.error("range", cell.span, label)
+            ends = f"{shortest_decimal(low, context.number)} to {shortest_decimal(high, context.number)}"
+            label = f"`{characteristic.name.text}` = {shown} is outside its range, {ends} in SI"
+            context.problems.error("range", cell.span, label)
             return None
     return value
 
 
-def unit_beside(one: Characteristic, own: Unit, cell: Cell | None, desk: Desk) -> Unit | None:
-    """Return the unit that stands beside values, a parameter's `own` where none does."""
-    unit = unit_of(cell, own, desk.problems)
-    if unit and (cell is None or not cell.text.strip()) and not own.dimension.is_number:
-        desk.remark("no unit", one.name, f"has no unit beside it: taken in {unit.text}")
+def resolve_unit(
+    characteristic: FileCharacteristic,
+    declared_unit: Unit,
+    cell: Cell | None,
+    context: ImportContext,
+) -> Unit | None:
+    """Return the unit that stands beside values, a parameter's `declared_unit` where none does."""
+    unit = parse_unit_cell(cell, declared_unit, context.problems)
+    if unit and (cell is None or not cell.text.strip()) and not declared_unit.dimension.is_number:
+        context.add_remark(
+            "no unit", characteristic.name, f"has no unit beside it: taken in {unit.text}"
+        )
     return unit
 
 
-def in_type(number: Fraction, unit: Unit, cell: Cell, desk: Desk) -> float | None:
+def convert_to_si(number: Fraction, unit: Unit, cell: Cell, context: ImportContext) -> float | None:
     """Return the value in SI of a number in a unit, None for one that is past the type."""
-    value = rounded(number * unit.factor + unit.offset, desk.number)
+    value = round_to_type(number * unit.factor + unit.offset, context.number)
     if abs(value) != float("inf"):
         return value
-    desk.problems.error("number", cell.span, f"`{cell.text}` is out of the range of {desk.number}")
+    context.problems.error(
+        "number", cell.span, f"`{cell.text}` is out of the range of {context.number}"
+    )
     return None

@@ -12,17 +12,17 @@ from codegen.exchange.characteristic import Cell
 
 
 @dataclass(frozen=True)
-class Owned:
+class NameFilter:
     """The names that begin with an `owner`'s, or all where there is none; `passed` are the others,
     each where it stood first.
     """
 
     owner: str = ""
-    passed: dict[str, Cell] = field(default_factory=dict)
+    skipped: dict[str, Cell] = field(default_factory=dict)
 
-    def has(self, name: Cell) -> bool:
+    def accepts(self, name: Cell) -> bool:
         """Tell whether a name is wanted; one that is not is noted."""
         if not self.owner or name.text.startswith(f"{self.owner}."):
             return True
-        self.passed.setdefault(name.text, name)
+        self.skipped.setdefault(name.text, name)
         return False

@@ -6,22 +6,22 @@ The names are those that the C has, behind that of the automaton: `estimator.J_e
 
 from __future__ import annotations
 
-from codegen.exchange.characteristic import Axis, Cell, Characteristic
+from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic
 from codegen.names import c_member
-from codegen.source import stepped
+from codegen.source import restrict_to_step
 from language.declaration import LookupTable
 from language.model import Automaton
-from language.number import NumberType, decimal, rounded
-from language.program import TICKS, Constant, Program, short
-from language.units import shown_unit
-from language.written import exact_text
+from language.number import NumberType, round_to_type, shortest_decimal
+from language.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.units import display_unit
+from language.written import format_exact
 
-STAMP = "solved.stamp_"
+STAMP_PREFIX = "solved.stamp_"
 
 
 def page_constants(program: Program) -> tuple[Constant, ...]:
     """Return the constants of the page in the order of its members."""
-    constants = stepped(program).constants
+    constants = restrict_to_step(program).constants
     return tuple(
         constant
         for kind in ("tunable", "solved")
@@ -36,55 +36,60 @@ def page_name(program: Program, constant: Constant) -> str:
     return f"{program.name}.{within}{c_member(constant.name)}"
 
 
-def page_of(automaton: Automaton, program: Program) -> tuple[Characteristic, ...]:
+def page_characteristics(automaton: Automaton, program: Program) -> tuple[FileCharacteristic, ...]:
     """Return the page of an automaton's Program with its values."""
-    return tuple(_characteristic(automaton, program, c) for c in page_constants(program))
+    return tuple(_page_characteristic(automaton, program, c) for c in page_constants(program))
 
 
-def value_text(value: float, constant: Constant, number: NumberType) -> str:
+def format_constant_value(value: float, constant: Constant, number: NumberType) -> str:
     """Return a value of a constant as it stands in a file."""
     if constant.type == "truth":
         return "true" if value else "false"
     if constant.values:
         return constant.values[int(value)]
-    return str(int(value)) if constant.type == "whole" else decimal(value, number)
+    return str(int(value)) if constant.type == "whole" else shortest_decimal(value, number)
 
 
-def _characteristic(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
-    if constant.unit == TICKS:
-        return _as_time(automaton, program, constant)
+def _page_characteristic(
+    automaton: Automaton, program: Program, constant: Constant
+) -> FileCharacteristic:
+    if constant.unit == TICK_UNIT:
+        return _wait_as_time(automaton, program, constant)
     table = None
     if constant.kind == "tunable":
-        table = automaton.parameters[short(constant.name)].table
+        table = automaton.parameters[unqualified_name(constant.name)].table
     items = constant.items or (constant.value,)
     is_text = constant.type == "truth" or bool(constant.values)
-    is_told = constant.type == "real" and (
-        constant.kind == "tunable" or constant.name.startswith(STAMP)
+    has_unit = constant.type == "real" and (
+        constant.kind == "tunable" or constant.name.startswith(STAMP_PREFIX)
     )
-    return Characteristic(
+    return FileCharacteristic(
         Cell(page_name(program, constant)),
-        tuple(Cell(value_text(item, constant, program.number)) for item in items),
-        Cell(shown_unit(constant.unit)) if is_told else None,
-        axes_of(table, program.number) if table else (),
+        tuple(Cell(format_constant_value(item, constant, program.number_type)) for item in items),
+        Cell(display_unit(constant.unit)) if has_unit else None,
+        axes_of(table, program.number_type) if table else (),
         is_text,
         constant.about,
     )
 
 
-def _as_time(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
+def _wait_as_time(automaton: Automaton, program: Program, constant: Constant) -> FileCharacteristic:
     """Return a tunable wait, which is kept in ticks, as the time that it is."""
     assert automaton.period
     time = int(constant.value) * automaton.period
     name = Cell(page_name(program, constant))
-    return Characteristic(name, (Cell(exact_text(time)),), Cell("s"), about=constant.about)
+    return FileCharacteristic(name, (Cell(format_exact(time)),), Cell("s"), about=constant.about)
 
 
-def axes_of(table: LookupTable, number: NumberType) -> tuple[Axis, ...]:
+def axes_of(table: LookupTable, number: NumberType) -> tuple[FileAxis, ...]:
     """Return the axes of a table as they are compiled in, in SI."""
     return tuple(
-        Axis(
-            tuple(Cell(decimal(rounded(point, number), number)) for point in axis.points),
-            Cell(shown_unit(str(axis.unit.dimension))),
+        FileAxis(
+            tuple(
+                Cell(shortest_decimal(round_to_type(point, number), number))
+                for point in axis.points
+            ),
+            Cell(display_unit(str(axis.unit.dimension))),
         )
         for axis in table.axes
     )

@@ -11,14 +11,14 @@ from language.problem import Problems, Source, Span, SpecError
 MAX_BYTES = 8 * 1024 * 1024
 """Largest file read: the page of a large automaton has some 100 kB."""
 LINE_END = re.compile(r"\r\n|\r|\n")
-NO_TEXT = re.compile(r"[\x00-\x08\x0b\x0e-\x1f]")
+CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b\x0e-\x1f]")
 """Characters that no text has: tabs, ends of lines and of pages are none of them."""
-UTF16 = (b"\xff\xfe", b"\xfe\xff")
+UTF16_BOM = (b"\xff\xfe", b"\xfe\xff")
 
 
-def page_bytes(path: Path, shown: str) -> bytes:
+def read_bytes(path: Path, display_name: str) -> bytes:
     """Return what a file holds. Raises SpecError for what is no file, is empty or too large."""
-    place = Span(Source(shown), 1, 1)
+    place = Span(Source(display_name), 1, 1)
     problems = Problems()
     data = b""
     try:
@@ -37,31 +37,33 @@ def page_bytes(path: Path, shown: str) -> bytes:
         problems.error("unreadable", place, f"the file cannot be read: {error.strerror}")
     except ValueError:
         problems.error("unreadable", place, "this is not the name of a file")
-    problems.stop_if_any()
+    problems.raise_if_errors()
     return data
 
 
-def page_text(data: bytes, shown: str, other: str | None = None) -> tuple[Source, str]:
-    """Return the text of a file in UTF-8, or else in the encoding `other`. Raises SpecError."""
+def decode_text(
+    data: bytes, display_name: str, fallback_encoding: str | None = None
+) -> tuple[Source, str]:
+    """Return the text of a file in UTF-8, or else in the encoding `fallback_encoding`. Raises SpecError."""
     problems = Problems()
-    if data.startswith(UTF16):
-        place = Span(Source(shown), 1, 1)
+    if data.startswith(UTF16_BOM):
+        place = Span(Source(display_name), 1, 1)
         problems.error("binary", place, "this is UTF-16", "save it as UTF-8")
-        problems.stop_if_any()
+        problems.raise_if_errors()
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        if other is None:
+        if fallback_encoding is None:
             line = data.count(b"\n", 0, error.start) + 1
-            place = Span(Source(shown), line, 1)
+            place = Span(Source(display_name), line, 1)
             problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
-            raise SpecError(problems.found) from None
-        text = data.decode(other)
-    odd = NO_TEXT.search(text)
-    if odd:
-        line = len(LINE_END.findall(text, 0, odd.start())) + 1
-        place = Span(Source(shown), line, 1)
-        label = f"this is no text: it holds the character {ord(odd[0])}"
+            raise SpecError(problems.reported) from None
+        text = data.decode(fallback_encoding)
+    control_character = CONTROL_CHARACTERS.search(text)
+    if control_character:
+        line = len(LINE_END.findall(text, 0, control_character.start())) + 1
+        place = Span(Source(display_name), line, 1)
+        label = f"this is no text: it holds the character {ord(control_character[0])}"
         problems.error("binary", place, label)
-        problems.stop_if_any()
-    return Source(shown, tuple(LINE_END.split(text))), text
+        problems.raise_if_errors()
+    return Source(display_name, tuple(LINE_END.split(text))), text

@@ -4,62 +4,84 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from codegen.exchange.characteristic import Axis, Cell, Characteristic
-from codegen.exchange.desk import Desk, in_type, real_of, unit_beside
-from codegen.exchange.exact import exact
+from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic
+from codegen.exchange.desk import ImportContext, convert_real, convert_to_si, resolve_unit
+from codegen.exchange.exact import parse_cell_number
 from codegen.exchange.page import axes_of
 from language.declaration import Parameter
-from language.document import Node
-from language.number import rounded
+from language.document import YamlNode
+from language.number import round_to_type
 from language.program import Constant
 from language.units import Unit
-from language.written import points_of
+from language.written import table_points
 
 
-def table_of(
-    one: Characteristic, constant: Constant, parameter: Parameter, desk: Desk
-) -> Node | None:
+def read_table(
+    characteristic: FileCharacteristic,
+    constant: Constant,
+    parameter: Parameter,
+    context: ImportContext,
+) -> YamlNode | None:
     """Return the values of a table at its points, which are compiled in.
 
     None where it is no such table, which is reported.
     """
     assert parameter.table
-    told = len(desk.problems.found)
-    has_points = not one.axes or _have_points(one, parameter, desk)
-    if len(one.values) != len(constant.items) or not has_points:
-        if len(desk.problems.found) == told:
-            label = f"`{one.name.text}` has other points than the table of the spec"
+    problem_count = len(context.problems.reported)
+    has_points = not characteristic.axes or _has_equal_axes(characteristic, parameter, context)
+    if len(characteristic.values) != len(constant.items) or not has_points:
+        if len(context.problems.reported) == problem_count:
+            label = f"`{characteristic.name.text}` has other points than the table of the spec"
             hint = "a calibration holds the values at its points: change these in a variant"
-            desk.problems.error("table", one.name.span, label, hint)
+            context.problems.error("table", characteristic.name.span, label, hint)
         return None
-    unit = unit_beside(one, parameter.table.unit, one.unit, desk)
-    found = [real_of(one, cell, unit, parameter, desk) for cell in one.values] if unit else []
-    values = [value for value in found if value is not None]
+    unit = resolve_unit(characteristic, parameter.table.unit, characteristic.unit, context)
+    converted = (
+        [
+            convert_real(characteristic, cell, unit, parameter, context)
+            for cell in characteristic.values
+        ]
+        if unit
+        else []
+    )
+    values = [value for value in converted if value is not None]
     if len(values) < len(constant.items):
         return None
-    return points_of(parameter, values, desk.number, one.values[0].span)
+    return table_points(parameter, values, context.number, characteristic.values[0].span)
 
 
-def _have_points(one: Characteristic, parameter: Parameter, desk: Desk) -> bool:
+def _has_equal_axes(
+    characteristic: FileCharacteristic, parameter: Parameter, context: ImportContext
+) -> bool:
     """Tell whether the axes of a file are those that are compiled in."""
     assert parameter.table
-    own = axes_of(parameter.table, desk.number)
-    if [len(axis.points) for axis in one.axes] != [len(axis.points) for axis in own]:
+    compiled_axes = axes_of(parameter.table, context.number)
+    if [len(axis.points) for axis in characteristic.axes] != [
+        len(axis.points) for axis in compiled_axes
+    ]:
         return False
     return all(
-        _has_points(one, axis, ours, declared.unit, desk)
-        for axis, ours, declared in zip(one.axes, own, parameter.table.axes, strict=True)
+        _has_equal_points(characteristic, axis, ours, declared.unit, context)
+        for axis, ours, declared in zip(
+            characteristic.axes, compiled_axes, parameter.table.axes, strict=True
+        )
     )
 
 
-def _has_points(one: Characteristic, axis: Axis, ours: Axis, own: Unit, desk: Desk) -> bool:
-    unit = unit_beside(one, own, axis.unit, desk)
+def _has_equal_points(
+    characteristic: FileCharacteristic,
+    axis: FileAxis,
+    compiled: FileAxis,
+    declared_unit: Unit,
+    context: ImportContext,
+) -> bool:
+    unit = resolve_unit(characteristic, declared_unit, axis.unit, context)
     return unit is not None and all(
-        _is_value(cell, unit, rounded(Fraction(point.text), desk.number), desk)
-        for cell, point in zip(axis.points, ours.points, strict=True)
+        _is_equal(cell, unit, round_to_type(Fraction(point.text), context.number), context)
+        for cell, point in zip(axis.points, compiled.points, strict=True)
     )
 
 
-def _is_value(cell: Cell, unit: Unit, value: float, desk: Desk) -> bool:
-    number = exact(cell, desk.problems)
-    return number is not None and in_type(number, unit, cell, desk) == value
+def _is_equal(cell: Cell, unit: Unit, value: float, context: ImportContext) -> bool:
+    number = parse_cell_number(cell, context.problems)
+    return number is not None and convert_to_si(number, unit, cell, context) == value

@@ -30,23 +30,23 @@ class Element:
         """The text between its tags, without blanks around it."""
         return "".join(self.pieces).strip()
 
-    def all(self, tag: str) -> Iterator[Element]:
+    def find_all(self, tag: str) -> Iterator[Element]:
         """Iterate over the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
-    def first(self, *path: str) -> Element | None:
+    def find(self, *path: str) -> Element | None:
         """Return what is found by going down a path of tags."""
-        found: Element | None = self
+        element: Element | None = self
         for tag in path:
-            found = next(found.all(tag), None) if found else None
-        return found
+            element = next(element.find_all(tag), None) if element else None
+        return element
 
-    def below(self, tag: str) -> Iterator[Element]:
+    def iter_descendants(self, tag: str) -> Iterator[Element]:
         """Iterate over what is inside at any depth with a tag, in the order of the file."""
         for child in self.children:
             if child.tag == tag:
                 yield child
-            yield from child.below(tag)
+            yield from child.iter_descendants(tag)
 
 
 class _Builder:
@@ -54,47 +54,47 @@ class _Builder:
 
     def __init__(self, source: Source, parser: expat.XMLParserType) -> None:
         self.source, self.parser, self.problems = source, parser, Problems()
-        self.open = [Element("", Span(source, 1, 1))]
+        self.stack = [Element("", Span(source, 1, 1))]
         parser.StartElementHandler = self.start
         parser.EndElementHandler = self.end
         parser.CharacterDataHandler = self.text
         parser.StartDoctypeDeclHandler = self.document_type
         parser.EntityDeclHandler = self.entity
-        parser.SkippedEntityHandler = self.skipped
+        parser.SkippedEntityHandler = self.skipped_entity
 
-    def place(self, width: int = 1) -> Span:
+    def current_span(self, width: int = 1) -> Span:
         at = self.parser.CurrentColumnNumber + 1
         return Span(self.source, self.parser.CurrentLineNumber, at, width)
 
     def start(self, name: str, attributes: object) -> None:
-        element = Element(name.rpartition(":")[2], self.place(len(name) + 1))
-        self.open[-1].children.append(element)
-        self.open.append(element)
-        if len(self.open) > MAX_DEPTH:
-            self.refuse("depth", f"elements lie more than {MAX_DEPTH} deep in each other")
+        element = Element(name.rpartition(":")[2], self.current_span(len(name) + 1))
+        self.stack[-1].children.append(element)
+        self.stack.append(element)
+        if len(self.stack) > MAX_DEPTH:
+            self.reject("depth", f"elements lie more than {MAX_DEPTH} deep in each other")
 
     def end(self, name: str) -> None:
-        self.open.pop()
+        self.stack.pop()
 
     def text(self, data: str) -> None:
-        self.open[-1].pieces.append(data)
+        self.stack[-1].pieces.append(data)
 
     def document_type(self, name: str, system: object, public: object, inside: int) -> None:
         if inside:
-            self.refuse("form", "a document that declares entities or elements is not read")
+            self.reject("form", "a document that declares entities or elements is not read")
 
     def entity(self, *declared: object) -> None:
-        self.refuse("form", "a document that declares entities is not read")
+        self.reject("form", "a document that declares entities is not read")
 
-    def skipped(self, name: str, is_parameter: object) -> None:
-        self.refuse("form", f"the entity `{name}` is not known")
+    def skipped_entity(self, name: str, is_parameter: object) -> None:
+        self.reject("form", f"the entity `{name}` is not known")
 
-    def refuse(self, kind: str, label: str) -> None:
-        self.problems.error(kind, self.place(), label)
-        raise SpecError(self.problems.found)
+    def reject(self, kind: str, label: str) -> None:
+        self.problems.error(kind, self.current_span(), label)
+        raise SpecError(self.problems.reported)
 
 
-def xml_tree(source: Source, data: bytes) -> Element:
+def parse_xml(source: Source, data: bytes) -> Element:
     """Return the root of an XML document. Raises SpecError."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
@@ -108,5 +108,5 @@ def xml_tree(source: Source, data: bytes) -> Element:
     except (LookupError, ValueError):
         start = Span(source, 1, 1)
         builder.problems.error("binary", start, "the encoding of this XML is not known")
-    builder.problems.stop_if_any()
-    return builder.open[0].children[0]
+    builder.problems.raise_if_errors()
+    return builder.stack[0].children[0]

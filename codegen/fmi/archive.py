@@ -6,39 +6,39 @@ import io
 import zipfile
 from collections.abc import Mapping
 
-from codegen.fmi.binary import binary, binary_file
-from codegen.fmi.content import fmu_files, headers
+from codegen.fmi.binary import binary_path, build_binary
+from codegen.fmi.content import emit_fmu_files, read_headers
 from codegen.fmi.variable import Version
 from language.program import Program
 
-FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time that a zip file can tell: no file in it has another."""
-PLAIN, RUNNABLE = 0o644, 0o755
+FILE_MODE, EXECUTABLE_MODE = 0o644, 0o755
 UNIX = 3
 """Who made an entry, for the permissions that it has."""
 
 
-def fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
+def build_fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
     """Return an FMU of a Program, with a binary for this machine or with sources alone.
 
     Raises ValueError as `fmu_files` does; ToolMissing, BuildError where there is a binary to make.
     """
-    files = fmu_files(program, version)
+    files = emit_fmu_files(program, version)
     if not is_source_only:
-        where = binary_file(program.name, version)
+        where = binary_path(program.name, version)
         sources = {path: data for path, data in files.items() if path.endswith((".c", ".h"))}
-        files[where] = binary(sources, headers(version))
-    return _zipped(files)
+        files[where] = build_binary(sources, read_headers(version))
+    return _zip_files(files)
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
+def _zip_files(files: Mapping[str, bytes]) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for path in sorted(files):
-            entry = zipfile.ZipInfo(path, FIRST_DAY)
+            entry = zipfile.ZipInfo(path, ZIP_EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = UNIX
-            mode = RUNNABLE if path.startswith("binaries/") else PLAIN
+            mode = EXECUTABLE_MODE if path.startswith("binaries/") else FILE_MODE
             entry.external_attr = mode << 16
             archive.writestr(entry, files[path])
     return buffer.getvalue()

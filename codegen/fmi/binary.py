@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, BuildError, compiler, compiler_version, linked
+from codegen.build import FLAGS, WARNINGS, BuildError, compiler_version, find_compiler, run_compiler
 from codegen.fmi.variable import Version
-from codegen.objects import with_objects
+from codegen.objects import substitute_objects
 
-SHARED = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
+SHARED_LIBRARY_FLAGS = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
 """Only what the standard names is seen; without symbols, so that bytes do not tell of folders."""
 
 
@@ -21,7 +21,7 @@ class Platform:
     """A machine as FMI names it: its folder in each version, and how its libraries end."""
 
     folders: Mapping[int, str]
-    ending: str
+    suffix: str
 
 
 PLATFORMS: Mapping[tuple[str, str], Platform] = {
@@ -32,16 +32,16 @@ PLATFORMS: Mapping[tuple[str, str], Platform] = {
 }
 
 
-def binary_file(name: str, version: Version) -> str:
+def binary_path(name: str, version: Version) -> str:
     """Return the path in an FMU of what is compiled for this machine. Raises BuildError."""
     machine = (platform.system(), platform.machine())
     if machine not in PLATFORMS:
         raise BuildError(f"FMI has no name for this machine ({' '.join(machine)}): pack sources")
     found = PLATFORMS[machine]
-    return f"binaries/{found.folders[version]}/{name}{found.ending}"
+    return f"binaries/{found.folders[version]}/{name}{found.suffix}"
 
 
-def binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
+def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
     """Return the library made of the sources of an FMU. Raises ToolMissing, BuildError.
 
     Headers of the standard are not ours to change: they are read without warnings.
@@ -53,9 +53,11 @@ def binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
         for path, data in files.items():
             folder = standard if Path(path).name in headers else ours
             (folder / Path(path).name).write_bytes(data)
-        words = [*compiler(), *FLAGS, *WARNINGS, *SHARED]
-        room = Path(name) / "objects"
-        parts = with_objects(sorted(ours.glob("*.c")), words, compiler_version(), room)
+        compile_command = [*find_compiler(), *FLAGS, *WARNINGS, *SHARED_LIBRARY_FLAGS]
+        object_folder = Path(name) / "objects"
+        parts = substitute_objects(
+            sorted(ours.glob("*.c")), compile_command, compiler_version(), object_folder
+        )
         target = Path(name) / "library"
-        linked([*words, "-isystem", str(standard), *map(str, parts), "-lm"], target)
+        run_compiler([*compile_command, "-isystem", str(standard), *map(str, parts), "-lm"], target)
         return target.read_bytes()

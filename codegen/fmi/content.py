@@ -10,9 +10,9 @@ from typing import Any
 from codegen.fmi.interface import used_enumerations, variables_of
 from codegen.fmi.standard import refusals
 from codegen.fmi.unit import unit_definitions
-from codegen.fmi.variable import TYPES, VERSIONS, Version
-from codegen.rendering import render, version as product
-from codegen.source import c_files
+from codegen.fmi.variable import FMI_TYPES, VERSIONS, Version
+from codegen.rendering import product_version as product, render
+from codegen.source import emit_c_files
 from language.printing import digest
 from language.program import Program
 
@@ -21,11 +21,11 @@ HEADERS: Mapping[Version, tuple[str, ...]] = {
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
 }
 """Headers of the Modelica Association, under their own licence (BSD, two clauses)."""
-OPTIONS = "-ffp-contract=off -fno-fast-math"
+COMPILER_OPTIONS = "-ffp-contract=off -fno-fast-math"
 """What a compiler must be told; under others the bits are others."""
 
 
-def fmu_files(program: Program, version: Version) -> dict[str, bytes]:
+def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
     """Return the files of an FMU without a binary, by their path in it.
 
     Raises ValueError for a version that is not known and for a Program that has no C.
@@ -33,35 +33,35 @@ def fmu_files(program: Program, version: Version) -> dict[str, bytes]:
     if version not in VERSIONS:
         known = " and ".join(map(str, VERSIONS))
         raise ValueError(f"there is no FMI {version}: versions are {known}")
-    sources = {**c_files(program), **wrapper(program, version)}
-    context = {**described(program, version), "sources": _compiled(sources)}
+    sources = {**emit_c_files(program), **emit_wrapper(program, version)}
+    context = {**fmu_context(program, version), "sources": _c_sources(sources)}
     files = {f"sources/{name}": text.encode() for name, text in sources.items()}
-    files |= {f"sources/{name}": data for name, data in headers(version).items()}
-    files["modelDescription.xml"] = _rendered(f"fmi/description_{version}.xml.jinja", context)
+    files |= {f"sources/{name}": data for name, data in read_headers(version).items()}
+    files["modelDescription.xml"] = _render_bytes(f"fmi/description_{version}.xml.jinja", context)
     if version == 3:
-        files["sources/buildDescription.xml"] = _rendered("fmi/build.xml.jinja", context)
+        files["sources/buildDescription.xml"] = _render_bytes("fmi/build.xml.jinja", context)
     return dict(sorted(files.items()))
 
 
-def wrapper(program: Program, version: Version) -> dict[str, str]:
+def emit_wrapper(program: Program, version: Version) -> dict[str, str]:
     """Return the C that puts the functions of the standard around a Program's own, by name."""
-    context = described(program, version)
+    context = fmu_context(program, version)
     return {f"{program.name}_fmu.c": render(f"fmi/fmi_{version}.c.jinja", context)}
 
 
-def headers(version: Version) -> dict[str, bytes]:
+def read_headers(version: Version) -> dict[str, bytes]:
     """Return the headers of the standard by name."""
     folder = resources.files("codegen").joinpath("fmi", "headers")
     return {name: folder.joinpath(name).read_bytes() for name in HEADERS[version]}
 
 
-def token(program: Program, version: Version) -> str:
+def instantiation_token(program: Program, version: Version) -> str:
     """Return what ties a description to its binary: it follows from digest, version and product."""
-    told = f"modewright {product()} FMI {version} {program.name} {digest(program)}"
-    return f"{{{uuid.uuid5(uuid.NAMESPACE_URL, told)}}}"
+    identity = f"modewright {product()} FMI {version} {program.name} {digest(program)}"
+    return f"{{{uuid.uuid5(uuid.NAMESPACE_URL, identity)}}}"
 
 
-def described(program: Program, version: Version) -> dict[str, Any]:
+def fmu_context(program: Program, version: Version) -> dict[str, Any]:
     """Return what the templates of an FMU read."""
     variables = variables_of(program, version)
     period = program.period or program.major_step
@@ -69,7 +69,7 @@ def described(program: Program, version: Version) -> dict[str, Any]:
         "name": program.name,
         "version": product(),
         "fmi": f"fmi{version}",
-        "token": token(program, version),
+        "token": instantiation_token(program, version),
         "digest": digest(program),
         "period": repr(float(period)),
         "over": f"{float(period.numerator)!r}",
@@ -78,18 +78,18 @@ def described(program: Program, version: Version) -> dict[str, Any]:
         "enumerations": used_enumerations(program, variables),
         "units": unit_definitions(variable.unit for variable in variables),
         "unknowns": [(k, v) for k, v in enumerate(variables) if v.causality == "output"],
-        "types": TYPES[version],
+        "types": FMI_TYPES[version],
         "stores": sorted({variable.kept for variable in variables} - {"fault"}),
         "written": sorted({variable.kept for variable in variables if variable.role != "SHOWN"}),
         "faults": program.faults,
-        "options": OPTIONS,
+        "options": COMPILER_OPTIONS,
         "refusals": list(refusals(version)),
     }
 
 
-def _compiled(sources: Mapping[str, str]) -> list[str]:
+def _c_sources(sources: Mapping[str, str]) -> list[str]:
     return sorted(name for name in sources if name.endswith(".c"))
 
 
-def _rendered(template: str, context: Mapping[str, Any]) -> bytes:
+def _render_bytes(template: str, context: Mapping[str, Any]) -> bytes:
     return render(template, context).encode()

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from codegen.names import enumerations
-from language.program import MODE, ModeInfo, Program, mode_variable
+from language.program import MODE_VARIABLE, ModeInfo, Program, mode_variable
 
 RUN_MODE = "memory.run_mode"
 PREFIX = "type."
@@ -23,29 +23,29 @@ class Enumeration:
 
 def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
     """Return the types of a Program: the modes of each region, then lists of names."""
-    found = [_modes("mode", program.modes)]
-    found += [_modes(f"region.{info.name}", info.modes) for info in program.regions]
+    types = [_mode_enumeration("mode", program.modes)]
+    types += [_mode_enumeration(f"region.{info.name}", info.modes) for info in program.regions]
     if program.run_modes:
-        found.append(_modes("run_mode", program.run_modes))
-    found += [
+        types.append(_mode_enumeration("run_mode", program.run_modes))
+    types += [
         Enumeration(f"{PREFIX}values.{name}", tuple((value, k) for k, value in enumerate(values)))
         for name, values in enumerations(program)
     ]
-    return tuple(found)
+    return tuple(types)
 
 
-def type_of(program: Program, name: str, values: tuple[str, ...] = ()) -> str:
+def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) -> str:
     """Return the name of the type of a variable or constant; an empty text where it has none."""
-    if name == MODE:
+    if name == MODE_VARIABLE:
         return f"{PREFIX}mode"
     if name == RUN_MODE:
         return f"{PREFIX}run_mode"
     for region in program.regions:
-        if name == mode_variable(MODE, region.name):
+        if name == mode_variable(MODE_VARIABLE, region.name):
             return f"{PREFIX}region.{region.name}"
     owners = (owner for owner, known in enumerations(program) if known == values)
     return f"{PREFIX}values.{next(owners)}" if values else ""
 
 
-def _modes(name: str, modes: Iterable[ModeInfo]) -> Enumeration:
+def _mode_enumeration(name: str, modes: Iterable[ModeInfo]) -> Enumeration:
     return Enumeration(f"{PREFIX}{name}", tuple((mode.name, mode.number) for mode in modes))

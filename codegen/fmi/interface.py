@@ -5,24 +5,31 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-from codegen.fmi.enumeration import Enumeration, enumerations_of, type_of
+from codegen.fmi.enumeration import Enumeration, enumeration_name, enumerations_of
 from codegen.fmi.unit import SECOND, unit_name
 from codegen.fmi.variable import (
-    LIMITS,
+    TYPE_LIMITS,
     Causality,
     FmuVariable,
     Version,
-    enumerated_in,
-    type_in,
+    fmi_enumeration_type,
+    fmi_type,
 )
 from codegen.names import CNames, c_member, c_type
-from codegen.source import stepped
-from language.number import decimal
+from codegen.source import restrict_to_step
+from language.number import shortest_decimal
 from language.operation import Assign, Value
-from language.program import TICKS, Constant, Program, Variable, short
-from language.text import visible
+from language.program import TICK_UNIT, Constant, Program, Variable, unqualified_name
+from language.text import escape_invisible
 
-LOCAL = ("state.", "discrete.", "equation.", "innovation.", "memory.mode", "memory.run_mode")
+LOCAL_PREFIXES = (
+    "state.",
+    "discrete.",
+    "equation.",
+    "innovation.",
+    "memory.mode",
+    "memory.run_mode",
+)
 FIRED = "memory.fired"
 FAULTS = "memory.faults"
 """Locals are what an instance carries of these, where no output has it."""
@@ -33,46 +40,51 @@ def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
 
     Names are those of the spec; a name that is taken gets its causality before it.
     """
-    program = stepped(program)
-    found = [
-        _time(version),
-        *_inputs(program, version),
-        *_parameters(program, version),
-        *_outputs(program, version),
-        *_locals(program, version),
-        *_faults(program, version),
+    program = restrict_to_step(program)
+    variables = [
+        _time_variable(version),
+        *_input_variables(program, version),
+        *_parameter_variables(program, version),
+        *_output_variables(program, version),
+        *_local_variables(program, version),
+        *_fault_variables(program, version),
     ]
-    return tuple(_with_own_names(found))
+    return tuple(_make_names_unique(variables))
 
 
-def _time(version: Version) -> FmuVariable:
-    kind = type_in(version, "double")
+def _time_variable(version: Version) -> FmuVariable:
+    kind = fmi_type(version, "double")
     return FmuVariable("time", kind, "double", "time", "independent", "continuous", unit=SECOND)
 
 
-def _inputs(program: Program, version: Version) -> Iterator[FmuVariable]:
-    place, first = CNames(program), _first_values(program)
+def _input_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+    place, first = CNames(program), _start_values(program)
     for variable in program.variables:
         group, _, name = variable.name.partition(".")
         if group not in ("input", "is_new"):
             continue
-        kept = c_type(variable, program.number)
+        storage_type = c_type(variable, program.number_type)
         is_new = group == "is_new"
-        made = _variable(
-            program, version, variable, kept, place(variable.name).replace("in->", "in."), "input"
+        made = _make_variable(
+            program,
+            version,
+            variable,
+            storage_type,
+            place(variable.name).replace("in->", "in."),
+            "input",
         )
         start = True if is_new else first.get(name, 0)
         yield dataclasses.replace(
-            _bounded(made, program, None),
+            _with_limits(made, program, None),
             name=f"is_new.{name}" if is_new else name,
-            start=_told(start, kept, program),
+            start=_format_value(start, storage_type, program),
         )
 
 
-def _first_values(program: Program) -> dict[str, float | bool]:
+def _start_values(program: Program) -> dict[str, float | bool]:
     """Return what inputs hold at first: their default, or of a range what is nearest to 0."""
     held = {
-        short(op.target): op.value.value
+        unqualified_name(op.target): op.value.value
         for op in program.blocks.get("init", ())
         if isinstance(op, Assign) and isinstance(op.value, Value)
         if op.target.startswith("latched.")
@@ -80,57 +92,57 @@ def _first_values(program: Program) -> dict[str, float | bool]:
     return {**held, **program.defaults}
 
 
-def _parameters(program: Program, version: Version) -> Iterator[FmuVariable]:
+def _parameter_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
     """The whole page: tunable parameters, tables by point, and numbers solved for them."""
     for constant in program.constants:
         if constant.kind not in ("tunable", "solved"):
             continue
         group = "cal.solved." if constant.kind == "solved" else "cal."
-        name = ("solved." if constant.kind == "solved" else "") + short(constant.name)
+        name = ("solved." if constant.kind == "solved" else "") + unqualified_name(constant.name)
         variable = Variable(constant.name, constant.type, constant.unit, values=constant.values)
-        kept, member = c_type(variable, program.number), c_member(constant.name)
-        made = _variable(program, version, variable, kept, group + member, "parameter")
-        made = dataclasses.replace(_bounded(made, program, constant), name=name)
+        storage_type, member = c_type(variable, program.number_type), c_member(constant.name)
+        made = _make_variable(program, version, variable, storage_type, group + member, "parameter")
+        made = dataclasses.replace(_with_limits(made, program, constant), name=name)
         about = constant.about or constant.key
-        if constant.unit == TICKS and program.period:
-            about += f"; in ticks of {decimal(float(program.period), 'float64')} s"
+        if constant.unit == TICK_UNIT and program.period:
+            about += f"; in ticks of {shortest_decimal(float(program.period), 'float64')} s"
         if not constant.items:
-            start = _told(constant.value, kept, program)
-            yield dataclasses.replace(made, start=start, about=visible(about))
+            start = _format_value(constant.value, storage_type, program)
+            yield dataclasses.replace(made, start=start, about=escape_invisible(about))
         for k, item in enumerate(constant.items):
             yield dataclasses.replace(
                 made,
                 name=f"{name}[{k + 1}]",
                 place=f"{made.place}[{k}]",
-                start=_told(item, kept, program),
-                about=visible(about),
+                start=_format_value(item, storage_type, program),
+                about=escape_invisible(about),
             )
 
 
-def _outputs(program: Program, version: Version) -> Iterator[FmuVariable]:
+def _output_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
     sources = {variable.name: variable for variable in program.variables}
     for wire in program.outputs:
         source = dataclasses.replace(sources[wire.source], unit=wire.unit)
-        kept = c_type(source, program.number)
-        made = _variable(program, version, source, kept, f"out.{wire.name}", "output")
+        storage_type = c_type(source, program.number_type)
+        made = _make_variable(program, version, source, storage_type, f"out.{wire.name}", "output")
         yield dataclasses.replace(made, name=wire.name)
 
 
-def _locals(program: Program, version: Version) -> Iterator[FmuVariable]:
+def _local_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
     place = CNames(program)
-    told = {wire.source for wire in program.outputs}
+    output_sources = {wire.source for wire in program.outputs}
     for variable in program.variables:
         name = variable.name
-        is_local = name.startswith((*LOCAL, FIRED)) or name == FAULTS
-        if not is_local or name in told or variable.size:
+        is_local = name.startswith((*LOCAL_PREFIXES, FIRED)) or name == FAULTS
+        if not is_local or name in output_sources or variable.size:
             continue
-        kept = c_type(variable, program.number)
+        storage_type = c_type(variable, program.number_type)
         where = place(name).replace("self->", "self.")
-        made = _variable(program, version, variable, kept, where, "local")
+        made = _make_variable(program, version, variable, storage_type, where, "local")
         yield dataclasses.replace(made, name=name.removeprefix("memory."))
 
 
-def _faults(program: Program, version: Version) -> Iterator[FmuVariable]:
+def _fault_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
     for bit, fault in enumerate(program.faults):
         yield FmuVariable(
             f"fault.{fault}",
@@ -143,57 +155,60 @@ def _faults(program: Program, version: Version) -> Iterator[FmuVariable]:
         )
 
 
-def _variable(
+def _make_variable(
     program: Program,
     version: Version,
     variable: Variable,
-    kept: str,
+    storage_type: str,
     place: str,
     causality: Causality,
 ) -> FmuVariable:
     """Return a variable with what follows from its type."""
-    declared = type_of(program, variable.name, variable.values)
+    declared = enumeration_name(program, variable.name, variable.values)
     flows = program.period is None and variable.type == "real"
     variability = "continuous" if flows else "discrete"
     return FmuVariable(
-        name=short(variable.name),
-        type=enumerated_in(version) if declared else type_in(version, kept),
-        kept=kept,
+        name=unqualified_name(variable.name),
+        type=fmi_enumeration_type(version) if declared else fmi_type(version, storage_type),
+        kept=storage_type,
         place=place,
         causality=causality,
         variability="tunable" if causality == "parameter" else variability,
         unit=unit_name(variable.unit) if variable.type == "real" else "",
         declared=declared,
-        about=visible(variable.about),
+        about=escape_invisible(variable.about),
     )
 
 
-def _bounded(made: FmuVariable, program: Program, constant: Constant | None) -> FmuVariable:
+def _with_limits(variable: FmuVariable, program: Program, constant: Constant | None) -> FmuVariable:
     """Return a variable that may be set with what it may be set to."""
-    low, high = LIMITS[made.kept]
-    if made.declared:
-        items = next(e.items for e in enumerations_of(program) if e.name == made.declared)
+    low, high = TYPE_LIMITS[variable.kept]
+    if variable.declared:
+        items = next(e.items for e in enumerations_of(program) if e.name == variable.declared)
         low, high = (f"{number}.0" for number in (items[0][1], items[-1][1]))
     if constant is None or constant.range is None:
-        return dataclasses.replace(made, low=low, high=high)
+        return dataclasses.replace(variable, low=low, high=high)
     ends = [float(end) for end in constant.range]
-    told = (_told(ends[0], made.kept, program), _told(ends[1], made.kept, program))
+    told = (
+        _format_value(ends[0], variable.kept, program),
+        _format_value(ends[1], variable.kept, program),
+    )
     # The C compares doubles: a float32 end is written with all its digits.
-    return dataclasses.replace(made, range=told, low=repr(ends[0]), high=repr(ends[1]))
+    return dataclasses.replace(variable, range=told, low=repr(ends[0]), high=repr(ends[1]))
 
 
-def _told(value: float | bool, kept: str, program: Program) -> str:
+def _format_value(value: float | bool, storage_type: str, program: Program) -> str:
     """Return a value as the description has it."""
-    if kept == "bool":
+    if storage_type == "bool":
         return "true" if value else "false"
-    if kept in ("double", "float"):
-        return decimal(float(value), program.number)
+    if storage_type in ("double", "float"):
+        return shortest_decimal(float(value), program.number_type)
     return str(int(value))
 
 
-def _with_own_names(found: Sequence[FmuVariable]) -> Iterator[FmuVariable]:
+def _make_names_unique(variables: Sequence[FmuVariable]) -> Iterator[FmuVariable]:
     taken: set[str] = set()
-    for variable in found:
+    for variable in variables:
         name = variable.name
         while name in taken:
             name = f"{variable.causality}.{name}"

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 
-from codegen.fmi.variable import TYPES, Version
+from codegen.fmi.variable import FMI_TYPES, Version
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 FUNCTION = re.compile(r"typedef\s+fmi\dStatus\s+(fmi\d\w+?)TYPE\s*\((.*?)\);", re.DOTALL)
-MADE: Mapping[Version, str] = {
+IMPLEMENTED: Mapping[Version, str] = {
     2: "SetDebugLogging SetupExperiment EnterInitializationMode ExitInitializationMode Terminate "
     "Reset GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate "
     "DeSerializeFMUstate DoStep GetRealStatus GetBooleanStatus",
@@ -20,7 +20,7 @@ MADE: Mapping[Version, str] = {
     "DeserializeFMUState DoStep",
 }
 """Functions that return a status and have a template of their own."""
-REASONS: tuple[tuple[str, str], ...] = (
+REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
     ("String$", "no variable is a text"),
     ("Binary", "no variable is binary"),
     ("Clock|Interval|Shift", "there are no clocks"),
@@ -52,15 +52,17 @@ class Refusal:
 def refusals(version: Version) -> Iterator[Refusal]:
     """Yield the functions of a version that no template makes, in the order of its header."""
     file = resources.files("codegen").joinpath("fmi", "headers", f"fmi{version}FunctionTypes.h")
-    made = {f"fmi{version}{name}" for name in MADE[version].split()}
-    made |= {f"fmi{version}{what}{kind}" for kind in TYPES[version] for what in ("Get", "Set")}
+    implemented = {f"fmi{version}{name}" for name in IMPLEMENTED[version].split()}
+    implemented |= {
+        f"fmi{version}{what}{kind}" for kind in FMI_TYPES[version] for what in ("Get", "Set")
+    }
     for name, parameters in FUNCTION.findall(COMMENT.sub("", file.read_text("ascii"))):
-        if name not in made:
-            listed = tuple(_written(text) for text in parameters.split(","))
-            why = next(why for pattern, why in REASONS if re.search(pattern, name))
-            yield Refusal(name, listed, why)
+        if name not in implemented:
+            parameter_texts = tuple(_format_parameter(text) for text in parameters.split(","))
+            why = next(why for pattern, why in REFUSAL_REASONS if re.search(pattern, name))
+            yield Refusal(name, parameter_texts, why)
 
 
-def _written(parameter: str) -> str:
+def _format_parameter(parameter: str) -> str:
     """Return a parameter in one line, the star of a pointer beside its name."""
     return " ".join(parameter.split()).replace("* ", " *")

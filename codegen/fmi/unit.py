@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from language.symbols import BASE_SYMBOLS
-from language.units import UnitError, parse_unit, shown_unit
+from language.units import UnitError, display_unit, parse_unit
 
 SECOND = "s"
 BASE_ORDER = ("kg", "m", "s", "A", "K", "rad")
@@ -23,7 +23,7 @@ class UnitDefinition:
 
 def unit_name(text: str) -> str:
     """Return the name of a unit of a Program; an empty text for a number, and for what is none."""
-    return shown_unit(text) if text and _is_unit(text) else ""
+    return display_unit(text) if text and _is_unit(text) else ""
 
 
 def unit_definitions(texts: Iterable[str]) -> tuple[UnitDefinition, ...]:

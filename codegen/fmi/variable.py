@@ -11,7 +11,7 @@ VERSIONS: tuple[Version, ...] = (2, 3)
 Causality = Literal["independent", "input", "parameter", "output", "local"]
 ROLES: Mapping[str, str] = {"input": "INPUT", "parameter": "PARAMETER"}
 """What may be set; the rest is shown."""
-TYPES: Mapping[Version, tuple[str, ...]] = {
+FMI_TYPES: Mapping[Version, tuple[str, ...]] = {
     2: ("Real", "Integer", "Boolean"),
     3: (
         *("Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32"),
@@ -19,7 +19,7 @@ TYPES: Mapping[Version, tuple[str, ...]] = {
     ),
 }
 """Types that the functions of a version read and write; there are no texts and no bytes."""
-NUMBERS: Mapping[str, str] = {
+FMI3_TYPE_OF: Mapping[str, str] = {
     "double": "Float64",
     "float": "Float32",
     "int32_t": "Int32",
@@ -29,7 +29,7 @@ NUMBERS: Mapping[str, str] = {
     "uint32_t": "UInt32",
 }
 """Types of FMI 3.0 of what the C keeps."""
-LIMITS: Mapping[str, tuple[str, str]] = {
+TYPE_LIMITS: Mapping[str, tuple[str, str]] = {
     "double": ("-DBL_MAX", "DBL_MAX"),
     "float": ("-(double)FLT_MAX", "(double)FLT_MAX"),
     "bool": ("0.0", "1.0"),
@@ -69,15 +69,15 @@ class FmuVariable:
         return ROLES.get(self.causality, "SHOWN")
 
 
-def type_in(version: Version, kept: str) -> str:
+def fmi_type(version: Version, storage_type: str) -> str:
     """Return the type of FMI whose functions read a value of a C type."""
-    if kept in ("bool", "fault"):
+    if storage_type in ("bool", "fault"):
         return "Boolean"
     if version == 3:
-        return NUMBERS[kept]
-    return "Real" if kept in ("double", "float") else "Integer"
+        return FMI3_TYPE_OF[storage_type]
+    return "Real" if storage_type in ("double", "float") else "Integer"
 
 
-def enumerated_in(version: Version) -> str:
+def fmi_enumeration_type(version: Version) -> str:
     """Return the type of FMI whose functions read an enumeration."""
     return "Integer" if version == 2 else "Int64"

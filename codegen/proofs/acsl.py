@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from codegen.expression import literal
+from codegen.expression import format_literal
 from language.number import NumberType
 from language.operation import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 
@@ -56,7 +56,7 @@ class Speech:
         """Return a number. Raises Unsaid."""
         match expr:
             case Value():
-                text = literal(expr.rounded(self.number).value, self.number)
+                text = format_literal(expr.round_to_type(self.number).value, self.number)
                 return f"({text})" if text[0] == "-" else text
             case Ref(name):
                 return look(name)

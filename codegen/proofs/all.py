@@ -6,39 +6,39 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from codegen.proofs.contract import contract
-from codegen.proofs.misra import misra
-from codegen.proofs.proof import Proof
-from codegen.proofs.sanitised import sanitised
-from codegen.proofs.stack import stack
-from codegen.proofs.strict import strict
-from codegen.proofs.values import values
-from codegen.source import c_files
+from codegen.proofs.contract import check_contracts
+from codegen.proofs.misra import check_misra
+from codegen.proofs.proof import ToolVerdict
+from codegen.proofs.sanitised import check_sanitizers
+from codegen.proofs.stack import check_stack
+from codegen.proofs.strict import check_compiler_warnings
+from codegen.proofs.values import check_values
+from codegen.source import emit_c_files
 from language.model import Automaton
 from language.program import Program
 
 CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
 
 
-def proofs(
+def run_checks(
     automaton: Automaton, program: Program, checks: Sequence[str] = CHECKS
-) -> Iterator[Proof]:
+) -> Iterator[ToolVerdict]:
     """Yield what each check says. Raises ToolMissing, BuildError."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         for inner in ("sanitizers", "values", "contract"):
             (folder / inner).mkdir()
-        files = c_files(program)
+        files = emit_c_files(program)
         for file, text in files.items():
             (folder / file).write_text(text)
         sources = [file for file in files if file.endswith(".c")]
-        made: dict[str, Callable[[], list[Proof]]] = {
-            "warnings": lambda: strict(folder, sources),
-            "misra": lambda: [misra(folder, sources)],
-            "stack": lambda: [stack(folder, sources, f"{program.name}_Step")],
-            "sanitizers": lambda: [sanitised(program, folder / "sanitizers")],
-            "values": lambda: [values(program, folder / "values")],
-            "contract": lambda: [contract(automaton, program, folder / "contract")],
+        made: dict[str, Callable[[], list[ToolVerdict]]] = {
+            "warnings": lambda: check_compiler_warnings(folder, sources),
+            "misra": lambda: [check_misra(folder, sources)],
+            "stack": lambda: [check_stack(folder, sources, f"{program.name}_Step")],
+            "sanitizers": lambda: [check_sanitizers(program, folder / "sanitizers")],
+            "values": lambda: [check_values(program, folder / "values")],
+            "contract": lambda: [check_contracts(automaton, program, folder / "contract")],
         }
         for check in checks:
             yield from made[check]()

@@ -14,14 +14,14 @@ from typing import TypeAlias
 from codegen.proofs.chart_entry import modes_after, outcomes
 from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.activation import begin, edges_by_mode
-from language.chart import Chart, Node, Way
-from language.charting import kept
-from language.event import QUEUE, TAIL
+from language.activation import edge_detectors_by_mode, start_timers
+from language.chart import Chart, ChartNode, ChartTransition
+from language.charting import history_ref
+from language.event import QUEUE, QUEUE_TAIL
 from language.operation import Assign
-from language.program import LOGGED, fired_variable
+from language.program import LOG_COUNT_VARIABLE, fired_variable
 
-Moved: TypeAlias = Callable[[Node], bool]
+Moved: TypeAlias = Callable[[ChartNode], bool]
 """Whether a node is left, or entered, in a case."""
 
 
@@ -48,7 +48,7 @@ class Commit:
         yield from Hearing(words).consistent(words.now)
         for region in words.charting.chart.regions:
             taken = [f"{words.now(words.chosen(region.region))} == 0"]
-            for transition, way in words.charting.ways_in(region.region):
+            for transition, way in words.charting.transitions_in(region.region):
                 source = words.is_active(words.charting.chart.nodes[way.source], words.now)
                 number = words.number(transition)
                 own = words.is_one(words.chosen(region.region), [number], words.now)
@@ -59,23 +59,23 @@ class Commit:
         """Yield that places of the log and of the queue are places; the queue gets no shorter."""
         words = self.words
         yield from self._counted()
-        if any(transition.raises for transition, _ in words.charting.all_ways):
-            yield f"{words.before(TAIL.name)} <= {words.now(TAIL.name)}"
+        if any(transition.raises for transition, _ in words.charting.all_transitions):
+            yield f"{words.before(QUEUE_TAIL.name)} <= {words.now(QUEUE_TAIL.name)}"
 
     def _counted(self) -> Iterator[str]:
         words, charting = self.words, self.words.charting
-        if charting.several:
-            yield f"0 <= {words.now(LOGGED)}"
-        if any(transition.raises for transition, _ in charting.all_ways):
-            yield f"0 <= {words.now(TAIL.name)} <= {charting.size}"
+        if charting.has_several_micro_steps:
+            yield f"0 <= {words.now(LOG_COUNT_VARIABLE)}"
+        if any(transition.raises for transition, _ in charting.all_transitions):
+            yield f"0 <= {words.now(QUEUE_TAIL.name)} <= {charting.queue_capacity}"
 
     def _fired(self) -> Iterator[str]:
         words = self.words
         for region in words.charting.chart.regions:
-            ways = words.charting.ways_in(region.region)
+            ways = words.charting.transitions_in(region.region)
             name = fired_variable(region.region)
             for number in [words.number(transition) for transition, _ in ways]:
-                told = words.place.whole(name, number)
+                told = words.place.integer_constant(name, number)
                 yield f"{self._is_taken(region.region, number)} ==> {words.now(name)} == {told}"
             if ways:
                 same = f"{words.now(name)} == {words.before(name)}"
@@ -84,7 +84,7 @@ class Commit:
     def _modes(self) -> Iterator[str]:
         words = self.words
         for region in words.charting.chart.regions:
-            for transition, way in words.charting.ways_in(region.region):
+            for transition, way in words.charting.transitions_in(region.region):
                 is_taken = self._is_taken(region.region, words.number(transition))
                 for name, found in modes_after(words, transition, way).items():
                     for tests, number in outcomes(found):
@@ -92,39 +92,39 @@ class Commit:
                         for source in self._sources(way) if tests else [""]:
                             yield f"{all_of(filter(None, [is_taken, source, *tests]))} ==> {said}"
 
-    def _sources(self, way: Way) -> list[str]:
+    def _sources(self, way: ChartTransition) -> list[str]:
         """Return the modes that a region may be in when a transition leaves it."""
         chart, words = self.words.charting.chart, self.words
         source = chart.nodes[way.source]
         numbers = [n.number for n in chart.leaves_of(source) if n.number is not None]
         return [words.is_in(source.region, [number], words.before) for number in numbers]
 
-    def _kept(self, region: Node, left: Moved) -> Iterator[str]:
+    def _kept(self, region: ChartNode, left: Moved) -> Iterator[str]:
         """A history keeps what its mode was in when it was left."""
         words, chart = self.words, self.words.charting.chart
-        for index in sorted(words.charting.remembered):
+        for index in sorted(words.charting.history_nodes):
             node = chart.nodes[index]
             if node.region == region.region:
-                name = kept(node).name
+                name = history_ref(node).name
                 is_compound = node.kind == "compound"
                 was = words.before(words.mode(node.region)) if is_compound else "1"
                 yield f"{words.now(name)} == {was if left(node) else words.before(name)}"
 
-    def _times(self, region: Node, left: Moved, entered: Moved) -> Iterator[str]:
+    def _times(self, region: ChartNode, left: Moved, entered: Moved) -> Iterator[str]:
         """Counters and edges end with their mode; its time begins when it is entered."""
         words, charting = self.words, self.words.charting
         for node in charting.chart.nodes:
-            mode = charting.mode(node)
+            mode = charting.mode_of(node)
             if mode is None or node.region != region.region:
                 continue
-            for way in mode.transitions if node.index not in charting.continued else ():
-                timer = charting.info(way).timer
+            for way in mode.transitions if node.index not in charting.timer_keeping_nodes else ():
+                timer = charting.info_of(way).timer
                 if timer:
                     yield f"{words.now(timer)} == {'0' if left(node) else words.before(timer)}"
-            for edge in edges_by_mode(charting.automaton).get(mode.key, ()):
-                same = "\\false" if left(node) else words.before(edge.opposite)
-                yield f"({words.now(edge.opposite)} <==> {same})"
-            for op in begin(charting.automaton, mode):
+            for edge in edge_detectors_by_mode(charting.automaton).get(mode.key, ()):
+                same = "\\false" if left(node) else words.before(edge.armed_variable)
+                yield f"({words.now(edge.armed_variable)} <==> {same})"
+            for op in start_timers(charting.automaton, mode):
                 if isinstance(op, Assign):
                     same = f"({words.is_active(node, words.now)} ? 0 : {words.before(op.target)})"
                     value = same if entered(node) else words.before(op.target)
@@ -150,7 +150,9 @@ class Commit:
                     tests = [self._is_taken(name, number) for name, (number, _) in case.items()]
                     yield f"{all_of([*tests, *mode_test])} ==> {said}"
 
-    def _modes_left(self, region: Node, moves: list[Way]) -> Iterator[tuple[list[str], Moved]]:
+    def _modes_left(
+        self, region: ChartNode, moves: list[ChartTransition]
+    ) -> Iterator[tuple[list[str], Moved]]:
         """Yield the modes that a region may be in, and which of its nodes are left from there."""
         words, chart = self.words, self.words.charting.chart
         moved = _moved_by(chart, moves)
@@ -162,66 +164,66 @@ class Commit:
         numbers = [*leaves, *([] if inactive is None else [inactive])]
         for number in numbers:
             assert number is not None
-            active = chart.chain(leaves[number]) if number in leaves else ()
+            active = chart.region_ancestors(leaves[number]) if number in leaves else ()
             sources = [chart.nodes[way.source] for way in moves]
             if all(source in active for source in sources if source.region == region.region):
                 yield [words.is_in(region.region, [number], words.before)], _both(moved, active)
 
-    def _cases(self, region: Node) -> Iterator[dict[str, tuple[int, Way | None]]]:
+    def _cases(self, region: ChartNode) -> Iterator[dict[str, tuple[int, ChartTransition | None]]]:
         """Yield what regions may take together, of those whose transitions move a region."""
         words, chart = self.words, self.words.charting.chart
-        choices: dict[str, list[tuple[int, Way | None]]] = {}
+        choices: dict[str, list[tuple[int, ChartTransition | None]]] = {}
         for other in chart.regions:
-            ways = words.charting.ways_in(other.region)
+            ways = words.charting.transitions_in(other.region)
             if any(self._is_moved(region, way) for _, way in ways):
                 own = [(words.number(t), w if w.domain is not None else None) for t, w in ways]
                 choices[other.region] = [(0, None), *own]
         for case in product(*choices.values()):
             domains = [w.domain for _, w in case if w is not None and w.domain is not None]
-            if not any(chart.nested(a, b) for a, b in combinations(domains, 2)):
+            if not any(chart.are_nested(a, b) for a, b in combinations(domains, 2)):
                 yield dict(zip(choices, case, strict=True))
 
-    def _is_moved(self, region: Node, way: Way) -> bool:
+    def _is_moved(self, region: ChartNode, way: ChartTransition) -> bool:
         """Tell whether a transition may change the mode of a region."""
         if way.domain is None:
             return False
         domain = self.words.charting.chart.nodes[way.domain]
-        return domain.region == region.region or domain.holds(region.index)
+        return domain.region == region.region or domain.contains(region.index)
 
     def _is_taken(self, region: str, number: int) -> str:
         name = self.words.chosen(region)
-        return f"{self.words.before(name)} == {self.words.place.whole(name, number)}"
+        return f"{self.words.before(name)} == {self.words.place.integer_constant(name, number)}"
 
     def _raised(self) -> Iterator[str]:
         """An event that a transition raises is the last one that waits; regions in turn."""
         words, charting = self.words, self.words.charting
-        raising = [(t, w) for t, w in charting.all_ways if t.raises]
+        raising = [(t, w) for t, w in charting.all_transitions if t.raises]
         if len({charting.chart.nodes[way.source].region for _, way in raising}) != 1:
             return
         region = charting.chart.nodes[raising[0][1].source].region
-        tail, queue = words.before(TAIL.name), words.now(QUEUE)
+        tail, queue = words.before(QUEUE_TAIL.name), words.now(QUEUE)
         for transition, _ in raising:
             more = len(transition.raises)
             is_taken = words.is_one(words.chosen(region), [words.number(transition)], words.before)
-            fits = f"{is_taken} && {tail} <= {charting.size - more}"
-            yield f"({fits}) ==> {words.now(TAIL.name)} == {tail} + {more}"
+            fits = f"{is_taken} && {tail} <= {charting.queue_capacity - more}"
+            yield f"({fits}) ==> {words.now(QUEUE_TAIL.name)} == {tail} + {more}"
             if more == 1:
-                number = charting.chart.signals[transition.raises[0]].number
+                number = charting.chart.events[transition.raises[0]].number
                 yield f"({fits}) ==> {queue}[{tail}] == {number}"
         numbers = [words.number(transition) for transition, _ in raising]
         none = words.is_one(words.chosen(region), numbers, words.before)
-        yield f"{none} || {words.now(TAIL.name)} == {tail}"
+        yield f"{none} || {words.now(QUEUE_TAIL.name)} == {tail}"
 
 
-def _moved_by(chart: Chart, moves: list[Way]) -> Moved:
+def _moved_by(chart: Chart, moves: list[ChartTransition]) -> Moved:
     """Return whether a node is left or entered by some transitions if it is active."""
 
-    def moved(node: Node) -> bool:
+    def moved(node: ChartNode) -> bool:
         domains = [chart.nodes[way.domain] for way in moves if way.domain is not None]
-        return any(domain is not node and domain.holds(node.index) for domain in domains)
+        return any(domain is not node and domain.contains(node.index) for domain in domains)
 
     return moved
 
 
-def _both(moved: Moved, active: Sequence[Node]) -> Moved:
+def _both(moved: Moved, active: Sequence[ChartNode]) -> Moved:
     return lambda node: node in active and moved(node)

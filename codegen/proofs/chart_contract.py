@@ -20,36 +20,36 @@ from codegen.proofs.chart_commit import Commit
 from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.chart_step import Jump, Step
 from codegen.proofs.configuration import Configuration
-from codegen.proofs.effect import assigned, contract_text, with_turns
+from codegen.proofs.effect import add_loop_assigns, assigned, contract_text
 from codegen.proofs.outline import (
     Function,
     function_of,
-    outlined,
-    outlined_at,
+    move_scratch_to_parameter,
+    outline_calls,
+    outline_choices,
     part_name,
-    with_scratch_outside,
 )
 from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.summary import Summary
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.usage import locals_of
-from language.chart import Node
-from language.charting import Charting, ident, wish
+from language.chart import ChartNode
+from language.charting import ChartContext, request_variable, to_identifier
 from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Count,
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
 )
 from language.program import Program
-from language.traversal import block_writes, reached, walk
+from language.traversal import block_writes, reachable_blocks, walk_ops
 
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
 STEP, JUMP = "micro_step", "jump"
@@ -64,7 +64,7 @@ ONE_BY_ONE = (SELECT, HEAR, COMMIT, JUMP, *(f"{name}_{k}" for name in (STEP, JUM
 OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
-def written(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
+def write_chart_contracts(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
     """Write C with its contracts into a folder; return the names of the functions that have one."""
     name = made.made.name
     text, names = made.annotated(files[f"{name}.c"])
@@ -74,7 +74,7 @@ def written(made: ChartContract, files: Mapping[str, str], folder: Path) -> list
     return names
 
 
-def proven_of(name: str, functions: Sequence[str], folder: Path) -> Asked:
+def prove_chart_contracts(name: str, functions: Sequence[str], folder: Path) -> Asked:
     """Prove the contracts of functions of a module. Raises ToolMissing, BuildError."""
     detected(folder)
     chart = [one for one in functions if one in ONE_BY_ONE]
@@ -89,7 +89,7 @@ def proven_of(name: str, functions: Sequence[str], folder: Path) -> Asked:
 class ChartContract:
     """The contracts of a chart; `made` is the Program that the C is printed of."""
 
-    charting: Charting
+    charting: ChartContext
     made: Program
 
     @cached_property
@@ -100,7 +100,7 @@ class ChartContract:
     @property
     def functions(self) -> list[str]:
         """The functions of a micro-step."""
-        found = reached(JUMP, self.made.blocks)
+        found = reachable_blocks(JUMP, self.made.blocks)
         return [name for name in self.made.blocks if name in found]
 
     @property
@@ -114,7 +114,7 @@ class ChartContract:
         """Return C with contracts before its functions, and the names of these."""
         proven: list[str] = []
         work_is_inside = is_inside(text)
-        text = with_scratch_outside(text, JUMP)
+        text = move_scratch_to_parameter(text, JUMP)
         for name in self.functions:
             function = function_of(text, name)
             parts = self._parts(function)
@@ -126,8 +126,8 @@ class ChartContract:
     def _parts(self, function: Function) -> list[Function]:
         """Return the functions that a function is in the copy that is proven, itself at last."""
         if function.name == self._stepping:
-            return outlined_at(function, (SELECT, COMMIT))
-        return [function] if function.name == JUMP else outlined(function)
+            return outline_calls(function, (SELECT, COMMIT))
+        return [function] if function.name == JUMP else outline_choices(function)
 
     def with_apart(self, text: str) -> str:
         """Return a header in which arrays of whole numbers are of a type of their own: what is
@@ -144,7 +144,7 @@ class ChartContract:
         places = self._assigned(block, own)
         lines += [assigned(places), *self._ensured(block, part.name, own), "exits \\false;"]
         held = Jump(self.words).turns() if block == JUMP else ()
-        return contract_text(lines) + with_turns(part, places, held)
+        return contract_text(lines) + add_loop_assigns(part, places, held)
 
     def _own(self, block: str, part: str) -> Block:
         """Return the operations of a part of a function, or of all of it."""
@@ -163,11 +163,15 @@ class ChartContract:
         """The parts of that function: operations, what is asked before, and what they leave."""
         step, blocks = Step(self.words), self.made.blocks
         names = [part_name(self._stepping, number) for number in range(3)]
-        choosing = tuple(Run(name) for name in (SELECT, HEAR) if name in blocks)
+        choosing = tuple(RunBlock(name) for name in (SELECT, HEAR) if name in blocks)
         valid = list(self.words.valid(self.words.now))
         found: dict[str, tuple[Block, Sequence[str], Sequence[str]]] = {
             names[0]: (choosing, valid, list(step.chosen())),
-            names[1]: ((Run(COMMIT),), list(Commit(self.words).required()), list(step.committed())),
+            names[1]: (
+                (RunBlock(COMMIT),),
+                list(Commit(self.words).required()),
+                list(step.committed()),
+            ),
         }
         if STEP in blocks:
             done = next(op.then for op in blocks[STEP] if isinstance(op, Branch))
@@ -191,7 +195,7 @@ class ChartContract:
         elif block == JUMP:
             said = Jump(words).required()
         elif block == SELECT and (region := self._selected.get(part)):
-            said = (f"{words.now(wish(region.region))} == 0",)
+            said = (f"{words.now(request_variable(region.region))} == 0",)
         yield from (f"requires {one};" for one in said)
         yield from (f"requires {one}" for one in self._places(own))
 
@@ -243,7 +247,7 @@ class ChartContract:
     def _assigned(self, block: str, own: Block) -> list[str]:
         blocks = {**self.made.blocks, "": own}
         names: set[str] = set()
-        for name in reached("", blocks):
+        for name in reachable_blocks("", blocks):
             local = self._locals[name or block]
             written = set(block_writes(blocks[name]))
             names |= written - local
@@ -252,28 +256,28 @@ class ChartContract:
 
     def _places(self, own: Block) -> Iterator[str]:
         """Yield that places at which a part of a function stores something are none before 0."""
-        stores = [op for op in walk(own) if isinstance(op, Store)] if len(own) == 1 else []
+        stores = [op for op in walk_ops(own) if isinstance(op, Store)] if len(own) == 1 else []
         names = {op.index.name for op in stores if isinstance(op.index, Ref)}
         yield from (f"0 <= {self.words.now(name)};" for name in sorted(names))
 
     @cached_property
-    def _counting(self) -> dict[str, Node]:
-        return {f"count_{ident(node.path)}": node for node in self._moving}
+    def _counting(self) -> dict[str, ChartNode]:
+        return {f"count_{to_identifier(node.path)}": node for node in self._moving}
 
     @cached_property
-    def _choosing(self) -> dict[str, Node]:
-        return {f"choose_{ident(node.path)}": node for node in self._moving}
+    def _choosing(self) -> dict[str, ChartNode]:
+        return {f"choose_{to_identifier(node.path)}": node for node in self._moving}
 
     @property
-    def _moving(self) -> list[Node]:
-        return [node for node in self.charting.chart.nodes if self.charting.ways_of(node)]
+    def _moving(self) -> list[ChartNode]:
+        return [node for node in self.charting.chart.nodes if self.charting.transitions_of(node)]
 
     @cached_property
-    def _selected(self) -> dict[str, Node]:
+    def _selected(self) -> dict[str, ChartNode]:
         """The region that a part of `select_transitions` chooses in."""
         regions = {self.words.mode(r.region): r for r in self.charting.chart.regions}
         found = {name: _inner(op) for name, op in self._ops(SELECT).items()}
-        return {name: regions[op.selector] for name, op in found.items() if isinstance(op, Choose)}
+        return {name: regions[op.selector] for name, op in found.items() if isinstance(op, Switch)}
 
 
 def _inner(op: Op) -> Op:
@@ -287,4 +291,4 @@ def _is_choice(op: Op) -> bool:
         value = op.value
         parts = (value.then, value.other) if isinstance(value, Select) else ()
         return any(isinstance(part, Select) for part in parts)
-    return isinstance(op, Branch | Choose | Count | Loop)
+    return isinstance(op, Branch | Switch | Count | Loop)

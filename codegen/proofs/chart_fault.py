@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.proofs.configuration import Configuration
-from language.chart import Node, Way
+from language.chart import ChartNode, ChartTransition
 from language.chart_target import mode_paths
-from language.fault import FIRST
-from language.limit import HAPPENED
+from language.fault import FAULT_PRIORITY
+from language.limit import FAULT_HAPPENED
 from language.model import CHART, Transition
 
 
@@ -28,39 +28,39 @@ class ChartFault:
     @property
     def happened(self) -> str:
         """That a fault asks for the fault mode in this tick."""
-        return self.words.now(HAPPENED)
+        return self.words.now(FAULT_HAPPENED)
 
     @cached_property
-    def outside(self) -> Sequence[Node]:
+    def outside(self) -> Sequence[ChartNode]:
         """The innermost modes of the chart that are not in the fault mode."""
         chart = self.words.charting.chart
         if self._mode is None:
             return ()
-        return [leaf for leaf in chart.leaves(CHART) if not self._mode.holds(leaf.index)]
+        return [leaf for leaf in chart.leaves(CHART) if not self._mode.contains(leaf.index)]
 
-    def leaves(self, region: Node) -> bool:
+    def leaves(self, region: ChartNode) -> bool:
         """Tell whether a region stands inside a mode that is not in the fault mode."""
-        return any(leaf.holds(region.index) for leaf in self.outside)
+        return any(leaf.contains(region.index) for leaf in self.outside)
 
-    def ways(self, leaf: Node) -> Iterator[tuple[Transition, Way]]:
+    def ways(self, leaf: ChartNode) -> Iterator[tuple[Transition, ChartTransition]]:
         """Yield the transitions of a mode that enter the fault mode before all others."""
         charting = self.words.charting
-        for transition in charting.ways_of(leaf):
-            way = charting.chart.ways[transition.key]
+        for transition in charting.transitions_of(leaf):
+            way = charting.chart.transitions[transition.key]
             leads = self._mode is not None and way.targets == (self._mode.index,)
             if leads and is_of_fault(transition):
                 yield transition, way
 
-    def numbers(self, leaf: Node) -> list[int]:
+    def numbers(self, leaf: ChartNode) -> list[int]:
         """Return the numbers of these: one, or none by a mistake."""
         return [self.words.number(transition) for transition, _ in self.ways(leaf)]
 
     @cached_property
-    def _mode(self) -> Node | None:
+    def _mode(self) -> ChartNode | None:
         name = self.words.charting.automaton.fault_mode
         return mode_paths(self.words.charting.chart)[name] if name else None
 
 
 def is_of_fault(transition: Transition) -> bool:
     """Tell whether a transition is taken when a fault happened, and never else."""
-    return transition.priority == FIRST
+    return transition.priority == FAULT_PRIORITY

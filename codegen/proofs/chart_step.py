@@ -16,12 +16,12 @@ from codegen.proofs.chart_commit import Commit
 from codegen.proofs.chart_entry import modes_after, outcomes
 from codegen.proofs.chart_fault import ChartFault
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.chart import Way
-from language.charting import FIRST, OVER
-from language.event import EVENT, HEAD, TAIL
-from language.micro_step import BUSY, STEPS
+from language.chart import ChartTransition
+from language.charting import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED
+from language.event import CURRENT_EVENT, QUEUE_HEAD, QUEUE_TAIL
+from language.micro_step import HAS_NEXT_STEP, STEP_COUNT
 from language.model import CHART, Transition
-from language.program import LOGGED
+from language.program import LOG_COUNT_VARIABLE
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Step:
         """Yield what is asked before a micro-step: that modes fit together, and places."""
         yield from self.words.valid(self.words.now)
         yield from self.places()
-        yield self.words.now(BUSY.name)
+        yield self.words.now(HAS_NEXT_STEP.name)
 
     def ensured(self) -> Iterator[str]:
         """Yield what a micro-step leaves."""
         yield from self.moved()
-        if self.words.charting.several and self.words.knows(FIRST.name):
-            yield f"!{self.words.now(FIRST.name)}"
+        if self.words.charting.has_several_micro_steps and self.words.knows(IS_FIRST_STEP.name):
+            yield f"!{self.words.now(IS_FIRST_STEP.name)}"
 
     def moved(self) -> Iterator[str]:
         """Yield what it leaves once it is done with what is taken."""
@@ -52,7 +52,7 @@ class Step:
             mode = words.mode(region.region)
             stays = f"{words.now(mode)} == {words.before(mode)}"
             yield f"(!({self._free} && {self.fired}) ==> {stays})"
-        if words.charting.several:
+        if words.charting.has_several_micro_steps:
             yield from self._progress()
 
     def chosen(self) -> Iterator[str]:
@@ -83,26 +83,32 @@ class Step:
     def places(self) -> Iterator[str]:
         """Yield what holds of the places of the log and of the queue, and of the steps."""
         words, charting = self.words, self.words.charting
-        if charting.several:
-            steps, most = words.now(STEPS.name), charting.chart.micro_steps
-            yield f"0 <= {words.now(LOGGED)}"
+        if charting.has_several_micro_steps:
+            steps, most = words.now(STEP_COUNT.name), charting.chart.micro_steps
+            yield f"0 <= {words.now(LOG_COUNT_VARIABLE)}"
             yield f"0 <= {steps} <= {most}"
-            yield f"({words.now(OVER.name)} <==> {steps} == {most})"
-        if charting.size:
-            yield f"0 <= {words.now(HEAD.name)} <= {words.now(TAIL.name)} <= {charting.size}"
+            yield f"({words.now(IS_STEP_LIMIT_REACHED.name)} <==> {steps} == {most})"
+        if charting.queue_capacity:
+            yield f"0 <= {words.now(QUEUE_HEAD.name)} <= {words.now(QUEUE_TAIL.name)} <= {charting.queue_capacity}"
 
     @property
     def fired(self) -> str:
         """That something is taken."""
         words = self.words
-        regions = [r for r in words.charting.chart.regions if words.charting.ways_in(r.region)]
+        regions = [
+            r for r in words.charting.chart.regions if words.charting.transitions_in(r.region)
+        ]
         return any_of(f"{words.now(words.chosen(r.region))} != 0" for r in regions)
 
     @property
     def _free(self) -> str:
         """That the bound of the tick was not reached."""
         words = self.words
-        return f"!{words.before(OVER.name)}" if words.charting.several else "\\true"
+        return (
+            f"!{words.before(IS_STEP_LIMIT_REACHED.name)}"
+            if words.charting.has_several_micro_steps
+            else "\\true"
+        )
 
     def _is_taken(self, region: str, transition: Transition) -> str:
         words = self.words
@@ -121,7 +127,7 @@ class Step:
             )
             yield f"({asked}) ==> {any_of(found)}"
 
-    def _entered(self, transition: Transition, way: Way) -> str:
+    def _entered(self, transition: Transition, way: ChartTransition) -> str:
         """Return that the modes are active that a transition enters."""
         words, said = self.words, []
         for name, found in modes_after(words, transition, way).items():
@@ -133,24 +139,24 @@ class Step:
     def _progress(self) -> Iterator[str]:
         """Yield how far the tick is: steps, events, whether another turn follows."""
         words, now, before = self.words, self.words.now, self.words.before
-        steps = before(STEPS.name)
-        yield f"{now(STEPS.name)} == ({self.fired} && {self._free} ? {steps} + 1 : {steps})"
-        if not words.charting.size:
+        steps = before(STEP_COUNT.name)
+        yield f"{now(STEP_COUNT.name)} == ({self.fired} && {self._free} ? {steps} + 1 : {steps})"
+        if not words.charting.queue_capacity:
             yield self._goes_on(f"{self.fired} && {self._free}")
             return
-        head, event = before(HEAD.name), before(EVENT.name)
-        waits = f"{head} < {before(TAIL.name)}"
+        head, event = before(QUEUE_HEAD.name), before(CURRENT_EVENT.name)
+        waits = f"{head} < {before(QUEUE_TAIL.name)}"
         yield self._goes_on(f"({self.fired} || {waits}) && {self._free}")
         hears, moves = f"!{self.fired} && {waits} && {self._free}", f"{self.fired} && {self._free}"
-        yield f"{now(HEAD.name)} == ({hears} ? {head} + 1 : {head})"
-        yield f"(({moves}) ==> {now(EVENT.name)} == 0)"
-        yield f"({moves} || {hears} || {now(EVENT.name)} == {event})"
-        yield f"{before(TAIL.name)} <= {now(TAIL.name)}"
-        yield f"({self.fired} || {now(TAIL.name)} == {before(TAIL.name)})"
+        yield f"{now(QUEUE_HEAD.name)} == ({hears} ? {head} + 1 : {head})"
+        yield f"(({moves}) ==> {now(CURRENT_EVENT.name)} == 0)"
+        yield f"({moves} || {hears} || {now(CURRENT_EVENT.name)} == {event})"
+        yield f"{before(QUEUE_TAIL.name)} <= {now(QUEUE_TAIL.name)}"
+        yield f"({self.fired} || {now(QUEUE_TAIL.name)} == {before(QUEUE_TAIL.name)})"
 
     def _goes_on(self, test: str) -> str:
         """Return when another turn follows; one that is made follows one that was."""
-        busy = self.words.now(BUSY.name)
+        busy = self.words.now(HAS_NEXT_STEP.name)
         return f"({test} ? {busy} : !{busy})"
 
 
@@ -170,33 +176,33 @@ class Jump:
 
     def ensured(self) -> Iterator[str]:
         """Yield what a jump leaves."""
-        if not self.words.charting.several:
+        if not self.words.charting.has_several_micro_steps:
             yield from self._step.ensured()
             return
         yield from self.words.valid(self.words.now)
         yield from self._step.places()
-        yield f"!{self.words.now(BUSY.name)}"
+        yield f"!{self.words.now(HAS_NEXT_STEP.name)}"
         yield self._ended()
 
     def turns(self) -> Iterator[str]:
         """Yield what holds before each turn."""
         words, charting = self.words, self.words.charting
-        if not charting.several:
+        if not charting.has_several_micro_steps:
             return
         yield from words.valid(words.now)
         yield from self._step.places()
-        yield f"({words.now(BUSY.name)} || {self._ended()})"
-        done = words.now(STEPS.name)
-        if charting.size:
-            head = words.now(HEAD.name)
+        yield f"({words.now(HAS_NEXT_STEP.name)} || {self._ended()})"
+        done = words.now(STEP_COUNT.name)
+        if charting.queue_capacity:
+            head = words.now(QUEUE_HEAD.name)
             done += f" + {head} - \\at({head}, LoopEntry)"
             yield f"0 <= \\at({head}, LoopEntry)"
-        yield f"({words.now(BUSY.name)} ==> turn == {done})"
+        yield f"({words.now(HAS_NEXT_STEP.name)} ==> turn == {done})"
 
     def _ended(self) -> str:
         """Return that nothing is left to do, or no further micro-step is allowed."""
         words = self.words
         rests = [f"!{self._step.fired}"]
-        if words.charting.size:
-            rests.append(f"{words.now(HEAD.name)} == {words.now(TAIL.name)}")
-        return any_of([words.now(OVER.name), all_of(rests)])
+        if words.charting.queue_capacity:
+            rests.append(f"{words.now(QUEUE_HEAD.name)} == {words.now(QUEUE_TAIL.name)}")
+        return any_of([words.now(IS_STEP_LIMIT_REACHED.name), all_of(rests)])

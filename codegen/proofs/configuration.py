@@ -10,10 +10,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from codegen.names import SOLVED_ON_PAGE, CNames
+from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames
 from codegen.proofs.acsl import Look, Speech, Unsaid
-from language.chart import Node
-from language.charting import NOT_YET, Charting, kept, taken, wish
+from language.chart import ChartNode
+from language.charting import (
+    NEVER_LEFT,
+    ChartContext,
+    history_ref,
+    request_variable,
+    selected_variable,
+)
 from language.model import Transition
 from language.program import Program, mode_variable
 
@@ -22,20 +28,20 @@ from language.program import Program, mode_variable
 class Configuration:
     """The words of a chart's contracts; `made` is the Program that the C is printed of."""
 
-    charting: Charting
+    charting: ChartContext
     made: Program
 
     @cached_property
     def place(self) -> CNames:
         """Where names are in C."""
-        return CNames(self.made, frozenset(), SOLVED_ON_PAGE)
+        return CNames(self.made, frozenset(), SOLVED_PREFIX_ON_PAGE)
 
     @cached_property
     def speech(self) -> Speech:
         """How expressions are said."""
         truths = [v.name for v in self.made.variables if v.type == "truth"]
         truths += [c.name for c in self.made.constants if c.type == "truth"]
-        return Speech(self.made.number, frozenset(truths))
+        return Speech(self.made.number_type, frozenset(truths))
 
     @cached_property
     def _known(self) -> frozenset[str]:
@@ -68,11 +74,15 @@ class Configuration:
 
     def number(self, transition: Transition) -> int:
         """Return the number of a transition."""
-        return self.charting.info(transition).number
+        return self.charting.info_of(transition).number
 
     def chosen(self, region: str) -> str:
         """Return the variable of what a region takes."""
-        return taken(region) if len(self.charting.chart.regions) > 1 else wish(region)
+        return (
+            selected_variable(region)
+            if len(self.charting.chart.regions) > 1
+            else request_variable(region)
+        )
 
     def is_in(self, region: str, numbers: Iterable[int], at: Look) -> str:
         """Return that a region is in one of some modes."""
@@ -80,10 +90,10 @@ class Configuration:
 
     def is_one(self, name: str, numbers: Iterable[int], at: Look) -> str:
         """Return that a variable is one of some numbers."""
-        named = [self.place.whole(name, number) for number in sorted(numbers)]
+        named = [self.place.integer_constant(name, number) for number in sorted(numbers)]
         return any_of(f"{at(name)} == {number}" for number in named)
 
-    def is_active(self, node: Node, at: Look) -> str:
+    def is_active(self, node: ChartNode, at: Look) -> str:
         """Return that a node is active."""
         leaves = self.charting.chart.leaves_of(node)
         return self.is_in(node.region, (n.number for n in leaves if n.number is not None), at)
@@ -93,7 +103,7 @@ class Configuration:
         for region in self.charting.chart.regions:
             yield from self.valid_in(region, at)
 
-    def valid_in(self, region: Node, at: Look) -> Iterator[str]:
+    def valid_in(self, region: ChartNode, at: Look) -> Iterator[str]:
         """Yield what holds of a region: its mode, what is kept of it, its counters."""
         chart, automaton = self.charting.chart, self.charting.automaton
         inside = self.is_in(region.region, self._numbers(region), at)
@@ -105,27 +115,27 @@ class Configuration:
             outside = self.is_in(region.region, [inactive], at)
             yield f"({around} ? {inside} : {outside})"
         yield from self._histories(region, at)
-        for transition, _ in self.charting.ways_in(region.region):
-            info = self.charting.info(transition)
+        for transition, _ in self.charting.transitions_in(region.region):
+            info = self.charting.info_of(transition)
             if info.timer:
-                yield f"{at(info.timer)} <= {info.most}"
+                yield f"{at(info.timer)} <= {info.timer_limit}"
 
-    def _histories(self, region: Node, at: Look) -> Iterator[str]:
+    def _histories(self, region: ChartNode, at: Look) -> Iterator[str]:
         """Yield what is kept: a mode that was active, with what was active in it."""
-        chart, remembered = self.charting.chart, self.charting.remembered
+        chart, remembered = self.charting.chart, self.charting.history_nodes
         nodes = [chart.nodes[index] for index in sorted(remembered)]
         for node in nodes:
             if node.region == region.region:
                 numbers = self._numbers(node) if node.kind == "compound" else [1]
-                yield self.is_one(kept(node).name, [NOT_YET, *numbers], at)
+                yield self.is_one(history_ref(node).name, [NEVER_LEFT, *numbers], at)
         outer = chart.nodes[region.parent]
         for node in nodes if region.index in remembered else ():
             number = 1 if node is outer else outer.number
             if node is outer or (node.kind == "compound" and outer in chart.leaves_of(node)):
-                was = f"{at(kept(region).name)} != {NOT_YET}"
-                yield f"({at(kept(node).name)} == {number} ==> {was})"
+                was = f"{at(history_ref(region).name)} != {NEVER_LEFT}"
+                yield f"({at(history_ref(node).name)} == {number} ==> {was})"
 
-    def _numbers(self, node: Node) -> list[int]:
+    def _numbers(self, node: ChartNode) -> list[int]:
         """Return the numbers of the modes that a node's region is in while that is active."""
         leaves = self.charting.chart.leaves_of(node)
         return [leaf.number for leaf in leaves if leaf.number is not None]

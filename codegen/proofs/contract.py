@@ -19,29 +19,34 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
-from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
-from codegen.proofs.chart_contract import MODEL, ChartContract, proven_of, written
+from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames, mode_constant
+from codegen.proofs.chart_contract import (
+    MODEL,
+    ChartContract,
+    prove_chart_contracts,
+    write_chart_contracts,
+)
 from codegen.proofs.effect import (
+    add_effect_contracts,
+    add_loop_assigns,
     assigned,
     called_by,
     contract_text,
     places_of,
     seen_of,
-    with_effects,
-    with_turns,
 )
-from codegen.proofs.outline import Function, function_of, outlined_but
+from codegen.proofs.outline import Function, function_of, outline_except
 from codegen.proofs.pointers import is_inside, required
-from codegen.proofs.proof import Proof, version_of
+from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.proofs.wp import Asked, asked, detected, pure
-from codegen.source import c_files, c_program
+from codegen.source import emit_c_files, run_c_passes
 from codegen.usage import locals_of
-from language.fault import with_fault_transitions
+from language.fault import add_fault_transitions
 from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
-from language.situation import charting_of
-from language.traversal import block_reads, block_writes, walk
+from language.situation import chart_context_of
+from language.traversal import block_reads, block_writes, walk_ops
 
 PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
 """Outcomes of a mode with many ranges are proven way by way only."""
@@ -56,28 +61,28 @@ Asking: TypeAlias = tuple[list[str], tuple[str, ...]]
 """Functions, and how WP is asked for their contracts."""
 
 
-def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
+def check_contracts(automaton: Automaton, program: Program, folder: Path) -> ToolVerdict:
     """Prove the contracts of the modes of a Program. Raises ToolMissing, BuildError."""
-    made = c_program(program, by_amount=False)
-    tool = f"Frama-C {version_of('frama-c', folder)} WP"
+    made = run_c_passes(program, by_magnitude=False)
+    tool = f"Frama-C {tool_version('frama-c', folder)} WP"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
-    files = c_files(program, by_amount=False)
+    files = emit_c_files(program, by_magnitude=False)
     charting = None
     if automaton.is_sampled:
-        charting = charting_of(with_fault_transitions(automaton), program.transitions)
+        charting = chart_context_of(add_fault_transitions(automaton), program.transitions)
     if charting:
         chart = ChartContract(charting, made)
-        names = written(chart, files, folder)
+        names = write_chart_contracts(chart, files, folder)
         what = f"{len(names)} functions"
         what += f", of {', '.join(chart.unsaid)} lemmas alone" if chart.unsaid else ""
-        return _told(tool, proven_of(program.name, names, folder), what)
+        return _told(tool, prove_chart_contracts(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
         about = "one region of a sampled automaton, and a chart, have contracts"
-        return Proof("contract", tool, about, is_asked=False)
-    asking = written_of(program, files, folder, wholes_of(automaton))
+        return ToolVerdict("contract", tool, about, is_asked=False)
+    asking = write_contracts(program, files, folder, wholes_of(automaton))
     run = sum(len(names) for names, options in asking if options == OF_CALLED)
     also = f", {run} functions that they run" if run else ""
-    found = proven_with(folder, f"{program.name}.c", asking)
+    found = prove_contracts(folder, f"{program.name}.c", asking)
     return _told(tool, found, f"{len(modes)} modes{also}")
 
 
@@ -90,16 +95,16 @@ def wholes_of(automaton: Automaton) -> Wholes:
     }
 
 
-def written_of(
+def write_contracts(
     program: Program, files: Mapping[str, str], folder: Path, wholes: Wholes = NOTHING_KEPT
 ) -> list[Asking]:
     """Write C with its contracts into a folder; return what is to be proven: of modes and their
     parts, and of the functions that these run. `wholes` are ranges of whole numbers that are kept.
     """
-    made, file = c_program(program, by_amount=False), f"{program.name}.c"
+    made, file = run_c_passes(program, by_magnitude=False), f"{program.name}.c"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
     called = called_by(made, [f"jump_{mode.name}" for mode in modes])
-    text, functions = with_effects(made, files[file], called), []
+    text, functions = add_effect_contracts(made, files[file], called), []
     for mode in modes:
         text, names = _Mode(program, made, mode, wholes).annotated(text, in_parts=bool(called))
         functions += names
@@ -110,12 +115,12 @@ def written_of(
     return [(functions, options) for options in PARTS]
 
 
-def _told(tool: str, found: Asked, what: str) -> Proof:
+def _told(tool: str, found: Asked, what: str) -> ToolVerdict:
     about = f"{found.proven} of {found.asked} goals; {what}" if found.asked else "no result"
-    return Proof("contract", tool, about, found.open)
+    return ToolVerdict("contract", tool, about, found.open)
 
 
-def proven_with(folder: Path, file: str, asking: Sequence[Asking]) -> Asked:
+def prove_contracts(folder: Path, file: str, asking: Sequence[Asking]) -> Asked:
     """Prove the contracts of functions of modes, and of what these run."""
     detected(folder)
     found = [asked(folder, file, own, options) for own, options in asking if own]
@@ -139,7 +144,7 @@ class _Mode:
     @cached_property
     def place(self) -> CNames:
         """Where names are in C."""
-        return CNames(self.made, locals_of(self.made)[self.block], SOLVED_ON_PAGE)
+        return CNames(self.made, locals_of(self.made)[self.block], SOLVED_PREFIX_ON_PAGE)
 
     @property
     def transitions(self) -> list[TransitionInfo]:
@@ -149,12 +154,12 @@ class _Mode:
     def annotated(self, text: str, in_parts: bool) -> tuple[str, list[str]]:
         """Return C with contracts before its function and its parts, and the names of these."""
         function = function_of(text, self.block)
-        *parts, whole = outlined_but(function, (MODE, FIRED)) if in_parts else [function]
+        *parts, whole = outline_except(function, (MODE, FIRED)) if in_parts else [function]
         pointers = list(required(function.parameters, is_inside(text)))
         told = [self._part(part, pointers) for part in parts]
         seen = assigned(seen_of(function, self._places))
         lines = [*pointers, *self._required(), seen, *self._ensured()]
-        told.append(contract_text(lines) + with_turns(whole, self._places))
+        told.append(contract_text(lines) + add_loop_assigns(whole, self._places))
         text = text[: function.start] + "\n".join(told) + text[function.end :]
         return text, [part.name for part in (*parts, whole)]
 
@@ -169,7 +174,7 @@ class _Mode:
         lines = [*pointers, *(f"requires {timer} <= {counts[timer]};" for timer in own)]
         lines.append(assigned(places))
         lines += [f"ensures {timer} == 0 || {timer} == \\old({timer}) + 1;" for timer in own]
-        return contract_text([*lines, "exits \\false;"]) + with_turns(part, places)
+        return contract_text([*lines, "exits \\false;"]) + add_loop_assigns(part, places)
 
     def _required(self) -> Iterator[str]:
         mode = mode_constant(self.program, self.mode.number)
@@ -186,7 +191,7 @@ class _Mode:
             yield f"{low} <= {self.place(name)} <= {high}"
 
     def _counts(self) -> list[Count]:
-        return [op for op in walk(self.made.blocks[self.block]) if isinstance(op, Count)]
+        return [op for op in walk_ops(self.made.blocks[self.block]) if isinstance(op, Count)]
 
     @cached_property
     def _places(self) -> list[str]:
@@ -204,7 +209,7 @@ class _Mode:
             timer, most = self.place(count.timer), count.limit - 1
             yield f"ensures {timer} <= {most};"
             for info in self.transitions:
-                if info.timer == count.timer and not info.tunable:
+                if info.timer == count.timer and not info.tunable_wait:
                     full = f"\\old({timer}) == {most}"
                     yield f"ensures {FIRED} == {info.number} ==> {full};"
                     yield f"ensures {FIRED} == 0 && {full} ==> {timer} == 0;"

@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from language.operation import Block, Loop, Run
+from language.operation import Block, Loop, RunBlock
 from language.program import Program
-from language.traversal import block_reads, reached, walk
+from language.traversal import block_reads, reachable_blocks, walk_ops
 
 PASSING = ("input", "is_new", "work", "calibration", "derived")
 """Groups of what each step brings or finds anew."""
@@ -23,7 +23,7 @@ MOST_ITEMS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class Cutpoint:
     """A place with the variables that are known there; `loop` if it is where a turn begins."""
 
     name: str
@@ -32,46 +32,46 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class At:
+class CutpointState:
     """A cut, and the values that variables have there."""
 
-    cut: Cut
+    cut: Cutpoint
     values: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Way:
+class ExecutionPath:
     """What leads from one cut, or from nowhere, to the next one: all that is `given`."""
 
-    begin: At | None
+    begin: CutpointState | None
     given: tuple[Any, ...]
-    end: At
+    end: CutpointState
 
 
 @dataclass(frozen=True)
-class Visit:
+class ConditionVisit:
     """A condition where a way comes by it, and what holds there."""
 
-    begin: At | None
+    begin: CutpointState | None
     given: tuple[Any, ...]
     condition: Any
 
 
-def step_cut(program: Program) -> Cut:
+def step_cut(program: Program) -> Cutpoint:
     """Return the cut between two steps."""
     read = {name for block in program.blocks.values() for name in block_reads(block)}
     whole = (v.name for v in program.variables if not v.size and v.name in read)
-    return Cut("step", tuple(name for name in whole if name.partition(".")[0] not in PASSING))
+    return Cutpoint("step", tuple(name for name in whole if name.partition(".")[0] not in PASSING))
 
 
-def loop_cut(program: Program, loop: Loop, number: int) -> Cut:
+def loop_cut(program: Program, loop: Loop, number: int) -> Cutpoint:
     """Return the cut where a turn of a loop begins: all that is read anywhere is known."""
     read = {name for block in program.blocks.values() for name in block_reads(block)}
     fixed = {c.name for c in program.constants if c.kind == "fixed" or c.items}
     things = {v.name for v in (*program.variables, *program.inputs) if not v.size}
     things |= {c.name for c in program.constants}
     whole = (things & read) - fixed | {name for of in items_of(program).values() for name in of}
-    return Cut(f"loop {number}", (*sorted(whole - {loop.index}), loop.index), loop)
+    return Cutpoint(f"loop {number}", (*sorted(whole - {loop.index}), loop.index), loop)
 
 
 def items_of(program: Program) -> dict[str, tuple[str, ...]]:
@@ -84,7 +84,10 @@ def items_of(program: Program) -> dict[str, tuple[str, ...]]:
 def blocks_of(program: Program, block: Block) -> Iterator[Block]:
     """Yield a block, and all that it runs."""
     runs = {
-        r for op in walk(block) if isinstance(op, Run) for r in reached(op.block, program.blocks)
+        r
+        for op in walk_ops(block)
+        if isinstance(op, RunBlock)
+        for r in reachable_blocks(op.block, program.blocks)
     }
     yield block
     yield from (program.blocks[run] for run in sorted(runs))

@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from codegen.names import SOLVED_ON_PAGE, CNames
+from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames
 from codegen.proofs.outline import Function, function_of
 from codegen.proofs.pointers import is_inside, required
 from codegen.usage import locals_of
 from language.program import Program
-from language.traversal import block_writes, reached
+from language.traversal import block_writes, reachable_blocks
 
 LOOP = re.compile(r"^( *)for \(int32_t (\w+) = 0; \w+ < (\d+); \w+\+\+\) \{$", re.M)
 LOCAL = re.compile(r"^    (?!const |return )\w+ (\w+)(?: = [^;]+)?;$", re.M)
@@ -27,7 +27,7 @@ STEP = "*work"
 def called_by(program: Program, blocks: Iterable[str]) -> list[str]:
     """Return the blocks that some blocks run, directly or not."""
     given = tuple(blocks)
-    inside = {name for block in given for name in reached(block, program.blocks)}
+    inside = {name for block in given for name in reachable_blocks(block, program.blocks)}
     return sorted(inside - set(given))
 
 
@@ -36,24 +36,24 @@ def places_of(program: Program, block: str) -> list[str]:
     local = locals_of(program)
     names = {
         name
-        for inner in reached(block, program.blocks)
+        for inner in reachable_blocks(block, program.blocks)
         for name in block_writes(program.blocks[inner])
         if name not in local[inner]
     }
-    place = CNames(program, frozenset(), SOLVED_ON_PAGE)
+    place = CNames(program, frozenset(), SOLVED_PREFIX_ON_PAGE)
     sizes = {v.name: f"[0 .. {v.size - 1}]" for v in program.variables if v.size}
     found = {STEP if n.startswith("work.") else place(n) + sizes.get(n, "") for n in names}
     return sorted(found)
 
 
-def with_effects(program: Program, text: str, called: Iterable[str]) -> str:
+def add_effect_contracts(program: Program, text: str, called: Iterable[str]) -> str:
     """Return the C of a Program with a contract before each function that is `called`."""
     inside = is_inside(text)
     for name in called:
         function, places = function_of(text, name), places_of(program, name)
         seen = assigned(seen_of(function, places))
         lines = [*required(function.parameters, inside), seen, "exits \\false;"]
-        told = contract_text(lines) + with_turns(function, places)
+        told = contract_text(lines) + add_loop_assigns(function, places)
         text = text[: function.start] + told + text[function.end :]
     return text
 
@@ -74,7 +74,7 @@ def contract_text(lines: Iterable[str]) -> str:
     return "\n  ".join(["/*@", *lines]) + "\n*/\n"
 
 
-def with_turns(function: Function, places: Iterable[str], held: Iterable[str] = ()) -> str:
+def add_loop_assigns(function: Function, places: Iterable[str], held: Iterable[str] = ()) -> str:
     """Return a function as C with what each turn of its loops may write: what it may itself, and
     with what is `held` before each.
     """

@@ -7,15 +7,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from codegen.proofs.cut import Cut, blocks_of
+from codegen.proofs.cut import Cutpoint, blocks_of
 from codegen.proofs.terms import Limits, Range
-from language.charting import NOT_YET
-from language.number import rounded
+from language.charting import NEVER_LEFT
+from language.number import round_to_type
 from language.operation import Assign, Binary, Compare, Count, Expr, Ref, Unary, Value
-from language.program import MODE, Program, mode_variable
-from language.run import MODE as RUN_MODE
-from language.substitution import own_expressions, subexpressions
-from language.traversal import block_writes, walk
+from language.program import MODE_VARIABLE, Program, mode_variable
+from language.run import RUN_MODE as RUN_MODE
+from language.substitution import direct_expressions, walk_post_order
+from language.traversal import block_writes, walk_ops
 from language.wiring import INACTIVE
 
 LEFT = "memory.left_"
@@ -35,7 +35,7 @@ Literal = tuple[str, int]
 class Within:
     """A variable is within limits, where others have some values."""
 
-    cut: Cut
+    cut: Cutpoint
     name: str
     limits: Limits
     where: tuple[Literal, ...] = ()
@@ -47,7 +47,7 @@ class AtMost:
     truth value that keeps the loop `going` is false. It is so where others have some values.
     """
 
-    cut: Cut
+    cut: Cutpoint
     name: str
     others: tuple[str, ...]
     factor: int = 1
@@ -62,7 +62,7 @@ class Same:
     where others have some values.
     """
 
-    cut: Cut
+    cut: Cutpoint
     name: str
     operator: str
     number: float | int | str
@@ -73,19 +73,19 @@ class Same:
 Fact = Within | AtMost | Same
 
 
-def proposed(
+def propose_facts(
     program: Program,
-    cuts: Mapping[Cut, Mapping[str, int]],
+    cuts: Mapping[Cutpoint, Mapping[str, int]],
     ranges: Mapping[str, Range],
 ) -> Iterator[Fact]:
     """Yield what may hold at cuts; `ranges` are those of variables between two steps. Each cut has
     the numbers and truth values with which a loop begins.
     """
-    number = program.number
+    number = program.number_type
     for cut, first in cuts.items():
         for name, (low, high) in ranges.items():
             if name in cut.names:
-                yield Within(cut, name, (rounded(low, number), rounded(high, number)))
+                yield Within(cut, name, (round_to_type(low, number), round_to_type(high, number)))
         limits = _limits(program, cut, first)
         for name, some in limits.items():
             yield from (Within(cut, name, one) for one in some)
@@ -102,7 +102,7 @@ def proposed(
             yield from _counts(program, cut, first)
 
 
-def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, list[Limits]]:
+def _limits(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> dict[str, list[Limits]]:
     """Return limits that are tried of variables of a cut: modes, timers, truths, counters."""
     found: dict[str, list[Limits]] = {}
     for name, numbers in modes_of(program).items():
@@ -127,7 +127,9 @@ def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, l
     return {name: limits for name, limits in found.items() if name in cut.names}
 
 
-def _wheres(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[tuple[Literal, ...]]:
+def _wheres(
+    program: Program, cut: Cutpoint, first: Mapping[str, int]
+) -> Iterator[tuple[Literal, ...]]:
     """Yield the conditions under which something is tried: a mode, how a loop goes on, both."""
     modes = modes_at(program, cut)
     going = going_values(program, first)
@@ -135,7 +137,7 @@ def _wheres(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[tu
     yield from ((mode, one) for mode in modes for one in going)
 
 
-def modes_at(program: Program, cut: Cut) -> list[Literal]:
+def modes_at(program: Program, cut: Cutpoint) -> list[Literal]:
     """Return each mode of each region that is known at a cut."""
     modes = modes_of(program).items()
     return [(name, number) for name, of in modes for number in of if name in cut.names]
@@ -154,8 +156,8 @@ def truths_of(program: Program, first: Mapping[str, int]) -> list[str]:
 
 def modes_of(program: Program) -> dict[str, list[int]]:
     """Return the numbers of modes by the variable that holds one."""
-    modes = {MODE: program.modes, RUN_MODE: program.run_modes}
-    modes |= {mode_variable(MODE, region.name): region.modes for region in program.regions}
+    modes = {MODE_VARIABLE: program.modes, RUN_MODE: program.run_modes}
+    modes |= {mode_variable(MODE_VARIABLE, region.name): region.modes for region in program.regions}
     return {name: [info.number for info in infos] for name, infos in modes.items() if infos}
 
 
@@ -174,7 +176,7 @@ def _assigned(program: Program, modes: Mapping[str, Sequence[int]]) -> dict[str,
     found = {name: set(numbers) for name, numbers in modes.items()}
     given: dict[str, list[Expr]] = {}
     for block in program.blocks.values():
-        for op in walk(block):
+        for op in walk_ops(block):
             if isinstance(op, Assign) and op.target in kept - set(found):
                 given.setdefault(op.target, []).append(op.value)
     for name, values in given.items():
@@ -194,10 +196,10 @@ def _assigned(program: Program, modes: Mapping[str, Sequence[int]]) -> dict[str,
 
 def _timers(program: Program) -> Iterator[tuple[str, int]]:
     for block in program.blocks.values():
-        yield from ((op.timer, op.limit) for op in walk(block) if isinstance(op, Count))
+        yield from ((op.timer, op.limit) for op in walk_ops(block) if isinstance(op, Count))
 
 
-def ends_of(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
+def ends_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, int]]:
     """Yield the numbers with which a loop compares what it counts."""
     counters = set(counters_of(program, cut))
     for expr in _expressions(program, cut):
@@ -208,19 +210,19 @@ def ends_of(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
                 yield name, most
 
 
-def compared_in(program: Program, cut: Cut) -> Iterator[tuple[str, str, int]]:
+def compared_in(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, int]]:
     """Yield comparisons of whole numbers that become truth values."""
     wholes = {v.name for v in program.variables if v.type == "whole"} & set(cut.names)
     found = set()
     for block in program.blocks.values():
-        for op in walk(block):
+        for op in walk_ops(block):
             match op:
                 case Assign(_, Compare(operator, Ref(name), Value(int(number)))) if name in wholes:
                     found.add((name, operator, number))
     yield from sorted(found)
 
 
-def asked_of(program: Program, cut: Cut) -> Iterator[tuple[str, str, float | int]]:
+def asked_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, float | int]]:
     """Yield what a loop compares with a number, and does not change."""
     if cut.loop is None:
         return
@@ -234,17 +236,17 @@ def asked_of(program: Program, cut: Cut) -> Iterator[tuple[str, str, float | int
                 found.add((name, operator, -number))
     for name, operator, number in sorted(one for one in found if one[0] in cut.names):
         is_real = isinstance(number, float)
-        yield name, operator, rounded(number, program.number) if is_real else number
+        yield name, operator, round_to_type(number, program.number_type) if is_real else number
 
 
-def _histories(program: Program, cut: Cut) -> Iterator[Fact]:
+def _histories(program: Program, cut: Cutpoint) -> Iterator[Fact]:
     left = [name for name in cut.names if name.startswith(LEFT)]
     for one in left:
-        where = ((one, NOT_YET),)
-        yield from (Within(cut, n, frozenset({NOT_YET}), where) for n in left if n != one)
+        where = ((one, NEVER_LEFT),)
+        yield from (Within(cut, n, frozenset({NEVER_LEFT}), where) for n in left if n != one)
 
 
-def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+def _counts(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
     """Yield how counters of a loop hang together."""
     assert cut.loop
     counters, index = counters_of(program, cut), cut.loop.index
@@ -260,10 +262,10 @@ def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fa
         yield from (AtMost(cut, index, (one,), going=going) for going in truths)
 
 
-def counters_of(program: Program, cut: Cut) -> list[str]:
+def counters_of(program: Program, cut: Cutpoint) -> list[str]:
     """Return the whole numbers that a loop counts up."""
     assert cut.loop
-    ops = [op for block in blocks_of(program, cut.loop.body) for op in walk(block)]
+    ops = [op for block in blocks_of(program, cut.loop.body) for op in walk_ops(block)]
     assigned = [op for op in ops if isinstance(op, Assign)]
     found = {op.target for op in assigned if _counts_up(op)}
     return sorted(found & set(cut.names))
@@ -276,9 +278,9 @@ def _counts_up(op: Assign) -> bool:
     return False
 
 
-def _expressions(program: Program, cut: Cut) -> Iterator[Expr]:
+def _expressions(program: Program, cut: Cutpoint) -> Iterator[Expr]:
     assert cut.loop
     for block in blocks_of(program, cut.loop.body):
-        for op in walk(block):
-            for expr in own_expressions(op):
-                yield from subexpressions(expr)
+        for op in walk_ops(block):
+            for expr in direct_expressions(op):
+                yield from walk_post_order(expr)

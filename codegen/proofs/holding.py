@@ -6,9 +6,9 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from codegen.proofs.cut import At
+from codegen.proofs.cut import CutpointState
 from codegen.proofs.fact import AtMost, Fact, Literal, Same, Within
-from codegen.proofs.symbolic import World
+from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Limits
 from language.operators import RELATIONS
 
@@ -43,7 +43,7 @@ def _is_within(value: Any, limits: Limits) -> bool:
     return value is not None and limits[0] <= value <= limits[1]
 
 
-def term(world: World, at: At, fact: Fact) -> Any:
+def term(world: SymbolicProgram, at: CutpointState, fact: Fact) -> Any:
     """Return a fact of the values at a cut, for z3: one term each time that it is asked for."""
     key = id(at), fact
     if key not in world.said:
@@ -51,7 +51,7 @@ def term(world: World, at: At, fact: Fact) -> Any:
     return world.said[key][0]
 
 
-def _term(world: World, at: At, fact: Fact) -> Any:
+def _term(world: SymbolicProgram, at: CutpointState, fact: Fact) -> Any:
     z3, terms, values = world.z3, world.terms, at.values
     match fact:
         case Within(_, name, limits, where):
@@ -67,7 +67,9 @@ def _term(world: World, at: At, fact: Fact) -> Any:
             return _where(world, at, where, found == wanted)
 
 
-def _where(world: World, at: At, where: tuple[Literal, ...], found: Any) -> Any:
+def _where(
+    world: SymbolicProgram, at: CutpointState, where: tuple[Literal, ...], found: Any
+) -> Any:
     z3, terms = world.z3, world.terms
     if not where:
         return found

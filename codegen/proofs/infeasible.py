@@ -12,15 +12,15 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from typing import Any
 
-from codegen.expression import LOGIC, c_expression
-from codegen.names import SOLVED_ON_PAGE, CNames
-from codegen.proofs.cut import Visit
+from codegen.expression import LOGICAL_OPERATORS, emit_expression
+from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames
+from codegen.proofs.cut import ConditionVisit
 from codegen.proofs.fact import Fact
-from codegen.proofs.invariant import invariant, is_never, known_at
-from codegen.proofs.reach import Reach
-from codegen.proofs.symbolic import World
+from codegen.proofs.invariant import find_invariants, is_never, known_at
+from codegen.proofs.reach import Reachability
+from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Range
-from codegen.statement import going_on, opposite
+from codegen.statement import negate_condition, split_loop_guard
 from codegen.usage import locals_of
 from language.operation import (
     Assign,
@@ -34,12 +34,12 @@ from language.operation import (
     Unary,
 )
 from language.program import Program
-from language.substitution import own_expressions, subexpressions
-from language.traversal import walk
+from language.substitution import direct_expressions, walk_post_order
+from language.traversal import walk_ops
 
 
 @dataclass(frozen=True)
-class Place:
+class DecisionSite:
     """A decision as C has it: its block, its text, and the numbers of its conditions."""
 
     block: str
@@ -47,7 +47,7 @@ class Place:
     conditions: tuple[int, ...]
 
 
-def unshared(program: Program) -> Program:
+def unshare_expressions(program: Program) -> Program:
     """Return a Program in which each expression is an object of its own: conditions are told apart
     by their `id`.
     """
@@ -62,43 +62,48 @@ def _own(thing: Any) -> Any:
     return thing
 
 
-def places_of(program: Program) -> Iterator[Place]:
+def decision_sites(program: Program) -> Iterator[DecisionSite]:
     """Yield the decisions of the Program that C is printed of, as far as C has them as they are."""
     local = locals_of(program)
     for name, block in program.blocks.items():
-        place = CNames(program, local[name], SOLVED_ON_PAGE)
-        for op in walk(block):
+        place = CNames(program, local[name], SOLVED_PREFIX_ON_PAGE)
+        for op in walk_ops(block):
             tests = [(test, test) for test in _inside(op)]
             if isinstance(op, Loop):
-                yield Place(name, f"{place(op.index)} < {op.count}", (id(op),))
-            if isinstance(op, Loop) and (condition := going_on(op.index, op.body)[0]) is not None:
-                tests.append((opposite(condition), condition))
+                yield DecisionSite(name, f"{place(op.index)} < {op.count}", (id(op),))
+            if (
+                isinstance(op, Loop)
+                and (condition := split_loop_guard(op.index, op.body)[0]) is not None
+            ):
+                tests.append((negate_condition(condition), condition))
             if isinstance(op, Branch):
                 tests.append((op.condition, op.condition))
             if isinstance(op, Count):
-                tests.append((opposite(op.condition), op.condition))
+                tests.append((negate_condition(op.condition), op.condition))
             for shown, test in tests:
                 numbers = tuple(id(condition) for condition in _conditions(test))
-                yield Place(name, c_expression(shown, place), numbers)
+                yield DecisionSite(name, emit_expression(shown, place), numbers)
             if isinstance(op, Count):
-                yield Place(name, f"{place(op.timer)} < {op.limit}U", (id(op),))
+                yield DecisionSite(name, f"{place(op.timer)} < {op.limit}U", (id(op),))
 
 
-def never(
-    program: Program, ranges: Mapping[str, Range], wanted: Collection[int]
+def prove_infeasible(
+    program: Program, ranges: Mapping[str, Range], conditions: Collection[int]
 ) -> dict[int, bool]:
     """Return of conditions, by number, the one outcome that they never have, where that is proven.
 
     `ranges` are those of variables between two steps, as far as they stay in them.
     """
-    world = World(program)
-    facts = invariant(world, ranges)
-    reach = Reach(world, facts)
-    found = {number: _outcome(world, facts, reach, number) for number in wanted}
+    world = SymbolicProgram(program)
+    facts = find_invariants(world, ranges)
+    reach = Reachability(world, facts)
+    found = {number: _outcome(world, facts, reach, number) for number in conditions}
     return {number: outcome for number, outcome in found.items() if outcome is not None}
 
 
-def _outcome(world: World, facts: Collection[Fact], reach: Reach, number: int) -> bool | None:
+def _outcome(
+    world: SymbolicProgram, facts: Collection[Fact], reach: Reachability, number: int
+) -> bool | None:
     """Return the outcome that a condition never has: what facts exclude is seen sooner."""
     visits = world.visits.get(number, [])
     for excluded in (partial(_is_excluded, world, facts), reach.never) if visits else ():
@@ -109,7 +114,7 @@ def _outcome(world: World, facts: Collection[Fact], reach: Reach, number: int) -
 
 
 def _is_excluded(
-    world: World, facts: Collection[Fact], visits: Sequence[Visit], outcome: bool
+    world: SymbolicProgram, facts: Collection[Fact], visits: Sequence[ConditionVisit], outcome: bool
 ) -> bool:
     """Tell whether facts alone exclude an outcome at all visits of a condition."""
     for visit in visits:
@@ -122,9 +127,13 @@ def _is_excluded(
 
 def _inside(op: Op) -> Iterator[Expr]:
     """Yield the decisions inside an operation: of choices, and of what is assigned as a truth."""
-    for expr in own_expressions(op):
-        yield from (part.condition for part in subexpressions(expr) if isinstance(part, Select))
-    if isinstance(op, Assign) and isinstance(op.value, Binary) and op.value.operator in LOGIC:
+    for expr in direct_expressions(op):
+        yield from (part.condition for part in walk_post_order(expr) if isinstance(part, Select))
+    if (
+        isinstance(op, Assign)
+        and isinstance(op.value, Binary)
+        and op.value.operator in LOGICAL_OPERATORS
+    ):
         yield op.value
 
 

@@ -11,12 +11,12 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-from codegen.proofs.cut import At, Cut, Way
-from codegen.proofs.fact import Fact, Within, proposed
+from codegen.proofs.cut import Cutpoint, CutpointState, ExecutionPath
+from codegen.proofs.fact import Fact, Within, propose_facts
 from codegen.proofs.holding import Number, holds, term
-from codegen.proofs.queue import queued
-from codegen.proofs.standing import commanded, counted, lasting, standing
-from codegen.proofs.symbolic import World
+from codegen.proofs.queue import queue_candidates
+from codegen.proofs.standing import commanded, counted, lasting, loop_invariant_candidates
+from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Range, Real
 
 EFFORT = 20_000_000
@@ -25,8 +25,8 @@ MOST_WHERE, MOST_TRIED = 2, 12_000
 """Most conditions of a fact, and most facts that are tried together: a minute."""
 
 
-def invariant(
-    world: World, ranges: Mapping[str, Range], most_where: int = MOST_WHERE
+def find_invariants(
+    world: SymbolicProgram, ranges: Mapping[str, Range], most_where: int = MOST_WHERE
 ) -> list[Fact]:
     """Return what holds at the cuts of a Program; `ranges` are those of variables between two
     steps, as far as they stay in them; facts have at most `most_where` conditions.
@@ -34,7 +34,7 @@ def invariant(
     What is said of few variables is looked for first: it is known when the rest is asked, which is
     left out where it is too much.
     """
-    facts = list(dict.fromkeys(proposed(world.program, world.cuts, ranges)))
+    facts = list(dict.fromkeys(propose_facts(world.program, world.cuts, ranges)))
     last = list(dict.fromkeys(_last(world)))
     known: list[Fact] = []
     for most in range(most_where + 2):
@@ -46,7 +46,7 @@ def invariant(
     return known
 
 
-def _last(world: World) -> Iterator[Fact]:
+def _last(world: SymbolicProgram) -> Iterator[Fact]:
     """Yield what is proposed at last, together: what a loop counts hangs on what modes command."""
     if not any(cut.loop for cut in world.cuts):
         return
@@ -54,12 +54,14 @@ def _last(world: World) -> Iterator[Fact]:
         yield from commanded(world.program, cut, first)
         yield from lasting(world.program, cut, first, world.cuts)
         if cut.loop:
-            yield from standing(world.program, cut, first)
+            yield from loop_invariant_candidates(world.program, cut, first)
             yield from counted(world.program, cut)
-            yield from queued(world.program, cut, first)
+            yield from queue_candidates(world.program, cut, first)
 
 
-def _staying(world: World, tried: Collection[Fact], known: Collection[Fact]) -> list[Fact]:
+def _staying(
+    world: SymbolicProgram, tried: Collection[Fact], known: Collection[Fact]
+) -> list[Fact]:
     """Return the largest part of what is tried that stays, where some facts are known."""
     facts = dict.fromkeys(tried)
     asking = [_Asking(world, way, facts, known) for way in world.ways]
@@ -87,8 +89,8 @@ def _strongest(facts: Collection[Fact]) -> Iterator[Fact]:
             yield fact
 
 
-def _by_variable(facts: Iterable[Fact]) -> dict[tuple[Cut, str], list[Fact]]:
-    found: dict[tuple[Cut, str], list[Fact]] = {}
+def _by_variable(facts: Iterable[Fact]) -> dict[tuple[Cutpoint, str], list[Fact]]:
+    found: dict[tuple[Cutpoint, str], list[Fact]] = {}
     for fact in facts:
         found.setdefault((fact.cut, fact.name), []).append(fact)
     return found
@@ -107,14 +109,16 @@ def _says(one: Fact, other: Fact) -> bool:
     return False
 
 
-def known_at(world: World, at: At | None, facts: Collection[Fact]) -> list[Any]:
+def known_at(
+    world: SymbolicProgram, at: CutpointState | None, facts: Collection[Fact]
+) -> list[Any]:
     """Return what facts say of the values at a cut."""
     if at is None:
         return []
     return [term(world, at, fact) for fact in facts if fact.cut is at.cut]
 
 
-def is_never(world: World, facts: list[Any]) -> bool:
+def is_never(world: SymbolicProgram, facts: list[Any]) -> bool:
     """Prove that some terms are never true together."""
     solver = world.z3.Solver()
     solver.set("rlimit", EFFORT)
@@ -126,7 +130,11 @@ class _Asking:
     """A way with all that was proposed where it begins, and where it ends."""
 
     def __init__(
-        self, world: World, way: Way, facts: Collection[Fact], known: Collection[Fact]
+        self,
+        world: SymbolicProgram,
+        way: ExecutionPath,
+        facts: Collection[Fact],
+        known: Collection[Fact],
     ) -> None:
         z3 = self.z3 = world.z3
         self.world, self.end, begin = world, way.end, way.begin
@@ -157,7 +165,7 @@ class _Asking:
         return found
 
 
-def _read(world: World, at: At, model: Any) -> Callable[[str], Number]:
+def _read(world: SymbolicProgram, at: CutpointState, model: Any) -> Callable[[str], Number]:
     """Return what gives the number that a variable has in a model."""
 
     @cache

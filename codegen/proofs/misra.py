@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.proofs.proof import Proof, version_of
-from codegen.tool import told
-from language.missing import ToolMissing
+from codegen.proofs.proof import ToolVerdict, tool_version
+from codegen.tool import run_tool
+from language.missing import MissingToolError
 
 DEVIATIONS = {
     "8.9": "fixed numbers stand together at the head of the file, also where one function alone "
@@ -25,15 +25,15 @@ ADDONS = ("usr/lib/*", "usr/share", "usr/local/share")
 VIOLATION = re.compile(r"\[(?P<file>[^:\]]+):(?P<line>\d+)\].*\[misra-c2012-(?P<rule>[\d.]+)\]")
 
 
-def misra(folder: Path, sources: Sequence[str]) -> Proof:
+def check_misra(folder: Path, sources: Sequence[str]) -> ToolVerdict:
     """Check the sources of a folder. Raises ToolMissing, BuildError."""
-    tool = f"cppcheck {version_of('cppcheck', folder)}"
-    read = told(["cppcheck", "--dump", *READING, *KNOWN, *sources], folder)
-    heard = told([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
+    tool = f"cppcheck {tool_version('cppcheck', folder)}"
+    read = run_tool(["cppcheck", "--dump", *READING, *KNOWN, *sources], folder)
+    heard = run_tool([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
     unread = [one for one in sources if f"Checking {one}.dump, config" not in heard.stdout]
     if read.returncode or unread:
         said = (read.stderr + heard.stderr).strip().splitlines()[-1:]
-        return Proof("misra", tool, "no result", (f"not read: {' '.join([*unread, *said])}",))
+        return ToolVerdict("misra", tool, "no result", (f"not read: {' '.join([*unread, *said])}",))
     lines = {match.group(0): match for match in VIOLATION.finditer(heard.stderr)}
     deviating = Counter(m["rule"] for m in lines.values() if m["rule"] in DEVIATIONS)
     found = sorted(
@@ -43,11 +43,11 @@ def misra(folder: Path, sources: Sequence[str]) -> Proof:
     )
     listed = ", ".join(f"{rule} ({n} times)" for rule, n in sorted(deviating.items()))
     about = f"{len(sources)} files; deviations: {listed or 'none'}"
-    return Proof("misra", tool, about, tuple(found))
+    return ToolVerdict("misra", tool, about, tuple(found))
 
 
 def _addon() -> str:
     for pattern in ADDONS:
         for found in Path("/").glob(f"{pattern}/cppcheck/addons/misra.py"):
             return str(found)
-    raise ToolMissing("the rules of cppcheck (misra.py) are missing: apt-get install cppcheck")
+    raise MissingToolError("the rules of cppcheck (misra.py) are missing: apt-get install cppcheck")

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from codegen.source import STATIC
+from codegen.source import STATIC_PATTERN
 
 CHOICE = re.compile(r"^    (?:if|switch|for) \(.*?^    }\n", re.M | re.S)
 INNER = re.compile(r"^( +)(?:if|switch|for) \(.*?^\1}\n", re.M | re.S)
@@ -49,13 +49,13 @@ class Function:
 
 def function_of(text: str, name: str) -> Function:
     """Return a function of a module."""
-    head = rf"^((?:{STATIC})?)void {name}\(([^)]*)\)\n{{\n(.*?)^}}\n"
+    head = rf"^((?:{STATIC_PATTERN})?)void {name}\(([^)]*)\)\n{{\n(.*?)^}}\n"
     found = re.search(head, text, re.M | re.S)
     assert found, name
     return Function(*found.span(), found[1], name, found[2], found[3])
 
 
-def with_scratch_outside(text: str, name: str) -> str:
+def move_scratch_to_parameter(text: str, name: str) -> str:
     """Return a module in which a function takes the scratch that it has of its own: what it leaves
     there can be said of it, and of its parts.
     """
@@ -71,7 +71,7 @@ def with_scratch_outside(text: str, name: str) -> str:
     return call.sub(block, text)
 
 
-def outlined(function: Function) -> list[Function]:
+def outline_choices(function: Function) -> list[Function]:
     """Return the parts of a function, then what is left of it, which runs them.
 
     One with a variable of its own stays whole: so does one with a single choice.
@@ -81,7 +81,7 @@ def outlined(function: Function) -> list[Function]:
     return _taken_out(function, [found.span() for found in CHOICE.finditer(function.body)])
 
 
-def outlined_but(function: Function, kept: Sequence[str]) -> list[Function]:
+def outline_except(function: Function, kept: Sequence[str]) -> list[Function]:
     """Return the parts of a function, then what is left of it: parts are the outermost choices
     that write none of some places. One with a variable of its own stays whole.
     """
@@ -90,7 +90,7 @@ def outlined_but(function: Function, kept: Sequence[str]) -> list[Function]:
     return _taken_out(function, list(_without(function.body, kept)))
 
 
-def outlined_at(function: Function, calls: Sequence[str]) -> list[Function]:
+def outline_calls(function: Function, calls: Sequence[str]) -> list[Function]:
     """Return the parts of a function, then what is left of it: some calls and what follows each in
     its block, up to a choice; at last what its first choice does, if there is a choice in that.
     """

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.tool import told
+from codegen.tool import run_tool
 
 
 @dataclass(frozen=True)
-class Proof:
+class ToolVerdict:
     """What a `tool` says of the C of a Program: `findings`, none where the proof holds.
 
     `about` tells what was looked at, and how much of it. One that is not asked says nothing.
@@ -27,7 +27,9 @@ class Proof:
         return not self.findings
 
 
-def version_of(tool: str, folder: Path) -> str:
+def tool_version(tool: str, folder: Path) -> str:
     """Return the first number that a tool calls its version."""
-    words = told([tool, "--version" if tool != "frama-c" else "-version"], folder).stdout.split()
+    words = run_tool(
+        [tool, "--version" if tool != "frama-c" else "-version"], folder
+    ).stdout.split()
     return next((word.strip("()") for word in words if word[0].isdigit()), "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, permutations
 
-from codegen.proofs.cut import Cut, items_of
+from codegen.proofs.cut import Cutpoint, items_of
 from codegen.proofs.fact import (
     AtMost,
     Fact,
@@ -24,7 +24,7 @@ Numbers = Mapping[str, frozenset[int]]
 """The numbers that are put into an array, by its name."""
 
 
-def queued(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+def queue_candidates(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
     """Yield what may be in small arrays, and in what is read from them."""
     arrays, ops = items_of(program), all_of(program, _every(program))
     stored = {name: _stored(ops, name) for name in arrays}
@@ -72,7 +72,7 @@ def _read(ops: Sequence[Op], stored: Numbers) -> list[tuple[str, str]]:
 
 def _heard(
     program: Program,
-    cut: Cut,
+    cut: Cutpoint,
     going: Sequence[Literal],
     read: Sequence[tuple[str, str]],
     stored: Numbers,
@@ -86,7 +86,7 @@ def _heard(
             yield from _waiting(program, cut, ((target, number),))
 
 
-def _waiting(program: Program, cut: Cut, where: tuple[Literal, ...]) -> Iterator[Fact]:
+def _waiting(program: Program, cut: Cutpoint, where: tuple[Literal, ...]) -> Iterator[Fact]:
     """Yield what may hold while something waits: modes, counts, what guards say."""
     for name, numbers in modes_of(program).items():
         if name in cut.names:

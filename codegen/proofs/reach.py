@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
-from codegen.proofs.cut import At, Cut, Visit
+from codegen.proofs.cut import ConditionVisit, Cutpoint, CutpointState
 from codegen.proofs.fact import Fact
 from codegen.proofs.invariant import known_at
-from codegen.proofs.symbolic import World
+from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Real
 
 EFFORT = 15_000_000
 """Units of z3's own count for one question: some seconds."""
 
 
-class Reach:
+class Reachability:
     """The clauses of a Program, with `facts` that are known to hold at its cuts."""
 
-    def __init__(self, world: World, facts: Collection[Fact]) -> None:
+    def __init__(self, world: SymbolicProgram, facts: Collection[Fact]) -> None:
         self.world, self.facts, self.z3 = world, facts, world.z3
         self.clauses = self.z3.Fixedpoint()
         self.clauses.set(engine="spacer", rlimit=EFFORT)
@@ -31,7 +31,7 @@ class Reach:
             body = self._all(way.begin, way.given)
             self.clauses.rule(self._closed(self._at(way.end), body))
 
-    def never(self, visits: Sequence[Visit], outcome: bool) -> bool:
+    def never(self, visits: Sequence[ConditionVisit], outcome: bool) -> bool:
         """Prove that a condition has an outcome at none of its visits; False where z3 gives up."""
         z3 = self.z3
         terms = [v.condition if outcome else z3.Not(v.condition) for v in visits]
@@ -41,17 +41,17 @@ class Reach:
         except z3.Z3Exception:  # the effort is spent
             return False
 
-    def _predicate(self, cut: Cut) -> Any:
+    def _predicate(self, cut: Cutpoint) -> Any:
         values = {name: self.world.terms.new(self.world.kinds[name], name) for name in cut.names}
-        sorts = [part.sort() for part in _parts(At(cut, values))]
+        sorts = [part.sort() for part in _parts(CutpointState(cut, values))]
         found = self.z3.Function(cut.name, *sorts, self.z3.BoolSort())
         self.clauses.register_relation(found)
         return found
 
-    def _at(self, at: At) -> Any:
+    def _at(self, at: CutpointState) -> Any:
         return self.predicates[at.cut.name](*_parts(at))
 
-    def _all(self, begin: At | None, given: Sequence[Any]) -> Any:
+    def _all(self, begin: CutpointState | None, given: Sequence[Any]) -> Any:
         """Return all that holds: where a way began, what was given, what is known of it."""
         known = [*given, *known_at(self.world, begin, self.facts)]
         known += self.world.terms.lemmas(known)
@@ -67,7 +67,7 @@ class Reach:
         return self.z3.Exists(free, body) if free else body
 
 
-def _parts(at: At) -> Iterator[Any]:
+def _parts(at: CutpointState) -> Iterator[Any]:
     """Yield what z3 has of the values at a cut."""
     for name in at.cut.names:
         value = at.values[name]

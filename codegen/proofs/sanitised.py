@@ -8,31 +8,34 @@ import struct
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.harness import fed, write_harness
+from codegen.harness import tick_inputs, write_harness
 from codegen.names import c_type
-from codegen.proofs.proof import Proof, version_of
-from codegen.sanitizers import built, ran
-from codegen.tool import SECONDS
-from language.number import LARGEST
+from codegen.proofs.proof import ToolVerdict, tool_version
+from codegen.sanitizers import build_sanitised, run_sanitised
+from codegen.tool import TOOL_TIMEOUT
+from language.number import MAX_FINITE
 from language.program import Program, Variable
 
 STEPS, SEED = 20_000, 1
-SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, LARGEST["float32"])
+SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, MAX_FINITE["float32"])
 SCALES = (1.0, 100.0, 1e4, 1e30)
 
 
-def sanitised(program: Program, folder: Path) -> Proof:
+def check_sanitizers(program: Program, folder: Path) -> ToolVerdict:
     """Run the C of a Program for many steps. Raises ToolMissing, BuildError."""
-    app = built("gcc", write_harness(program, folder), folder)
-    tool, about = f"gcc {version_of('gcc', folder)}", f"{STEPS} steps on random inputs"
-    return Proof(
-        "sanitizers", tool, about, ran(app, given=_records(program), seconds=SECONDS).found
+    app = build_sanitised("gcc", write_harness(program, folder), folder)
+    tool, about = f"gcc {tool_version('gcc', folder)}", f"{STEPS} steps on random inputs"
+    return ToolVerdict(
+        "sanitizers",
+        tool,
+        about,
+        run_sanitised(app, stdin=_records(program), timeout=TOOL_TIMEOUT).findings,
     )
 
 
 def _records(program: Program) -> bytes:
     """Return inputs of steps: of any size, held for a while, with numbers that are none between."""
-    generator, inputs = random.Random(SEED), fed(program)
+    generator, inputs = random.Random(SEED), tick_inputs(program)
     values = [0.0 for _ in inputs]
     records = []
     for _ in range(STEPS):
@@ -53,7 +56,7 @@ def _any(variable: Variable, program: Program, generator: random.Random) -> floa
     if variable.type == "truth":
         return float(generator.random() < 0.5)
     if variable.type == "whole":
-        is_byte = c_type(variable, program.number) == "uint8_t"
+        is_byte = c_type(variable, program.number_type) == "uint8_t"
         low, high = (0, 255) if is_byte else (-(2**31), 2**31 - 1)
         near = generator.randint(-3, 12)
         return float(max(low, near) if generator.random() < 0.8 else generator.randint(low, high))

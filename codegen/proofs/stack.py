@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.build import FLAGS, BuildError
-from codegen.machine import CORTEX
-from codegen.proofs.proof import Proof, version_of
+from codegen.machine import CORTEX_FLAGS
+from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.tool import ARM_COMPILER, output_of
 
 LIMIT = 256
@@ -38,7 +38,7 @@ class _Calls:
 
 
 @dataclass(frozen=True)
-class Stack:
+class StackUsage:
     """The `most` bytes that a function takes with all that it calls, as far as that is known.
 
     `beside` are functions that are not among the sources (memset, arithmetic in software): the
@@ -52,15 +52,15 @@ class Stack:
     growing: tuple[str, ...] = ()
 
 
-def stack_of(folder: Path, sources: Sequence[str], entry: str) -> Stack:
+def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
     """Compile for a Cortex-M4F and add up what a function takes. Raises ToolMissing, BuildError."""
-    output_of([ARM_COMPILER, *CORTEX, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
+    output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
     calls = _read("\n".join((folder / f"{Path(s).stem}.ci").read_text() for s in sources))
     if entry not in calls.sizes:
         raise BuildError(f"{entry} is not in the compiled code")
     ways = calls.ways(entry)
     met = {name for way in ways for name in way}
-    return Stack(
+    return StackUsage(
         max(sum(calls.sizes.get(name, 0) for name in way) for way in ways),
         tuple(sorted(met - set(calls.sizes))),
         tuple(sorted({way[-1] for way in ways if way[-1] in way[:-1]})),
@@ -68,19 +68,19 @@ def stack_of(folder: Path, sources: Sequence[str], entry: str) -> Stack:
     )
 
 
-def stack(folder: Path, sources: Sequence[str], entry: str) -> Proof:
+def check_stack(folder: Path, sources: Sequence[str], entry: str) -> ToolVerdict:
     """Say whether a step takes no more than the limit, and a fixed number. Raises ToolMissing."""
-    tool = f"{ARM_COMPILER} {version_of(ARM_COMPILER, folder)}"
+    tool = f"{ARM_COMPILER} {tool_version(ARM_COMPILER, folder)}"
     try:
-        took = stack_of(folder, sources, entry)
+        took = stack_usage(folder, sources, entry)
     except BuildError as error:
-        return Proof("stack", tool, "no result", (str(error).partition("\n")[0],))
+        return ToolVerdict("stack", tool, "no result", (str(error).partition("\n")[0],))
     found = [f"{name} calls itself" for name in took.recurring]
     found += [f"{name} takes more or less each time" for name in took.growing]
     if took.most > LIMIT:
         found.append(f"{entry} takes {took.most} bytes, {LIMIT} are allowed")
     beside = f", beside what these take: {', '.join(took.beside)}" if took.beside else ""
-    return Proof("stack", tool, f"{entry}: {took.most} bytes{beside}", tuple(found))
+    return ToolVerdict("stack", tool, f"{entry}: {took.most} bytes{beside}", tuple(found))
 
 
 def _read(text: str) -> _Calls:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations
 
-from codegen.proofs.cut import Cut, blocks_of
+from codegen.proofs.cut import Cutpoint, blocks_of
 from codegen.proofs.fact import (
     KEPT,
     AtMost,
@@ -25,27 +25,29 @@ from codegen.proofs.fact import (
     modes_at,
     modes_of,
 )
-from language.number import rounded
+from language.number import round_to_type
 from language.operation import (
     Assign,
-    Choose,
     Compare,
     Count,
     Expr,
     Op,
     Ref,
+    Switch,
     Unary,
     Value,
 )
 from language.program import Program
-from language.substitution import own_expressions, subexpressions
-from language.traversal import walk
+from language.substitution import direct_expressions, walk_post_order
+from language.traversal import walk_ops
 
 Atom = tuple[str, str, float | int | str]
 """A variable, a relation, and a number or another variable."""
 
 
-def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+def loop_invariant_candidates(
+    program: Program, cut: Cutpoint, first: Mapping[str, int]
+) -> Iterator[Fact]:
     """Yield what may hold of what modes count and compare, while a loop goes on."""
     if cut.loop is None:
         return
@@ -61,7 +63,7 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
                     yield from (Within(cut, name, frozenset({t}), where) for t in (0, 1))
 
 
-def counted(program: Program, cut: Cut) -> Iterator[Fact]:
+def counted(program: Program, cut: Cutpoint) -> Iterator[Fact]:
     """Yield what may hold of modes where a loop has counted so far."""
     counts = counts_of(program, cut)
     modes = modes_at(program, cut)
@@ -80,7 +82,7 @@ def counted(program: Program, cut: Cut) -> Iterator[Fact]:
 
 
 def lasting(
-    program: Program, cut: Cut, first: Mapping[str, int], cuts: Iterable[Cut]
+    program: Program, cut: Cutpoint, first: Mapping[str, int], cuts: Iterable[Cutpoint]
 ) -> Iterator[Fact]:
     """Yield how the time in a mode goes with what a mode beside it counts."""
     going = going_values(program, first)
@@ -100,20 +102,20 @@ def _times(ops: list[Op]) -> set[str]:
     read = {
         expr.left.name
         for op in ops
-        for whole in own_expressions(op)
-        for expr in subexpressions(whole)
+        for whole in direct_expressions(op)
+        for expr in walk_post_order(whole)
         if isinstance(expr, Compare) and isinstance(expr.left, Ref)
     }
     return {name for name in read - set(counted) if name.startswith("timer.")}
 
 
-def counts_of(program: Program, cut: Cut) -> dict[str, int]:
+def counts_of(program: Program, cut: Cutpoint) -> dict[str, int]:
     """Return what a loop counts until it says so, and the most of it."""
     last = {name for name, _, _ in compared_in(program, cut)}
     return {name: most for name, most in ends_of(program, cut) if name in last}
 
 
-def commanded(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+def commanded(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
     """Yield what equations and discrete truth values may be in a mode, and while a loop goes on."""
     groups = ("equation.", "discrete.")
     truths = [v.name for v in program.variables if v.type == "truth" and v.name in cut.names]
@@ -126,7 +128,7 @@ def commanded(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[
 
 
 def said(
-    program: Program, cut: Cut, where: tuple[Literal, ...], kind: type = object
+    program: Program, cut: Cutpoint, where: tuple[Literal, ...], kind: type = object
 ) -> Iterator[Fact]:
     """Yield what guards may say of what a loop does not change, of numbers of a kind."""
     for name, relation, number in asked_of(program, cut):
@@ -138,24 +140,24 @@ def _timers(ops: list[Op]) -> list[str]:
     return sorted({op.timer for op in ops if isinstance(op, Count)})
 
 
-def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:
+def _followed(program: Program, cut: Cutpoint) -> Iterator[tuple[Literal, list[Op]]]:
     """Yield modes with all that a loop does in them, of loops that choose by mode."""
     assert cut.loop
     modes = modes_of(program)
     for block in blocks_of(program, cut.loop.body):
-        for op in walk(block):
+        for op in walk_ops(block):
             match op:
-                case Choose(selector, cases) if selector in modes and selector in cut.names:
+                case Switch(selector, cases) if selector in modes and selector in cut.names:
                     for number, case in cases:
                         yield (selector, number), all_of(program, case)
 
 
 def all_of(program: Program, ops: Iterable[Op]) -> list[Op]:
     """Return some operations, and all that they run."""
-    return [op for block in blocks_of(program, tuple(ops)) for op in walk(block)]
+    return [op for block in blocks_of(program, tuple(ops)) for op in walk_ops(block)]
 
 
-def _latches(cut: Cut, ops: list[Op]) -> list[Literal]:
+def _latches(cut: Cutpoint, ops: list[Op]) -> list[Literal]:
     """Return what counters and kept truth values may be: 0, and true or false."""
     found: dict[Literal, None] = {}
     for op in ops:
@@ -167,7 +169,7 @@ def _latches(cut: Cut, ops: list[Op]) -> list[Literal]:
     return [latch for latch in found if latch[0] in cut.names]
 
 
-def _asked(program: Program, cut: Cut, ops: list[Op]) -> tuple[list[Atom], list[str]]:
+def _asked(program: Program, cut: Cutpoint, ops: list[Op]) -> tuple[list[Atom], list[str]]:
     """Return what guards of a mode compare, and the truth values that they read."""
     atoms: dict[Atom, None] = {}
     truths: dict[str, None] = {}
@@ -187,18 +189,18 @@ def _guards(ops: list[Op]) -> Iterator[Expr]:
     """Yield what is asked by counters, and what becomes a level."""
     for op in ops:
         if isinstance(op, Count) or (isinstance(op, Assign) and isinstance(op.value, Compare)):
-            for expr in own_expressions(op):
-                yield from subexpressions(expr)
+            for expr in direct_expressions(op):
+                yield from walk_post_order(expr)
 
 
-def _other(program: Program, cut: Cut, expr: Expr) -> float | int | str | None:
+def _other(program: Program, cut: Cutpoint, expr: Expr) -> float | int | str | None:
     match expr:
         case Value(int(number)):
             return number
         case Value(float(number)):
-            return rounded(number, program.number)
+            return round_to_type(number, program.number_type)
         case Unary("-", Value(float(number))):
-            return -rounded(number, program.number)
+            return -round_to_type(number, program.number_type)
         case Ref(name) if name in cut.names:
             return name
     return None

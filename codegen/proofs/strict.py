@@ -6,22 +6,24 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from codegen.build import FLAGS, WARNINGS
-from codegen.proofs.proof import Proof, version_of
-from codegen.tool import told
+from codegen.proofs.proof import ToolVerdict, tool_version
+from codegen.tool import run_tool
 
 COMPILERS = ("gcc", "clang-19")
 
 
-def strict(folder: Path, sources: Sequence[str]) -> list[Proof]:
+def check_compiler_warnings(folder: Path, sources: Sequence[str]) -> list[ToolVerdict]:
     """Compile the sources of a folder. Raises ToolMissing."""
     found = []
     for compiler in COMPILERS:
         command = [compiler, *FLAGS, *WARNINGS, "-c", *sources]
-        done = told(command, folder)
+        done = run_tool(command, folder)
         lines = done.stderr.splitlines()
         heard = tuple(line for line in lines if "warning:" in line or "error:" in line)
         if done.returncode and not heard:
             heard = (f"{compiler} ended with {done.returncode}",)
         about = f"{len(WARNINGS)} kinds of warnings"
-        found.append(Proof("warnings", f"{compiler} {version_of(compiler, folder)}", about, heard))
+        found.append(
+            ToolVerdict("warnings", f"{compiler} {tool_version(compiler, folder)}", about, heard)
+        )
     return found

@@ -15,15 +15,15 @@ from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Count,
     Expr,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Store,
+    Switch,
 )
-from language.traversal import block_writes, reached
+from language.traversal import block_writes, reachable_blocks
 
 LONGEST = 20000
 """Characters of a value; a longer one is left open."""
@@ -69,7 +69,7 @@ class Summary:
         return found
 
     def _run_by(self, block: Block) -> set[str]:
-        return reached("", {**self.blocks, "": block}) - {""}
+        return reachable_blocks("", {**self.blocks, "": block}) - {""}
 
     def _said(self, name: str, found: Found) -> str:
         """Return that a variable has a value now."""
@@ -108,14 +108,14 @@ class Summary:
                 values[target] = self._value(target, value, values)
             case Branch(condition, then, other):
                 self._forked(self._test(condition, values), then, other, values)
-            case Choose(selector, cases):
+            case Switch(selector, cases):
                 self._chosen(selector, cases, values)
             case Count(timer, condition, limit, _):
                 count = self._value_of(timer, values)
                 on: Found = count and Fork(f"{count} < {limit}", f"({count} + 1)", count)
                 test = self._test(condition, values)
                 values[timer] = Fork(test, on, "0") if test else None
-            case Run(name):
+            case RunBlock(name):
                 self._block(self.blocks[name], values)
             case Store(array, Ref(index), value) if index not in values:
                 values[item(array, index)] = self._value("", value, values)

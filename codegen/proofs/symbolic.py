@@ -9,16 +9,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from codegen.proofs.cut import At, Cut, Visit, Way, blocks_of, items_of, loop_cut, step_cut
+from codegen.proofs.cut import (
+    ConditionVisit,
+    Cutpoint,
+    CutpointState,
+    ExecutionPath,
+    blocks_of,
+    items_of,
+    loop_cut,
+    step_cut,
+)
 from codegen.proofs.terms import Terms
-from codegen.statement import going_on
+from codegen.statement import split_loop_guard
 from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -27,9 +35,10 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
 )
@@ -40,7 +49,7 @@ KINDS = ("real", "whole")
 """Of an item of an array, which is a whole number or not."""
 
 
-class World:
+class SymbolicProgram:
     """The `ways` of a Program from cut to cut; `visits` are by `id` of a condition.
 
     Each of the `cuts` has the numbers and truth values with which its loop begins. What was `said`
@@ -49,7 +58,7 @@ class World:
 
     def __init__(self, program: Program) -> None:
         self.program = program
-        self.terms = Terms(program.number)
+        self.terms = Terms(program.number_type)
         self.z3 = self.terms.z3
         self.kinds = {v.name: v.type for v in (*program.variables, *program.inputs)}
         self.kinds |= {c.name: c.type for c in program.constants}
@@ -59,11 +68,11 @@ class World:
         self.fixed = {c.name: self.terms.value(c.value) for c in fixed}
         self.tables = {c.name: c.items for c in program.constants if c.kind == "fixed" and c.items}
         self.always = self.terms.value(True)
-        self.cuts: dict[Cut, dict[str, int]] = {}
-        self.ways: list[Way] = []
-        self.visits: dict[int, list[Visit]] = {}
-        self.said: dict[tuple[int, object], tuple[Any, At]] = {}
-        self.begin: At | None = None
+        self.cuts: dict[Cutpoint, dict[str, int]] = {}
+        self.ways: list[ExecutionPath] = []
+        self.visits: dict[int, list[ConditionVisit]] = {}
+        self.said: dict[tuple[int, object], tuple[Any, CutpointState]] = {}
+        self.begin: CutpointState | None = None
         self.given: tuple[Any, ...] = ()
         self._go()
 
@@ -73,7 +82,7 @@ class World:
         self.cuts[cut] = {}
         self._end(cut, self._after_init())
         self.visits = {}
-        self.begin = At(cut, {name: self._any(name) for name in self.kinds} | self.fixed)
+        self.begin = CutpointState(cut, {name: self._any(name) for name in self.kinds} | self.fixed)
         values = dict(self.begin.values)
         self.given = self._page(values)
         self._block(self.program.blocks["step"], values, self.always)
@@ -87,8 +96,8 @@ class World:
         self._block(self.program.blocks["init"], values, self.always)
         return values
 
-    def _end(self, cut: Cut, values: Mapping[str, Any]) -> None:
-        self.ways.append(Way(self.begin, self.given, At(cut, dict(values))))
+    def _end(self, cut: Cutpoint, values: Mapping[str, Any]) -> None:
+        self.ways.append(ExecutionPath(self.begin, self.given, CutpointState(cut, dict(values))))
 
     def _any(self, name: str) -> Any:
         return self.terms.new(self.kinds.get(name, "real"), name)
@@ -111,7 +120,7 @@ class World:
             case Branch(condition, then, other):
                 test = self._decided(condition, values, path)
                 self._merge(test, then, other, values, path)
-            case Choose(selector, cases):
+            case Switch(selector, cases):
                 self._choose(values[selector], cases, values, path)
             case Loop() if path is self.always:
                 self._cut(op, values)
@@ -121,7 +130,7 @@ class World:
                 self._count(op, values, path)
             case FaultBit():
                 values["memory.faults"] = self._any("memory.faults")
-            case Run(name):
+            case RunBlock(name):
                 self._block(self.program.blocks[name], values, path)
 
     def _count(self, op: Count, values: dict[str, Any], path: Any) -> None:
@@ -164,7 +173,7 @@ class World:
 
     def _cut(self, loop: Loop, values: dict[str, Any]) -> None:
         """A loop that every step comes by: ways lead into it, through a turn of it, and on."""
-        index, limit, going = loop.index, loop.count, going_on(loop.index, loop.body)[0]
+        index, limit, going = loop.index, loop.count, split_loop_guard(loop.index, loop.body)[0]
         self.kinds[index] = "whole"
         cut = loop_cut(self.program, loop, len(self.cuts))
         values[index] = self.z3.IntVal(0)
@@ -186,12 +195,12 @@ class World:
         goes = self.always if going is None else self._unseen(going, values)
         self.given += (self.z3.Not(self.z3.And(turn[index] < limit, goes)),)
 
-    def _begun(self, cut: Cut, values: dict[str, Any]) -> Mapping[str, Any]:
+    def _begun(self, cut: Cutpoint, values: dict[str, Any]) -> Mapping[str, Any]:
         """Begin at a cut: nothing is known of values but what its facts say."""
         for name in values:
             if name not in self.fixed:
                 values[name] = self._any(name)
-        self.begin, self.given = At(cut, dict(values)), self._page(values)
+        self.begin, self.given = CutpointState(cut, dict(values)), self._page(values)
         return self.begin.values
 
     def _page(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -238,7 +247,7 @@ class World:
 
     def _visited(self, number: int, condition: Any, path: Any) -> Any:
         given = (*self.given, path)
-        self.visits.setdefault(number, []).append(Visit(self.begin, given, condition))
+        self.visits.setdefault(number, []).append(ConditionVisit(self.begin, given, condition))
         return condition
 
     def _expr(self, expr: Expr, values: dict[str, Any], path: Any) -> Any:

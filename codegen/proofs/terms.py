@@ -15,7 +15,7 @@ from itertools import pairwise
 from math import copysign, isfinite
 from typing import Any
 
-from language.number import LARGEST, NumberType, rounded
+from language.number import MAX_FINITE, NumberType, round_to_type
 
 BEFORE_ONE = {"float64": 1.0 - 2.0**-53, "float32": 1.0 - 2.0**-24}
 """The number before 1."""
@@ -52,7 +52,7 @@ class Terms:
             return z3.BoolVal(value)
         if not isinstance(value, float):
             return z3.IntVal(value)
-        number = rounded(value, self.number)
+        number = round_to_type(value, self.number)
         if not isfinite(number):
             return self.new("real", "literal")
         found = Real(z3.RealVal(str(Fraction(abs(number)))), z3.BoolVal(False))
@@ -141,7 +141,7 @@ class Terms:
         return found
 
     def _is_finite(self, x: Real) -> Any:
-        largest = self.value(LARGEST[self.number]).value
+        largest = self.value(MAX_FINITE[self.number]).value
         return self.z3.And(self.z3.Not(x.nan), -largest <= x.value, x.value <= largest)
 
     def compare(self, operator: str, left: Any, right: Any) -> Any:
@@ -182,9 +182,9 @@ class Terms:
         z3, found = self.z3, self.new("real", "lookup")
         ends = list(points)
         for a, b in pairwise(points):
-            apart = rounded(b - a, self.number)
-            step = rounded(BEFORE_ONE[self.number] * apart, self.number)
-            ends.append(rounded(a + step, self.number))
+            apart = round_to_type(b - a, self.number)
+            step = round_to_type(BEFORE_ONE[self.number] * apart, self.number)
+            ends.append(round_to_type(a + step, self.number))
         low, high = self.value(min(ends)).value, self.value(max(ends)).value
         within = z3.And(z3.Not(found.nan), low <= found.value, found.value <= high)
         bound = z3.Implies(z3.Not(x.nan), within)

@@ -9,18 +9,18 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from codegen.expression import literal
-from codegen.harness import fed, tunable
-from codegen.names import REAL, CNames, c_type
-from codegen.proofs.proof import Proof, version_of
+from codegen.expression import format_literal
+from codegen.harness import tick_inputs, tunable_constants
+from codegen.names import C_REAL_TYPE, CNames, c_type
+from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.rendering import render
-from codegen.source import c_files, stepped
-from codegen.tool import told
-from language.number import LARGEST
-from language.operation import Count, Expr, Item, Loop, Op, Ref, Run, Store
+from codegen.source import emit_c_files, restrict_to_step
+from codegen.tool import run_tool
+from language.number import MAX_FINITE
+from language.operation import Count, Expr, Item, Loop, Op, Ref, RunBlock, Store
 from language.program import Constant, Program, Variable
-from language.substitution import own_expressions, subexpressions
-from language.traversal import walk
+from language.substitution import direct_expressions, walk_post_order
+from language.traversal import walk_ops
 
 KERNEL = (
     *("-machdep", "gcc_x86_32", "-cpp-extra-args=-I. -Dvolatile="),
@@ -37,25 +37,25 @@ ALARM = re.compile(
 REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
 
 
-def values(program: Program, folder: Path) -> Proof:
+def check_values(program: Program, folder: Path) -> ToolVerdict:
     """Follow the values of a Program. Raises ToolMissing, BuildError."""
-    files = {**c_files(program, by_amount=False), "main.c": _main(program)}
+    files = {**emit_c_files(program, by_magnitude=False), "main.c": _main(program)}
     for name, text in files.items():
         (folder / name).write_text(text)
     sources = [name for name in files if name.endswith(".c")]
     turns = str(_turns(program))
     unrolled = ("-eva-min-loop-unroll", turns, *(MERGED if program.run_modes else ()))
-    done = told(["frama-c", *KERNEL, *ANALYSIS, *unrolled, *sources], folder)
-    tool = f"Frama-C {version_of('frama-c', folder)}"
+    done = run_tool(["frama-c", *KERNEL, *ANALYSIS, *unrolled, *sources], folder)
+    tool = f"Frama-C {tool_version('frama-c', folder)}"
     alarms = {
         f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in ALARM.finditer(done.stdout)
     }
     reached = REACHED.search(done.stdout)
     if done.returncode or reached is None:
         last = (done.stdout + done.stderr).strip().splitlines()[-1:]
-        return Proof("values", tool, "no result", tuple(last) or ("no result",))
+        return ToolVerdict("values", tool, "no result", tuple(last) or ("no result",))
     about = f"{reached[1]} of {reached[2]} statements reached; any number of steps"
-    return Proof("values", tool, about, tuple(sorted(alarms)))
+    return ToolVerdict("values", tool, about, tuple(sorted(alarms)))
 
 
 def _turns(program: Program) -> int:
@@ -64,12 +64,16 @@ def _turns(program: Program) -> int:
     """
     if not program.run_modes:
         return 0
-    loops = [op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop)]
-    running = (op for op in loops if any(isinstance(inner, Run) for inner in walk(op.body)))
+    loops = [
+        op for block in program.blocks.values() for op in walk_ops(block) if isinstance(op, Loop)
+    ]
+    running = (
+        op for op in loops if any(isinstance(inner, RunBlock) for inner in walk_ops(op.body))
+    )
     return max((loop.count for loop in running), default=0)
 
 
-def step_counts(program: Program) -> dict[str, int]:
+def counter_limits(program: Program) -> dict[str, int]:
     """Return the most of what counts from step to step: timers, and places in what is kept.
 
     A count that begins with any of its values needs no step to be followed until it is full.
@@ -78,7 +82,7 @@ def step_counts(program: Program) -> dict[str, int]:
         return {}
     sizes = {variable.name: variable.size for variable in program.variables}
     found: dict[str, int] = {}
-    for op in (op for block in program.blocks.values() for op in walk(block)):
+    for op in (op for block in program.blocks.values() for op in walk_ops(block)):
         if isinstance(op, Count):
             found[op.timer] = max(op.limit, found.get(op.timer, 0))
         for array, index in _places(op):
@@ -91,23 +95,25 @@ def _places(op: Op) -> Iterator[tuple[str, Expr]]:
     """Yield the arrays that an operation writes or reads, and where."""
     if isinstance(op, Store):
         yield op.array, op.index
-    for whole in own_expressions(op):
-        yield from ((e.name, e.index) for e in subexpressions(whole) if isinstance(e, Item))
+    for whole in direct_expressions(op):
+        yield from ((e.name, e.index) for e in walk_post_order(whole) if isinstance(e, Item))
 
 
 def _main(program: Program) -> str:
     place = CNames(program)
-    inputs = [(place(v.name).replace("in->", "in."), _any(program, v)) for v in fed(program)]
+    inputs = [
+        (place(v.name).replace("in->", "in."), _any(program, v)) for v in tick_inputs(program)
+    ]
     page = [
         (place(c.name).replace("cal->", "cal."), _within(program, c))
-        for c in tunable(stepped(program))
+        for c in tunable_constants(restrict_to_step(program))
         if c.range
     ]
-    real = REAL[program.number]
-    kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
+    real = C_REAL_TYPE[program.number_type]
+    kinds = {variable.name: c_type(variable, program.number_type) for variable in program.variables}
     counts = [
         (place(name).replace("self->", "self."), f"({kinds[name]})Frama_C_interval(0, {most})")
-        for name, most in step_counts(stepped(program)).items()
+        for name, most in counter_limits(restrict_to_step(program)).items()
     ]
     given = {"name": program.name, "real": real, "inputs": inputs, "page": page, "counts": counts}
     return render("values_main.c.jinja", given)
@@ -116,11 +122,13 @@ def _main(program: Program) -> str:
 def _any(program: Program, variable: Variable) -> str:
     """Return any value of an input: of its range or not."""
     if variable.type == "real":
-        return _between(program, -LARGEST[program.number], LARGEST[program.number])
+        return _between(program, -MAX_FINITE[program.number_type], MAX_FINITE[program.number_type])
     if variable.type == "truth":
         return "Frama_C_interval(0, 1) != 0"
-    low, high = (0, 255) if c_type(variable, program.number) == "uint8_t" else (-(2**31), 2**31 - 1)
-    return f"({c_type(variable, program.number)})Frama_C_interval({low}, {high})"
+    low, high = (
+        (0, 255) if c_type(variable, program.number_type) == "uint8_t" else (-(2**31), 2**31 - 1)
+    )
+    return f"({c_type(variable, program.number_type)})Frama_C_interval({low}, {high})"
 
 
 def _within(program: Program, constant: Constant) -> str:
@@ -129,5 +137,7 @@ def _within(program: Program, constant: Constant) -> str:
 
 
 def _between(program: Program, low: float, high: float) -> str:
-    ends = f"{literal(low, program.number)}, {literal(high, program.number)}"
-    return f"Frama_C_{REAL[program.number]}_interval({ends})"
+    ends = (
+        f"{format_literal(low, program.number_type)}, {format_literal(high, program.number_type)}"
+    )
+    return f"Frama_C_{C_REAL_TYPE[program.number_type]}_interval({ends})"

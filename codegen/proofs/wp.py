@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.tool import needed, told
+from codegen.tool import require_tool, run_tool
 
 PROVER = "z3"
 SECONDS = 20
@@ -55,8 +55,8 @@ def detected(folder: Path) -> None:
     It gets z3 by a script: beside what a function does a goal has axioms of memory, and to look
     for models of these (z3's MBQI) takes all the time that there is.
     """
-    found = shutil.which(needed(PROVER)) or PROVER
-    told(["why3", "config", "detect"], folder, {"HOME": str(folder)})
+    found = shutil.which(require_tool(PROVER)) or PROVER
+    run_tool(["why3", "config", "detect"], folder, {"HOME": str(folder)})
     script, config = folder / f"{PROVER}.sh", folder / CONFIG
     script.write_text(f'#!/bin/sh\nexec {shlex.quote(found)} {SEARCH} "$@"\n')
     script.chmod(0o700)
@@ -72,7 +72,7 @@ def pure(text: str) -> str:
 def asked(folder: Path, file: str, functions: Sequence[str], more: Sequence[str] = ()) -> Asked:
     """Prove the contracts of some functions of a file. Raises ToolMissing, BuildError."""
     words = [*KERNEL, *OPTIONS, *more, "-wp-fct", ",".join(functions), file]
-    done = told(["frama-c", *words], folder, {"HOME": str(folder)})
+    done = run_tool(["frama-c", *words], folder, {"HOME": str(folder)})
     counts = PROVED.search(done.stdout)
     if done.returncode or counts is None:
         said = done.stdout + done.stderr

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Sets, values_of
-from modewright.console import announce, console
+from modewright.console import console, report_written_files
 from modewright.files import OutputError, require_writable, write_files
 
 
@@ -43,12 +43,12 @@ def a2l(
     except ImageError as error:
         raise OutputError(str(error)) from None
     write_files({out: text.encode("ascii")})
-    announce([out])
-    if lacks := _lacking(text, elf):
+    report_written_files([out])
+    if lacks := _missing_addresses(text, elf):
         console().print(lacks, highlight=False, soft_wrap=True, markup=False)
 
 
-def _lacking(text: str, elf: Path | None) -> str:
+def _missing_addresses(text: str, elf: Path | None) -> str:
     """Return what an A2L has no addresses of, and why."""
     if elf is None:
         return "it has no addresses: link the C with -g and name the program by --elf"

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
-from language.problem import SpecError, ordered
-from language.text import visible
+from language.problem import SpecError, sort_problems
+from language.text import escape_invisible
 from modewright.commands.options import Calibrations, Json, Sets, calibration_title, values_of
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.exits import EXIT_CODES
 from modewright.files import OutputError, require_writable, write_files
 
@@ -53,15 +53,15 @@ def export_page(
     from modewright import show, show_calibration
     from modewright.calibrations import export_calibration
 
-    name = _written_format(out, form)
-    with working(f"solving {automaton}"), _told_as_json(as_json):
+    name = _output_format(out, form)
+    with progress_spinner(f"solving {automaton}"), _report_problems_as_json(as_json):
         page = export_calibration(automaton, values_of(sets), calibrations=calibrations or ())
     write_files({out: page.text(name).encode()})
     if as_json:
         show.print_json(show_calibration.page_json(page))
     else:
         show_calibration.print_page(console(), page)
-        announce([out])
+        report_written_files([out])
 
 
 @calibration.command(name="import", epilog=EXIT_CODES)
@@ -93,14 +93,14 @@ def import_page(
 
     _require_format(form)
     title = calibration_title(out, name, date)
-    with working(f"reading {page}"), _told_as_json(as_json):
+    with progress_spinner(f"reading {page}"), _report_problems_as_json(as_json):
         found = import_calibration(page, of, form=form, own_only=own_only)
-    write_files({out: found.calibration(title, visible(page.name), date).encode()})
+    write_files({out: found.calibration(title, escape_invisible(page.name), date).encode()})
     if as_json:
         show.print_json(show_calibration.import_json(found))
     else:
         show_calibration.print_import(console(), found)
-        announce([out])
+        report_written_files([out])
 
 
 @calibration.command(epilog=EXIT_CODES)
@@ -126,20 +126,20 @@ def resolve(
 
     if not (page or calibrations or sets):
         raise typer.BadParameter("say for what: --page, --calibration or --set")
-    name = _written_format(out, form)
+    name = _output_format(out, form)
     values = values_of(sets)
-    with working(f"solving {automaton}"), _told_as_json(as_json):
+    with progress_spinner(f"solving {automaton}"), _report_problems_as_json(as_json):
         found = resolve_calibration(automaton, page, values, calibrations=calibrations or ())
     write_files({out: found.page.text(name).encode()})
     if as_json:
         show.print_json(show_calibration.resolved_json(found))
     else:
         show_calibration.print_resolved(console(), found)
-        announce([out])
+        report_written_files([out])
 
 
 @contextmanager
-def _told_as_json(as_json: bool) -> Iterator[None]:
+def _report_problems_as_json(as_json: bool) -> Iterator[None]:
     """Print problems as JSON too, where that is asked for; they still end the command."""
     from modewright import show
     from modewright.checking import problem_json
@@ -148,7 +148,7 @@ def _told_as_json(as_json: bool) -> Iterator[None]:
         yield
     except SpecError as error:
         if as_json:
-            problems = [problem_json(problem) for problem in ordered(error.problems)]
+            problems = [problem_json(problem) for problem in sort_problems(error.problems)]
             show.print_json({"problems": problems})
         raise
 
@@ -160,7 +160,7 @@ def _require_format(form: str | None) -> None:
         raise typer.BadParameter(f"{form}: one of {', '.join(FORMATS)}", param_hint="--format")
 
 
-def _written_format(out: Path, form: str | None) -> str:
+def _output_format(out: Path, form: str | None) -> str:
     """Return the format that a page is written in. Raises OutputError before any work is done."""
     from codegen.exchange.formats import FORMATS, format_name
 

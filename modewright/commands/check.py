@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import announce, console, counted
-from modewright.exits import MOST_SHOWN, PROBLEMS
+from modewright.console import console, pluralise, report_written_files
+from modewright.exits import MAX_SHOWN, PROBLEMS
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
     from language.problem import Problem
-    from modewright.checking import Checked
+    from modewright.checking import CheckResult
 
 
 def check(
@@ -41,7 +41,7 @@ def check(
     modewright check --all --watch
     """
     from modewright import checking
-    from modewright.watching import changes, folders_of
+    from modewright.watching import spec_folders, watch_changes
 
     require_writable(sarif)
     if not (specs or every):
@@ -50,32 +50,32 @@ def check(
     def names() -> list[str]:
         return list(specs or []) + [str(path) for path in checking.spec_files(Path()) if every]
 
-    is_fine = _checked(names(), len(specs or []), as_json, as_annotations, sarif)
-    for changed in changes(folders_of(specs or [])) if watch else ():
+    is_fine = _check_specs(names(), len(specs or []), as_json, as_annotations, sarif)
+    for changed in watch_changes(spec_folders(specs or [])) if watch else ():
         console().print(f"\n{', '.join(map(str, changed))} changed", highlight=False)
-        _checked(names(), len(specs or []), as_json, as_annotations, sarif)
+        _check_specs(names(), len(specs or []), as_json, as_annotations, sarif)
     if not is_fine:
         raise typer.Exit(PROBLEMS)
 
 
-def _checked(
+def _check_specs(
     names: list[str], named: int, as_json: bool, as_annotations: bool, sarif: Path | None
 ) -> bool:
     """Check specs and tell what was found, of those that are named their steps; is all fine?"""
     from modewright import checking
 
-    found = [checking.checked(name) for name in names]
-    problems = checking.all_problems(found)
+    found = [checking.check_spec(name) for name in names]
+    problems = checking.merge_problems(found)
     if sarif:
         _write_sarif(sarif, problems, as_json)
-    _tell(problems, len(names), as_json, as_annotations)
+    _report_problems(problems, len(names), as_json, as_annotations)
     is_fine = all(problem.severity != "error" for problem in problems)
     if is_fine and not (as_json or as_annotations):
-        _tell_limits(found[:named])
+        _report_limits(found[:named])
     return is_fine
 
 
-def _tell(
+def _report_problems(
     problems: Sequence[Problem], specs: int, as_json: bool, as_annotations: bool = False
 ) -> None:
     """Print the problems of some specs: as JSON, as annotations, or for a person."""
@@ -90,23 +90,23 @@ def _tell(
     if as_annotations:
         print(annotation_lines(problems), end="")
     elif problems:
-        print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
-        if len(problems) > MOST_SHOWN:
-            print(f"\n... and {len(problems) - MOST_SHOWN} more: --json", file=sys.stderr)
+        print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)
+        if len(problems) > MAX_SHOWN:
+            print(f"\n... and {len(problems) - MAX_SHOWN} more: --json", file=sys.stderr)
     errors = sum(problem.severity == "error" for problem in problems)
-    console().print(f"{counted(specs, 'spec')} checked, {counted(errors, 'problem')}")
+    console().print(f"{pluralise(specs, 'spec')} checked, {pluralise(errors, 'problem')}")
 
 
-def _tell_limits(found: Sequence[Checked]) -> None:
+def _report_limits(found: Sequence[CheckResult]) -> None:
     for each in found:
         for line in each.limits:
             console().print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 def _write_sarif(path: Path, problems: Sequence[Problem], silent: bool) -> None:
-    from modewright.sarif import sarif
+    from modewright.sarif import to_sarif
 
-    text = json.dumps(sarif(problems), indent=2, allow_nan=False)
+    text = json.dumps(to_sarif(problems), indent=2, allow_nan=False)
     write_files({path: f"{text}\n".encode()})
     if not silent:
-        announce([path])
+        report_written_files([path])

@@ -12,12 +12,12 @@ from modewright.commands.options import (
     Plot,
     Signals,
     To,
-    graphic_format,
+    picture_format,
     span_of,
     usage_errors,
 )
 from modewright.commands.plot import RunArgument
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import require_writable, write_files
 
@@ -49,29 +49,29 @@ def compare(
     """
     from modewright import runs, show
 
-    form = graphic_format(plot) if plot else "png"
+    form = picture_format(plot) if plot else "png"
     require_writable(plot)
-    with usage_errors(), working(f"comparing {a} and {b}"):
+    with usage_errors(), progress_spinner(f"comparing {a} and {b}"):
         first, second = runs.read(a), runs.read(b)
         found = runs.compare(
-            first, second, relative=relative, tolerances=_tolerances(tolerance),
+            first, second, relative=relative, tolerances=_parse_tolerances(tolerance),
             slack=slack, signals=signals or (), span=span_of(start, end),
         )  # fmt: skip
     if plot:
-        from engine.difference_picture import difference_picture
+        from engine.difference_picture import draw_difference
 
-        names = (runs.label(a, "A"), runs.label(b, "B"))
-        write_files({plot: difference_picture(first, second, found, names).data(form)})
+        names = (runs.run_label(a, "A"), runs.run_label(b, "B"))
+        write_files({plot: draw_difference(first, second, found, names).data(form)})
     if as_json:
         show.print_json(show.difference_json(found))
     else:
         show.print_difference(console(), found)
-        announce([plot] if plot else [])
+        report_written_files([plot] if plot else [])
     if not found.is_within:
         raise typer.Exit(PROBLEMS)
 
 
-def _tolerances(texts: list[str] | None) -> dict[str, float]:
+def _parse_tolerances(texts: list[str] | None) -> dict[str, float]:
     found = {}
     for text in texts or []:
         name, _, value = text.partition("=")

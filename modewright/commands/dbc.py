@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Sets, values_of
-from modewright.console import announce
+from modewright.console import report_written_files
 from modewright.files import require_writable, write_files
 
 
@@ -36,4 +36,4 @@ def dbc(
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--first") from None
     write_files({out: text.encode("ascii")})
-    announce([out])
+    report_written_files([out])

@@ -25,5 +25,5 @@ def demo(
     from modewright import demo as shown
 
     make_folder(out)
-    if not shown.run(out, console()):
+    if not shown.run_demo(out, console()):
         raise typer.Exit(PROBLEMS)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from modewright.commands.options import Json, usage_errors
-from modewright.console import announce, console
+from modewright.console import console, report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder
 
 if TYPE_CHECKING:
-    from diagnosis.dossier import Dossier
+    from diagnosis.dossier import DiagnosisReport
 
-SPAN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+DURATION_PATTERN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
+SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 Train = Annotated[
     list[Path], typer.Option("--train", help="a recording to learn from (repeatable)")
@@ -48,7 +48,7 @@ HeldOut = Annotated[
 Effects = Annotated[
     Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
 ]
-Nats = Annotated[
+Thresholds = Annotated[
     str,
     typer.Option(
         "--thresholds",
@@ -72,7 +72,7 @@ def diagnose(
     held_out: HeldOut = None,
     mapping: Map = None,
     effects: Effects = None,
-    thresholds: Nats = "kept",
+    thresholds: Thresholds = "kept",
     budget: Budget = "10min",
     anyway: Anyway = False,
     fail_on: FailOn = None,
@@ -99,32 +99,32 @@ def diagnose(
         with usage_errors():
             found = diagnosed(
                 spec, train, held_out or (), mapping, effects,
-                thresholds=thresholds, out=out, budget=seconds, anyway=anyway, tell=tell,
+                thresholds=thresholds, out=out, budget=seconds, anyway=anyway, tell=report_progress,
             )  # fmt: skip
     except KeyboardInterrupt:
         print(f"what was found is kept in {out}; the same command goes on from there",
               file=sys.stderr)  # fmt: skip
         raise
-    _show(found, out, as_json)
+    _report_dossier(found, out, as_json)
     if found.verdict.verdict == fail_on:
         raise typer.Exit(PROBLEMS)
 
 
-def _show(found: Dossier, out: Path, as_json: bool) -> None:
-    from diagnosis.dossier import verdict_json
-    from diagnosis.variant import needed
+def _report_dossier(found: DiagnosisReport, out: Path, as_json: bool) -> None:
+    from diagnosis.dossier import verdict_to_json
+    from diagnosis.variant import missing_effect_notes
     from modewright import show, show_diagnosis
 
-    for text in needed(found):
+    for text in missing_effect_notes(found):
         print(f"note: {text}", file=sys.stderr)
     if as_json:
-        show.print_json(verdict_json(found.verdict))
+        show.print_json(verdict_to_json(found.verdict))
     else:
         show_diagnosis.print_dossier(console(), found)
-        announce([out / "report.html"])
+        report_written_files([out / "report.html"])
 
 
-def tell(text: str) -> None:
+def report_progress(text: str) -> None:
     """Tell on stderr what a stage has found."""
     if not console().quiet:
         print(text, file=sys.stderr, flush=True)
@@ -132,7 +132,7 @@ def tell(text: str) -> None:
 
 def seconds_of(text: str) -> float:
     """Return a time [s] written as `90 s` or `10min`."""
-    match = SPAN.fullmatch(text.strip())
+    match = DURATION_PATTERN.fullmatch(text.strip())
     if not match:
         raise typer.BadParameter(f"`{text}` is not a time like `90 s`", param_hint="--budget")
-    return float(match[1]) * SECONDS[match[2]]
+    return float(match[1]) * SECONDS_PER_UNIT[match[2]]

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import announce
+from modewright.console import report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import require_writable, write_files
 
@@ -29,20 +29,20 @@ def diff(
     modewright diff driveline driveline_load
     modewright diff HEAD~1:spec/ev_driveline/plant.yaml driveline --html diff.html
     """
-    from modewright.editing.difference import difference
-    from modewright.editing.revision import documents
-    from modewright.editing.show_difference import json_of, page_of, text_of
+    from modewright.editing.difference import diff_documents
+    from modewright.editing.revision import load_documents
+    from modewright.editing.show_difference import diff_html, diff_json, diff_text
 
     require_writable(html)
-    with documents(before, after) as (old, new):
-        changes = difference(old, new)
+    with load_documents(before, after) as (old, new):
+        changes = diff_documents(old, new)
     if as_json:
-        print(json.dumps(json_of(changes), indent=2))
+        print(json.dumps(diff_json(changes), indent=2))
     else:
-        print(text_of(changes), end="")
+        print(diff_text(changes), end="")
     if html:
-        write_files({html: page_of(changes, before, after).encode()})
+        write_files({html: diff_html(changes, before, after).encode()})
         if not as_json:
-            announce([html])
+            report_written_files([html])
     if exit_code and changes:
         raise typer.Exit(PROBLEMS)

@@ -19,13 +19,13 @@ def doctor(as_json: Json = False) -> None:
     modewright doctor --json
     """
     from modewright import show
-    from modewright.doctor import findings
+    from modewright.doctor import run_health_checks
 
     found = []
-    for finding in findings():
+    for finding in run_health_checks():
         found.append(finding)
         if not as_json:
-            show.print_finding(console(), finding)
+            show.print_health_check(console(), finding)
     if as_json:
         show.print_json({"findings": [vars(finding) for finding in found]})
     faults = [finding for finding in found if finding.verdict == "fault"]

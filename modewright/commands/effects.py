@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Json, Plot, graphic_format, usage_errors
-from modewright.console import announce, console
+from modewright.commands.options import Json, Plot, picture_format, usage_errors
+from modewright.console import console, report_written_files
 from modewright.files import require_writable, write_files
 
 
@@ -35,14 +35,14 @@ def effects(
 
     if plot and name is None:
         raise typer.BadParameter("name the effect to be drawn", param_hint="--plot")
-    form = graphic_format(plot) if plot else ""
+    form = picture_format(plot) if plot else ""
     require_writable(plot)
     if step and not plot:
         raise typer.BadParameter("say with --plot where the picture goes", param_hint="--step")
-    listed = [found.effect(name, at)] if name else found.effects(at)
+    listed = [found.find_effect(name, at)] if name else found.list_effects(at)
     if plot and name:
         with usage_errors():
-            write_files({plot: found.signature(name, at, step=step).data(form)})
+            write_files({plot: found.draw_signature(name, at, step=step).data(form)})
     if as_json:
         show.print_json({"effects": [show_effects.effect_json(one) for one in listed]})
     elif name:
@@ -50,4 +50,4 @@ def effects(
     else:
         show_effects.print_effects(console(), listed, at)
     if not as_json:
-        announce([plot] if plot else [])
+        report_written_files([plot] if plot else [])

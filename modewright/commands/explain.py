@@ -44,10 +44,10 @@ def explain(
         raise typer.BadParameter("the document only is printed as JSON", param_hint="--json")
     values = values_of(sets)
     if as_json and other:
-        print(json.dumps(explaining.compared_json(spec, other), indent=2))
+        print(json.dumps(explaining.spec_differences_json(spec, other), indent=2))
     elif as_json:
-        print(json.dumps(explaining.explained_json(spec), indent=2))
+        print(json.dumps(explaining.spec_json(spec), indent=2))
     elif other:
-        print(explaining.compared(spec, other, stage, values), end="")  # type: ignore[arg-type]
+        print(explaining.compare_specs(spec, other, stage, values), end="")  # type: ignore[arg-type]
     else:
-        print(explaining.explained(spec, stage, values), end="")  # type: ignore[arg-type]
+        print(explaining.explain_spec(spec, stage, values), end="")  # type: ignore[arg-type]

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.diagnose import Map, Train, tell
+from modewright.commands.diagnose import Map, Train, report_progress
 from modewright.commands.options import Json, calibration_title, usage_errors
-from modewright.console import announce, console
+from modewright.console import console, report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import write_files
 
@@ -47,7 +47,7 @@ def fit(
     chosen = names_of(parameters) if parameters is not None else None
     try:
         with usage_errors():
-            found = fitted(spec, train, chosen, mapping, anyway=anyway, tell=tell)
+            found = fitted(spec, train, chosen, mapping, anyway=anyway, tell=report_progress)
     except UnusableRecordings as error:
         print(f"error: {error} (`--anyway` fits all the same)", file=sys.stderr)
         raise typer.Exit(PROBLEMS) from None
@@ -57,7 +57,7 @@ def fit(
         show.print_json(show_diagnosis.fit_json(found))
     else:
         show_diagnosis.print_fit(console(), found)
-        announce([out] if out else [])
+        report_written_files([out] if out else [])
 
 
 def names_of(text: str) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from modewright.commands.options import Calibrations, Sets, usage_errors, values_of
-from modewright.console import announce, working
+from modewright.console import progress_spinner, report_written_files
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def fmu(
 
     place = out or Path(f"{Path(automaton).stem}.fmu")
     require_writable(place)
-    with working(f"packing {automaton}"), usage_errors():
+    with progress_spinner(f"packing {automaton}"), usage_errors():
         packed = code.fmu(
             automaton,
             cast("Version", version),
@@ -50,4 +50,4 @@ def fmu(
             is_source_only=source_only,
         )
     write_files({place: packed})
-    announce([place])
+    report_written_files([place])

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from modewright.console import console, counted
+from modewright.console import console, pluralise
 from modewright.exits import PROBLEMS
-from modewright.files import require_place, write_files
+from modewright.files import require_writable_location, write_files
 
 
 def format(
@@ -25,34 +25,36 @@ def format(
     modewright format --check spec/plant.yaml
     """
     from language.document import read_text
-    from modewright.editing.format import formatted
+    from modewright.editing.format import format_text
 
-    paths = [path for file in files for path in _specs(file)]
+    paths = [path for file in files for path in _find_specs(file)]
     made: dict[Path, bytes] = {}
     for path in paths:
         read_text(path)  # refuses what is no text
         before = path.read_bytes()
-        data = formatted(before.decode(), str(path)).encode()
+        data = format_text(before.decode(), str(path)).encode()
         if data != before:
             made[path] = data
-    notes = {path: _note(path) for path in made}
+    notes = {path: _write_note(path) for path in made}
     if not check:
         for path in made:
-            require_place(path)
+            require_writable_location(path)
         write_files(made)
     for path, note in notes.items():
         verb = "would change" if check else "changed"
         console().print(f"{verb} {path}{note}", soft_wrap=True, markup=False)
-    console().print(f"{counted(len(paths), 'spec')} read, {counted(len(made), 'change')}")
+    console().print(f"{pluralise(len(paths), 'spec')} read, {pluralise(len(made), 'change')}")
     if check and made:
         raise typer.Exit(PROBLEMS)
 
 
-def _note(path: Path) -> str:
+def _write_note(path: Path) -> str:
     """Return what else comes of writing a file: it is a new one, other hard links keep the old."""
     others = path.stat().st_nlink - 1
-    return f" (no longer one file with its {counted(others, 'other hard link')})" if others else ""
+    return (
+        f" (no longer one file with its {pluralise(others, 'other hard link')})" if others else ""
+    )
 
 
-def _specs(path: Path) -> list[Path]:
+def _find_specs(path: Path) -> list[Path]:
     return sorted(path.rglob("*.yaml")) if path.is_dir() else [path]

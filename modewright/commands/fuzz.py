@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
-from modewright.console import console, working
+from modewright.console import console, progress_spinner
 from modewright.exits import PROBLEMS
 
 
@@ -32,7 +32,7 @@ def fuzz(
     """
     from modewright import code, show, show_code
 
-    with working(f"trying {runs} sequences on {automaton}"):
+    with progress_spinner(f"trying {runs} sequences on {automaton}"):
         try:
             found = code.fuzz(
                 automaton, runs, ticks, seed, values_of(sets), None, calibrations or (), numbers

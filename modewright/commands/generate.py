@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Sets, values_of
-from modewright.console import announce
+from modewright.console import report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder, write_files
 
@@ -44,7 +44,7 @@ def generate(
     if every and with_cmake:
         raise typer.BadParameter("goes with an automaton, not with --all", param_hint="--cmake")
     if only_check:
-        _stop_where_stale()
+        _exit_if_stale()
         return
     if automaton is not None:
         made = code.generate(automaton, values_of(sets), calibrations=calibrations or ())
@@ -56,10 +56,10 @@ def generate(
     for folder in {path.parent for path in files}:
         make_folder(folder)
     write_files(files)
-    announce(list(files))
+    report_written_files(list(files))
 
 
-def _stop_where_stale() -> None:
+def _exit_if_stale() -> None:
     from modewright.generated import stale_files
 
     lines = stale_files(Path())

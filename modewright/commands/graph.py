@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modewright.console import announce
+from modewright.console import report_written_files
 from modewright.files import OutputError, require_writable, write_files
 
 if TYPE_CHECKING:
@@ -39,20 +39,20 @@ def graph(
     require_writable(out)
     if tests and form != ".svg":
         raise typer.BadParameter("colours are for --out with .svg", param_hint="--tests")
-    drawn = _drawn(automaton, tests)
+    drawn = _load_diagram(automaton, tests)
     text = drawn.svg() if form == ".svg" else drawn.mermaid()
     if out is None:
         print(text, end="")
         return
     write_files({out: (f"```mermaid\n{text}```\n" if form == ".md" else text).encode()})
-    announce([out])
+    report_written_files([out])
 
 
-def _drawn(automaton: str, tests: bool) -> Diagram:
+def _load_diagram(automaton: str, tests: bool) -> Diagram:
     if tests:
-        from modewright.covered import tested_graph
+        from modewright.covered import project_coverage_diagram
 
-        return tested_graph(automaton)
+        return project_coverage_diagram(automaton)
     from modewright.diagram import graph as diagram
 
     return diagram(automaton)

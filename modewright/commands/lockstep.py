@@ -13,10 +13,10 @@ from modewright.commands.options import (
     Scenario,
     Sets,
     System,
-    stop_where,
+    exit_if_failed,
     values_of,
 )
-from modewright.console import console, working
+from modewright.console import console, progress_spinner
 
 Changes = Annotated[
     list[str] | None,
@@ -53,7 +53,7 @@ def lockstep(
     """
     from modewright import api, show
 
-    with working(f"simulating {system}, {scenario}, and running its C"):
+    with progress_spinner(f"simulating {system}, {scenario}, and running its C"):
         trajectory, verdicts = api.lockstep(
             system,
             scenario,
@@ -72,4 +72,4 @@ def lockstep(
         show.print_verdicts(console(), verdicts)
     is_compared = any(verdict.ticks for verdict in verdicts)
     is_equal = is_compared and all(verdict.is_equal for verdict in verdicts)
-    stop_where(trajectory.stopped is not None or not is_equal, trajectory)
+    exit_if_failed(trajectory.stopped is not None or not is_equal, trajectory)

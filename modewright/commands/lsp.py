@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 
 
 def lsp() -> None:
@@ -14,9 +14,9 @@ def lsp() -> None:
     modewright lsp
     """
     try:
-        from modewright.lsp.server import language_server
+        from modewright.lsp.server import create_server
     except ModuleNotFoundError as error:
         hint = "pip install 'modewright[lsp]'"
-        raise ToolMissing(f"the language server needs {error.name}: {hint}") from None
+        raise MissingToolError(f"the language server needs {error.name}: {hint}") from None
     with os.fdopen(os.dup(0), "rb") as asked, os.fdopen(os.dup(1), "wb") as answered:
-        language_server().start_io(asked, answered)
+        create_server().start_io(asked, answered)

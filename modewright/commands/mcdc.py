@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
-from modewright.console import console, working
+from modewright.console import console, progress_spinner
 
 
 def mcdc(
@@ -33,7 +33,7 @@ def mcdc(
     """
     from modewright import code, show, show_code
 
-    with working(f"running the C of {automaton} on the tests"):
+    with progress_spinner(f"running the C of {automaton} on the tests"):
         try:
             found = code.mcdc(
                 automaton,

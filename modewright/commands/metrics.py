@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.files import OutputError, require_writable, write_files
 
 if TYPE_CHECKING:
-    from codegen.instructions import Instructions
+    from codegen.instructions import InstructionCounts
 
 FORMATS = (".html", ".json")
 
@@ -49,9 +49,9 @@ def metrics(
     require_writable(out)
     found = []
     for automaton in automata:
-        with working(f"compiling {automaton} for a Cortex-M4F"):
+        with progress_spinner(f"compiling {automaton} for a Cortex-M4F"):
             given = values_of(sets), None, calibrations or (), numbers
-            counts = _counted(automaton, system, scenario, given)
+            counts = _count_instructions(automaton, system, scenario, given)
             found.append((code.metrics(automaton, *given), counts))
     data = show_metrics.metrics_json(found)
     if out:
@@ -63,12 +63,12 @@ def metrics(
         console().print(show_metrics.metrics_table(found))
         for line in show_metrics.unbounded_lines(found):
             console().print(line, highlight=False)
-        announce([out] if out else [])
+        report_written_files([out] if out else [])
 
 
-def _counted(
+def _count_instructions(
     automaton: str, system: str | None, scenario: str | None, given: Any
-) -> Instructions | None:
+) -> InstructionCounts | None:
     """Return the instructions of steps where a system is named that has the automaton."""
     from modewright import code
 

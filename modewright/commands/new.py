@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import usage_errors
-from modewright.console import announce, console
+from modewright.console import console, report_written_files
 
 
 def new(
@@ -26,7 +26,7 @@ def new(
 
     place = folder or Path(name)
     with usage_errors():
-        announce(write_skeleton(name, place))
+        report_written_files(write_skeleton(name, place))
     console().print(
         f"next: cd {place} && modewright simulate {name} -s cold_day --plot cold_day.png",
         highlight=False,

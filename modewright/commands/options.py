@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, require_calibration
+from modewright.files import OutputError, require_calibration_output
 
 if TYPE_CHECKING:
     from engine.trajectory import Trajectory
@@ -81,34 +81,34 @@ def usage_errors() -> Iterator[None]:
 def calibration_title(out: Path | None, name: str | None, date: str) -> str:
     """Return the name of the calibration, which can be written as it is asked for."""
     from language.calibration import DATE
-    from language.names import NAME
+    from language.names import NAME_PATTERN
 
     if out:
         if out.suffix != ".yaml":
             raise OutputError(f"{out}: a calibration ends with .yaml")
-        require_calibration(out)
+        require_calibration_output(out)
     title = name or (out.stem if out else "fitted")
-    if not NAME.fullmatch(title):
+    if not NAME_PATTERN.fullmatch(title):
         raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
     if date and not DATE.fullmatch(date):
         raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
     return title
 
 
-def require_run(path: Path | None) -> None:
+def require_run_format(path: Path | None) -> None:
     """Raise OutputError, before any work is done, for a run in a format that is not known."""
     if path and path.suffix.lower() not in (".csv", ".parquet"):
         raise OutputError(f"{path}: a run ends with .csv or .parquet")
 
 
-def graphic_format(path: Path) -> str:
+def picture_format(path: Path) -> str:
     """Return the format of a picture by the ending of its name. Raises OutputError."""
     if path.suffix.lower() not in GRAPHIC_FORMATS:
         raise OutputError(f"{path}: a picture ends with {', '.join(GRAPHIC_FORMATS)}")
     return path.suffix.lower()[1:]
 
 
-def stop_where(failed: bool, trajectory: Trajectory) -> None:
+def exit_if_failed(failed: bool, trajectory: Trajectory) -> None:
     """Warn of latched faults, tell why a run stopped; leave with exit code 1 if it failed."""
     for fault in trajectory.faults:
         print(f"warning: a fault bit is set: {fault}", file=sys.stderr)

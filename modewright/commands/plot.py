@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import From, Signals, To, graphic_format, span_of, usage_errors
-from modewright.console import announce
+from modewright.commands.options import From, Signals, To, picture_format, span_of, usage_errors
+from modewright.console import report_written_files
 from modewright.files import require_writable, write_files
 
 RunArgument = typer.Argument(help="a run: .csv, .parquet, or system:scenario to simulate")
@@ -32,9 +32,9 @@ def plot(
     """
     from modewright import runs
 
-    form = graphic_format(out)
+    form = picture_format(out)
     require_writable(out)
     with usage_errors():
         drawn = runs.plot(a, b, signals=signals or (), span=span_of(start, end))
     write_files({out: drawn.data(form)})
-    announce([out])
+    report_written_files([out])

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Json, Sets, values_of
-from modewright.console import console, working
+from modewright.console import console, progress_spinner
 from modewright.exits import PROBLEMS
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
@@ -38,7 +38,7 @@ def prove(
     if unknown:
         known = ", ".join(CHECKS)
         raise typer.BadParameter(f"{unknown[0]}: not one of {known}", param_hint="--only")
-    with working(f"checking the C of {automaton}"):
+    with progress_spinner(f"checking the C of {automaton}"):
         made = code.prove(
             automaton, values_of(sets), calibrations=calibrations or (), checks=checks
         )

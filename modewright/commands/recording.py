@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Json, Plot, graphic_format, usage_errors
-from modewright.console import announce, console, counted, working
+from modewright.commands.options import Json, Plot, picture_format, usage_errors
+from modewright.console import console, pluralise, progress_spinner, report_written_files
 from modewright.exits import EXIT_CODES, PROBLEMS
 from modewright.files import require_writable, write_files
 
@@ -50,15 +50,15 @@ def check(
     from modewright.recordings import check_recordings
 
     require_writable(plot)
-    with working(f"looking at {counted(len(files), 'recording')}"), usage_errors():
+    with progress_spinner(f"looking at {pluralise(len(files), 'recording')}"), usage_errors():
         checked = check_recordings(files, mapping, spec, databases or ())
     if plot:
         title = ", ".join(file.name for file in files) + (f" against {spec}" if spec else "")
-        write_files({plot: checked.plot(title).data(graphic_format(plot))})
+        write_files({plot: checked.plot(title).data(picture_format(plot))})
     if as_json:
         show.print_json(show_recording.check_json(checked.check))
     else:
         show_recording.print_check(console(), checked.check)
-        announce([plot] if plot else [])
+        report_written_files([plot] if plot else [])
     if not checked.check.is_usable:
         raise typer.Exit(PROBLEMS)

@@ -13,12 +13,12 @@ from modewright.commands.options import (
     Out,
     Plot,
     Sets,
-    graphic_format,
-    require_run,
-    stop_where,
+    exit_if_failed,
+    picture_format,
+    require_run_format,
     values_of,
 )
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.files import require_writable, write_files
 
 
@@ -40,28 +40,28 @@ def replay(
     \b
     modewright replay estimator drive.csv --map leaf_can --variant leaf --plot drive.png
     """
-    from engine.run_file import run_files
+    from engine.run_file import encode_run
     from modewright import api, show
 
-    require_run(out)
+    require_run_format(out)
     require_writable(out, plot)
-    with working(f"replaying {recording.name}"):
+    with progress_spinner(f"replaying {recording.name}"):
         replayed = api.replay(
             estimator, recording, mapping, variant, values_of(sets), calibrations=calibrations or ()
         )
     trajectory, verdict = replayed.result.trajectory, replayed.verdict
     files: dict[Path, bytes] = {}
     if out:
-        files |= run_files(trajectory, out)
+        files |= encode_run(trajectory, out)
     if plot:
         from modewright.replay_picture import replay_picture
 
         title = f"{estimator} on {recording.name}" + (f", variant {variant}" if variant else "")
-        files[plot] = replay_picture(replayed, title, graphic_format(plot))
+        files[plot] = replay_picture(replayed, title, picture_format(plot))
     write_files(files)
     if as_json:
         show.print_json(show.replay_json(replayed))
     else:
         show.print_replay(console(), replayed)
-        announce(list(files))
-    stop_where(verdict is not None and not verdict.is_equal, trajectory)
+        report_written_files(list(files))
+    exit_if_failed(verdict is not None and not verdict.is_equal, trajectory)

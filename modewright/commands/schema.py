@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import usage_errors
-from modewright.console import announce
+from modewright.console import report_written_files
 from modewright.files import require_writable, write_files
 
 
@@ -31,4 +31,4 @@ def schema(
         print(text, end="")
         return
     write_files({out: text.encode()})
-    announce([out])
+    report_written_files([out])

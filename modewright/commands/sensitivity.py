@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import announce, console
+from modewright.console import console, report_written_files
 from modewright.files import require_writable, write_files
 
 
@@ -40,4 +40,4 @@ def sensitivity(
         print_json(show_sensitivity.sensitivity_json(found))
     else:
         show_sensitivity.print_sensitivity(console(), found)
-        announce([table] if table else [])
+        report_written_files([table] if table else [])

@@ -15,13 +15,13 @@ from modewright.commands.options import (
     Scenario,
     Sets,
     System,
-    graphic_format,
-    require_run,
-    stop_where,
+    exit_if_failed,
+    picture_format,
+    require_run_format,
     usage_errors,
     values_of,
 )
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
@@ -53,12 +53,12 @@ def simulate(
     modewright simulate ev_driveline -s tip_out --plot tip_out.png
     modewright simulate ev_driveline -s tip_out --set 'k_hs=6000 N*m/rad' --out run.csv
     """
-    from engine.run_file import run_files
+    from engine.run_file import encode_run
     from modewright import api
 
-    require_run(out)
+    require_run_format(out)
     require_writable(out, plot)
-    with working(f"simulating {system}, {scenario}"), usage_errors():
+    with progress_spinner(f"simulating {system}, {scenario}"), usage_errors():
         trajectory = api.simulate(
             system,
             scenario,
@@ -68,26 +68,26 @@ def simulate(
             calibrations=calibrations or (),
             compiled=compiled,
         )
-    files = run_files(trajectory, out) if out else {}
+    files = encode_run(trajectory, out) if out else {}
     if plot:
-        files[plot] = _picture(trajectory, f"{system}, scenario {scenario}", plot)
+        files[plot] = _draw_plot(trajectory, f"{system}, scenario {scenario}", plot)
     write_files(files)
-    _tell(trajectory, list(files), as_json)
+    _report_run(trajectory, list(files), as_json)
 
 
-def _tell(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:
+def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:
     from modewright import show
 
     if as_json:
         show.print_json(show.trajectory_json(trajectory))
     else:
         console().print(show.events_table(trajectory.events))
-    stop_where(trajectory.stopped is not None, trajectory)
+    exit_if_failed(trajectory.stopped is not None, trajectory)
     if not as_json:
-        announce(files)
+        report_written_files(files)
 
 
-def _picture(trajectory: Trajectory, title: str, plot: Path) -> bytes:
-    from engine.plot import overview
+def _draw_plot(trajectory: Trajectory, title: str, plot: Path) -> bytes:
+    from engine.plot import draw_overview
 
-    return overview([trajectory], title=title).data(graphic_format(plot))
+    return draw_overview([trajectory], title=title).data(picture_format(plot))

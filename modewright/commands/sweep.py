@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from modewright.commands.options import Json, Sets, usage_errors, values_of
-from modewright.console import announce, console, counted, counting
+from modewright.console import console, pluralise, progress_bar, report_written_files
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, make_folder, require_beside, write_files
-from modewright.interruption import interrupted_once
+from modewright.files import OutputError, make_folder, require_separate_outputs, write_files
+from modewright.interruption import debounce_interrupts
 from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
-OF_A_RUN = {
+RUN_OPTIONS = {
     "out": "--out", "workers": "--workers", "cluster": "--cluster", "tls_ca": "--tls-ca",
     "tls_cert": "--tls-cert", "tls_key": "--tls-key", "sets": "--set", "samples": "--samples",
     "seed": "--seed", "block": "--block",
@@ -83,31 +83,33 @@ def sweep(
     modewright sweep my_study.yaml --out results --cluster tls://head:8786 --tls-ca ca.pem
     modewright sweep --summary results --csv summary.csv --report results.html
     """
-    folder = _checked_folder(study, out, summary, form)
+    folder = _require_folder(study, out, summary, form)
     if summary is not None:
         _require_nothing_to_run(context)
-    require_beside(folder, table, report)
+    require_separate_outputs(folder, table, report)
     lost = 0
     if study is not None:
         options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
         options["workers"] = workers or None
         options |= _cluster_options(cluster, workers, (tls_ca, tls_cert, tls_key))
-        lost = _run(study, folder, values_of(sets), options, as_json)
-    _show(folder, table, report, form, as_json)
+        lost = _run_study(study, folder, values_of(sets), options, as_json)
+    _report_results(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
 
 
 def _require_nothing_to_run(context: typer.Context) -> None:
     """Refuse options that have no influence where nothing is run."""
-    given = {name: context.get_parameter_source(name) for name in OF_A_RUN}
-    used = [OF_A_RUN[name] for name, source in given.items() if source and source.name != "DEFAULT"]
+    given = {name: context.get_parameter_source(name) for name in RUN_OPTIONS}
+    used = [
+        RUN_OPTIONS[name] for name, source in given.items() if source and source.name != "DEFAULT"
+    ]
     if used:
         label = f"it runs nothing: {', '.join(used)} would have no influence"
         raise typer.BadParameter(label, param_hint="--summary")
 
 
-def _checked_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
+def _require_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
     """Return the folder that is written or summed up."""
     if (study is None) == (summary is None):
         raise typer.BadParameter("name a study, or a folder with --summary", param_hint="STUDY")
@@ -124,7 +126,7 @@ def _cluster_options(
     cluster: str | None, workers: int, files: tuple[Path | None, ...]
 ) -> dict[str, Any]:
     """Return where the study is computed; warn of a connection that others can read."""
-    from sweep.address import Credentials, address_of
+    from sweep.address import Credentials, parse_address
 
     if cluster is None:
         if any(files):
@@ -134,18 +136,18 @@ def _cluster_options(
         label = "a cluster says itself how many workers it has: `local:4`"
         raise typer.BadParameter(label, param_hint="--workers")
     with usage_errors():
-        address = address_of(cluster)
+        address = parse_address(cluster)
     for path in files:
         if path and not address.url.startswith("tls:"):
             raise typer.BadParameter("files of TLS are for tls://", param_hint="--cluster")
         if path and not path.is_file():
             raise OutputError(f"{path}: there is no such file")
-    if address.is_open:
-        console_error(OPEN_WARNING.format(cluster))
+    if address.is_unprotected:
+        print_error(OPEN_WARNING.format(cluster))
     return {"cluster": cluster, "credentials": Credentials(*files)}
 
 
-def _run(
+def _run_study(
     study: str,
     out: Path,
     values: dict[str, str],
@@ -161,46 +163,50 @@ def _run(
         done[:] = [now, total]
         progress(now, before, total)
 
-    with interrupted_once():
+    with debounce_interrupts():
         try:
-            with counting(f"sweep {study}", "variants") as progress, usage_errors():
-                found = studies.sweep(study, out, values, **options, progress=tell, warn=_warn)
+            with progress_bar(f"sweep {study}", "variants") as progress, usage_errors():
+                found = studies.sweep(
+                    study, out, values, **options, progress=tell, warn=_print_warning
+                )
         except KeyboardInterrupt:
-            _tell_kept(out, *done)
+            _report_kept(out, *done)
             raise
         except (OutputError, ClusterError) as error:
             kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
             raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
     if not as_json:
-        _tell_run(found)
-    for part, reason in found.lost:
-        console_error(f"variants {part.start} to {part.stop - 1} are not done: {reason}")
-    return len(found.lost)
+        _report_run(found)
+    for part, reason in found.lost_blocks:
+        print_error(f"variants {part.start} to {part.stop - 1} are not done: {reason}")
+    return len(found.lost_blocks)
 
 
-def _tell_kept(out: Path, now: int, total: int) -> None:
+def _report_kept(out: Path, now: int, total: int) -> None:
     if total:
-        console_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
+        print_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
 
 
-def _warn(text: str) -> None:
+def _print_warning(text: str) -> None:
     """Print a warning; a problem says itself that it is one."""
-    console_error(text if ": warning: " in text.split("\n")[0] else f"warning: {text}")
+    print_error(text if ": warning: " in text.split("\n")[0] else f"warning: {text}")
 
 
-def _tell_run(found: StudyRun) -> None:
-    before = f", {found.before} were there" if found.before else ""
-    console().print(f"{counted(found.computed, 'variant')} computed{before}", highlight=False)
+def _report_run(found: StudyRun) -> None:
+    before = f", {found.reused} were there" if found.reused else ""
+    console().print(f"{pluralise(found.computed, 'variant')} computed{before}", highlight=False)
 
 
-def console_error(text: str) -> None:
+def print_error(text: str) -> None:
     """Print a line to stderr."""
     import sys
 
     print(text, file=sys.stderr)
 
 
-def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool) -> None:
+def _report_results(
+    folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool
+) -> None:
     """Tell the summary; then write what is drawn, and what is asked for."""
     from modewright import show_study, studies
     from modewright.show import print_json
@@ -210,16 +216,16 @@ def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_j
         print_json(show_study.summary_json(found))
     else:
         show_study.print_summary(console(), found)
-    written = _drawn(folder, form)
+    written = _write_pictures(folder, form)
     files = {table: found.csv().encode()} if table else {}
     if report:
         files[report] = studies.study_report(folder)
     write_files(files)
     if not as_json:
-        announce([*written, *files])
+        report_written_files([*written, *files])
 
 
-def _drawn(folder: Path, form: str) -> list[Path]:
+def _write_pictures(folder: Path, form: str) -> list[Path]:
     """Write the pictures of a study; where that cannot be, the summary was told all the same."""
     from modewright import studies
 
@@ -230,6 +236,6 @@ def _drawn(folder: Path, form: str) -> list[Path]:
             make_folder(folder / PLOTS)
         write_files(files)
     except OutputError as error:
-        _warn(f"the pictures are not written: {error}")
+        _print_warning(f"the pictures are not written: {error}")
         return []
     return list(files)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder, require_writable, write_files
 
@@ -44,41 +44,41 @@ def test(
     modewright test tip_out_is_detected --junit build/tests.xml
     modewright test --coverage --graphs build
     """
-    from expectation.coverage import coverage as covered, together
-    from modewright.show_tests import lines_of
+    from expectation.coverage import measure_coverage as covered, merge_coverages
+    from modewright.show_tests import spec_test_lines
     from modewright.tests import run_tests
 
     require_writable(junit)
     runs: list[TestRun] = []
     parts: list[Coverage] = []
-    with working("running tests"):
+    with progress_spinner("running tests"):
         for run in run_tests(tests or (), compiled=not interpreted):
             runs.append(run)
             parts += covered(run.test) if coverage or graphs else ()
-            _tell(() if as_json else lines_of(run))
-    sums = together(parts)
-    pictures = _write(runs, sums, junit, graphs)
+            _print_lines(() if as_json else spec_test_lines(run))
+    sums = merge_coverages(parts)
+    pictures = _write_results(runs, sums, junit, graphs)
     if as_json:
         _print_json(runs, sums)
     else:
-        _tell_end(runs, sums)
-        announce(pictures)
+        _report_end(runs, sums)
+        report_written_files(pictures)
     if not all(run.passed for run in runs):
         raise typer.Exit(PROBLEMS)
 
 
-def _write(
+def _write_results(
     runs: Sequence[TestRun], sums: Sequence[Coverage], junit: Path | None, graphs: Path | None
 ) -> list[Path]:
     """Write the results and the pictures that are wanted; return the files of the pictures."""
     from modewright import show_tests
-    from modewright.covered import covered_graph
+    from modewright.covered import coverage_diagram
 
-    results = {junit: show_tests.junit(runs)} if junit else {}
+    results = {junit: show_tests.junit_xml(runs)} if junit else {}
     pictures = {}
     if graphs:
         make_folder(graphs)
-        pictures = {graphs / f"{c.name}.svg": covered_graph(c).svg().encode() for c in sums}
+        pictures = {graphs / f"{c.name}.svg": coverage_diagram(c).svg().encode() for c in sums}
     write_files(results | pictures)
     return list(pictures)
 
@@ -86,21 +86,21 @@ def _write(
 def _print_json(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
     from modewright.covered import coverage_json
     from modewright.show import print_json
-    from modewright.show_tests import test_json
+    from modewright.show_tests import spec_test_json
 
-    told = {"tests": [test_json(run) for run in runs]}
+    told = {"tests": [spec_test_json(run) for run in runs]}
     print_json(told | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
 
 
-def _tell_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
-    from modewright.covered import lines_of
-    from modewright.show_tests import summary
+def _report_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
+    from modewright.covered import coverage_lines
+    from modewright.show_tests import spec_tests_summary
 
     for each in sums:
-        _tell(lines_of(each))
-    _tell([summary(runs)])
+        _print_lines(coverage_lines(each))
+    _print_lines([spec_tests_summary(runs)])
 
 
-def _tell(lines: Iterable[str]) -> None:
+def _print_lines(lines: Iterable[str]) -> None:
     for line in lines:
         console().print(line, soft_wrap=True, highlight=False, markup=False)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import announce, console, working
+from modewright.console import console, progress_spinner, report_written_files
 from modewright.exits import PROBLEMS
 from modewright.files import OutputError, require_writable, write_files
 
@@ -47,9 +47,9 @@ def trace(
         raise OutputError(f"{out}: a trace ends with {', '.join(FORMATS)}")
     require_writable(out)
     if keys:
-        _trace_keys(specs, out, form, as_json)
+        _report_key_trace(specs, out, form, as_json)
         return
-    with working("tracing requirements"):
+    with progress_spinner("tracing requirements"):
         found = traces.trace(specs, requirements, run=run)
     data = json.dumps(show_trace.trace_json(found), indent=2) + "\n"
     if out:
@@ -58,30 +58,30 @@ def trace(
     if as_json:
         print(data, end="")
     else:
-        for line in show_trace.lines_of(found):
+        for line in show_trace.trace_lines(found):
             console().print(line, soft_wrap=True, highlight=False, markup=False)
-        announce([out] if out else [])
-    if strict and len(found.of_state("traced")) < len(found.requirements):
+        report_written_files([out] if out else [])
+    if strict and len(found.with_state("traced")) < len(found.requirements):
         raise typer.Exit(PROBLEMS)
 
 
-def _trace_keys(specs: list[str], out: Path | None, form: str, as_json: bool) -> None:
+def _report_key_trace(specs: list[str], out: Path | None, form: str, as_json: bool) -> None:
     """Trace keys to lines of C: a page with both side by side, or plain data."""
     from modewright import show_keys, traces
 
     if form == ".csv":
         raise OutputError(f"{out}: a trace of keys ends with .html or .json")
-    with working("tracing keys"):
+    with progress_spinner("tracing keys"):
         traced = traces.trace_keys(specs)
-    data = json.dumps(show_keys.keys_json(traced.found), indent=2) + "\n"
+    data = json.dumps(show_keys.key_traces_json(traced.traces), indent=2) + "\n"
     if out:
         title = f"Keys of {', '.join(specs)}"
         is_page = form == ".html"
-        page = show_keys.keys_html(traced.found, traced.specs, traced.code, title)
+        page = show_keys.key_traces_html(traced.traces, traced.specs, traced.code, title)
         write_files({out: (page if is_page else data).encode()})
     if as_json:
         print(data, end="")
     else:
-        for line in show_keys.keys_lines(traced.found):
+        for line in show_keys.key_traces_lines(traced.traces):
             console().print(line, soft_wrap=True, highlight=False, markup=False)
-        announce([out] if out else [])
+        report_written_files([out] if out else [])

@@ -7,25 +7,32 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from language.document import Document, Items, Node, Scalar, Table
+from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.parse import parse_expression
 from language.problem import Problems, SpecError
-from language.syntax import Negative, Number, Tree, alike
-from language.units import Dimension, fits
-from modewright.editing.order import what_moves
-from modewright.editing.thing import SUBSECTIONS, TEXTS, Path, Thing, is_section, thing_of
-from modewright.editing.unfolding import unfolded
+from language.syntax import Negation, NumberLiteral, SyntaxTree, is_same_expression
+from language.units import Dimension, are_compatible
+from modewright.editing.order import describe_reordering
+from modewright.editing.thing import (
+    SUBSECTIONS,
+    TEXT_GROUP,
+    KeyPath,
+    Subject,
+    is_section,
+    subject_of,
+)
+from modewright.editing.unfolding import expand_templates
 
-MOST_PERCENT = 5
+MIN_RATIO_SHOWN = 5
 """From this ratio on it is told itself."""
-Kind = Literal["added", "removed", "changed"]
+ChangeKind = Literal["added", "removed", "changed"]
 
 
 @dataclass(frozen=True)
-class Change:
+class SpecChange:
     """One difference: of what, in which respect, the texts before and after with their places."""
 
-    kind: Kind
+    kind: ChangeKind
     group: str
     thing: str
     aspect: str
@@ -36,160 +43,173 @@ class Change:
     after_place: str
 
 
-def difference(before: Document, after: Document) -> tuple[Change, ...]:
+def diff_documents(before: Document, after: Document) -> tuple[SpecChange, ...]:
     """Return what differs between two expanded documents, by groups. Raises SpecError."""
     if before.kind != after.kind:
         problems = Problems()
         label = f"`{after.name}` is of kind {after.kind}, `{before.name}` of kind {before.kind}"
         problems.error("form", after.name_span, label, "specs of one kind are compared")
-        problems.stop_if_any()
-    trees = _Trees(unfolded(before.root), unfolded(after.root))
+        problems.raise_if_errors()
+    pair = _DocumentPair(expand_templates(before.root), expand_templates(after.root))
     heads = ("language", before.kind)
     found = [
         change
-        for key in _keys(trees.before, trees.after)
+        for key in _union_keys(pair.before, pair.after)
         if key not in heads
-        for change in trees.changes((key,), trees.before.get(key), trees.after.get(key))
+        for change in pair.iter_changes((key,), pair.before.get(key), pair.after.get(key))
     ]
-    order = [*dict.fromkeys(change.group for change in found if change.group != TEXTS), TEXTS]
+    order = [
+        *dict.fromkeys(change.group for change in found if change.group != TEXT_GROUP),
+        TEXT_GROUP,
+    ]
     return tuple(sorted(found, key=lambda change: order.index(change.group)))
 
 
 @dataclass(frozen=True)
-class _Trees:
+class _DocumentPair:
     """Both trees, templates applied."""
 
-    before: Table
-    after: Table
+    before: MappingNode
+    after: MappingNode
 
-    def changes(self, path: Path, old: Node | None, new: Node | None) -> Iterator[Change]:
+    def iter_changes(
+        self, path: KeyPath, old: YamlNode | None, new: YamlNode | None
+    ) -> Iterator[SpecChange]:
         """Yield what differs below a path; a mode that is new is told with what is in it."""
-        thing = thing_of(path, self.after if new is not None else self.before)
-        if isinstance(old, Table) and isinstance(new, Table):
+        subject = subject_of(path, self.after if new is not None else self.before)
+        if isinstance(old, MappingNode) and isinstance(new, MappingNode):
             if path != ("instances",) or "automaton" in self.after.entries:
-                yield from _moved(path, old, new)
-            for key in _keys(old, new):
-                yield from self.changes((*path, key), old.get(key), new.get(key))
+                yield from _order_changes(path, old, new)
+            for key in _union_keys(old, new):
+                yield from self.iter_changes((*path, key), old.get(key), new.get(key))
             return
-        whole = thing or Thing("settings", ".".join(path), "")
+        changed_subject = subject or Subject("settings", ".".join(path), "")
         if old is not None and new is not None:
-            if not _is_same(old, new):
-                yield _change("changed", whole, old, new)
+            if not _is_equivalent(old, new):
+                yield _make_change("changed", changed_subject, old, new)
             return
         node = old if new is None else new
         assert node is not None
-        inner = _subsections(node) if thing is None or thing.group == "modes" else []
-        if thing is not None:
-            yield _change("added" if old is None else "removed", thing, old, new)
+        inner = _subsections(node) if subject is None or subject.group == "modes" else []
+        if subject is not None:
+            yield _make_change("added" if old is None else "removed", subject, old, new)
         for key, below in inner:
             if old is None:
-                yield from self.changes((*path, key), None, below)
+                yield from self.iter_changes((*path, key), None, below)
             else:
-                yield from self.changes((*path, key), below, None)
+                yield from self.iter_changes((*path, key), below, None)
 
 
-def _moved(path: Path, old: Table, new: Table) -> Iterator[Change]:
+def _order_changes(path: KeyPath, old: MappingNode, new: MappingNode) -> Iterator[SpecChange]:
     """Yield that the keys of a section have another order, where that means something."""
     section = path[-1]
-    moves = what_moves(section, old, new) if is_section(path) else ""
-    if moves:
+    effect = describe_reordering(section, old, new) if is_section(path) else ""
+    if effect:
         owner = ".".join(key for key in path[:-1] if key not in ("modes", "regions"))
         title = f"order in {owner}" if owner else "order"
         texts = (", ".join(old.entries), ", ".join(new.entries))
-        yield Change("changed", section, title, "", *texts, moves, _place(old), _place(new))
+        yield SpecChange(
+            "changed", section, title, "", *texts, effect, _format_place(old), _format_place(new)
+        )
 
 
-def _keys(old: Table, new: Table) -> list[str]:
+def _union_keys(old: MappingNode, new: MappingNode) -> list[str]:
     return list(dict.fromkeys((*new.entries, *old.entries)))
 
 
-def _subsections(node: Node) -> list[tuple[str, Node]]:
+def _subsections(node: YamlNode) -> list[tuple[str, YamlNode]]:
     """Return what is told on its own: of a mode its transitions and the like, else everything."""
-    if not isinstance(node, Table):
+    if not isinstance(node, MappingNode):
         return []
     is_mode = any(entry.key in SUBSECTIONS for entry in node)
     return [(e.key, e.node) for e in node if e.key in SUBSECTIONS or not is_mode]
 
 
-def _change(kind: Kind, thing: Thing, old: Node | None, new: Node | None) -> Change:
-    left_out = SUBSECTIONS if thing.group == "modes" else ()
-    return Change(
+def _make_change(
+    kind: ChangeKind, subject: Subject, old: YamlNode | None, new: YamlNode | None
+) -> SpecChange:
+    left_out = SUBSECTIONS if subject.group == "modes" else ()
+    return SpecChange(
         kind=kind,
-        group=thing.group,
-        thing=thing.title,
-        aspect=thing.aspect,
-        before=_text(old, left_out) if old else "",
-        after=_text(new, left_out) if new else "",
-        note=_note(old, new, thing.group == "parameters") if old and new else "",
-        before_place=_place(old),
-        after_place=_place(new),
+        group=subject.group,
+        thing=subject.title,
+        aspect=subject.aspect,
+        before=_format_node(old, left_out) if old else "",
+        after=_format_node(new, left_out) if new else "",
+        note=_quantity_note(old, new, subject.group == "parameters") if old and new else "",
+        before_place=_format_place(old),
+        after_place=_format_place(new),
     )
 
 
-def _place(node: Node | None) -> str:
+def _format_place(node: YamlNode | None) -> str:
     return f"{node.span.source.name}:{node.span.line}" if node else ""
 
 
-def _text(node: Node, left_out: tuple[str, ...] = (), is_inner: bool = False) -> str:
+def _format_node(node: YamlNode, excluded: tuple[str, ...] = (), is_inner: bool = False) -> str:
     """Return a node on one line, without the brackets around all of it."""
     match node:
-        case Scalar():
+        case ScalarNode():
             return node.text
-        case Items(nodes):
-            return f"[{', '.join(_text(part, (), True) for part in nodes)}]"
-        case Table():
-            kept = [e for e in node if e.key not in left_out]
-            text = ", ".join(f"{entry.key}: {_text(entry.node, (), True)}" for entry in kept)
+        case SequenceNode(nodes):
+            return f"[{', '.join(_format_node(part, (), True) for part in nodes)}]"
+        case MappingNode():
+            shown = [e for e in node if e.key not in excluded]
+            text = ", ".join(
+                f"{entry.key}: {_format_node(entry.node, (), True)}" for entry in shown
+            )
             return f"{{{text}}}" if is_inner else text
 
 
-def _is_same(old: Node, new: Node) -> bool:
+def _is_equivalent(old: YamlNode, new: YamlNode) -> bool:
     """Tell whether two values say the same; blanks in expressions do not count."""
     match old, new:
-        case Scalar(), Scalar():
+        case ScalarNode(), ScalarNode():
             if old.text == new.text or old.text.split() == new.text.split():
                 return True
-            first, second = _tree(old), _tree(new)
-            return first is not None and second is not None and alike(first, second)
-        case Items(), Items():
+            first, second = _parse_or_none(old), _parse_or_none(new)
+            return first is not None and second is not None and is_same_expression(first, second)
+        case SequenceNode(), SequenceNode():
             same = len(old.nodes) == len(new.nodes)
-            return same and all(map(_is_same, old.nodes, new.nodes))
+            return same and all(map(_is_equivalent, old.nodes, new.nodes))
         case _:
             return False
 
 
-def _tree(scalar: Scalar) -> Tree | None:
+def _parse_or_none(scalar: ScalarNode) -> SyntaxTree | None:
     try:
         return parse_expression(scalar)
     except SpecError:
         return None
 
 
-def _note(old: Node, new: Node, is_value: bool) -> str:
+def _quantity_note(old: YamlNode, new: YamlNode, is_value: bool) -> str:
     """Return how much a quantity changed, or that it is the same in another unit.
 
     Of bare numbers that is told where they are values: a priority has no size.
     """
-    first, second = _number(old), _number(new)
+    first, second = _si_quantity(old), _si_quantity(new)
     if first is None or second is None:
         return ""
     if first[1].is_number and second[1].is_number and not is_value:
         return ""
-    if not fits(first[1], second[1]):
+    if not are_compatible(first[1], second[1]):
         return "other unit"
     if first[0] == second[0]:
         return "same value"
     if first[0] == 0:
         return ""
     ratio = second[0] / first[0]
-    if ratio >= MOST_PERCENT:
+    if ratio >= MIN_RATIO_SHOWN:
         return f"times {float(ratio):.3g}"
     return f"{float((second[0] - first[0]) / abs(first[0])) * 100:+.3g} %"
 
 
-def _number(node: Node) -> tuple[Fraction, Dimension] | None:
+def _si_quantity(node: YamlNode) -> tuple[Fraction, Dimension] | None:
     """Return a literal in SI and its dimension, None for other values."""
-    tree = _tree(node) if isinstance(node, Scalar) else None
-    sign = -1 if isinstance(tree, Negative) else 1
-    number = tree.operand if isinstance(tree, Negative) else tree
-    return (sign * number.value, number.unit.dimension) if isinstance(number, Number) else None
+    tree = _parse_or_none(node) if isinstance(node, ScalarNode) else None
+    sign = -1 if isinstance(tree, Negation) else 1
+    number = tree.operand if isinstance(tree, Negation) else tree
+    return (
+        (sign * number.value, number.unit.dimension) if isinstance(number, NumberLiteral) else None
+    )

@@ -8,57 +8,60 @@ comment keeps its column as long as two blanks fit before it.
 
 from __future__ import annotations
 
-from language.document import Items, Node, Scalar, Table, lines_of
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
 from language.problem import Source
-from language.yaml_tree import parse
-from modewright.editing.layout import aligned, ended, indented, spaced
-from modewright.editing.page import page_of
+from language.yaml_tree import parse_yaml
+from modewright.editing.layout import align_values, indent_blocks, space_tokens, strip_blanks
+from modewright.editing.page import tokenise
 
-PASSES = (ended, indented, spaced, aligned, ended)
-MOST_ROUNDS = 8
+PASSES = (strip_blanks, indent_blocks, space_tokens, align_values, strip_blanks)
+MAX_ROUNDS = 8
 """Rounds of the passes: what one has moved may take another out of a column."""
-MARK = "\ufeff"
+BYTE_ORDER_MARK = "\ufeff"
 """A mark of UTF-8 that some editors put before a text."""
 
 
-def formatted(text: str, name: str = "") -> str:
+def format_text(text: str, name: str = "") -> str:
     """Return the text of a spec laid out. Raises SpecError where it is no YAML of ours.
 
     A pass that would change what is said, in a text that no rule here foresees, is left out. A mark
     before the text stays, and all lines end as the first one does.
     """
-    made = _laid_out(text.removeprefix(MARK).replace("\r\n", "\n"), name)
+    result = _run_passes(text.removeprefix(BYTE_ORDER_MARK).replace("\r\n", "\n"), name)
     if text.partition("\n")[0].endswith("\r"):
-        made = made.replace("\n", "\r\n")
-    return MARK + made if text.startswith(MARK) else made
+        result = result.replace("\n", "\r\n")
+    return BYTE_ORDER_MARK + result if text.startswith(BYTE_ORDER_MARK) else result
 
 
-def _laid_out(made: str, name: str) -> str:
-    said = _said(made, name)
-    for _ in range(MOST_ROUNDS):
-        before = made
-        for one in PASSES:
-            tried = one(made)
-            if tried != made and _said(tried, name) == said:
-                made = tried
-        if made == before:
+def _run_passes(text: str, name: str) -> str:
+    content = _content_of(text, name)
+    for _ in range(MAX_ROUNDS):
+        before = text
+        for run_pass in PASSES:
+            candidate = run_pass(text)
+            if candidate != text and _content_of(candidate, name) == content:
+                text = candidate
+        if text == before:
             break
-    return made
+    return text
 
 
-def _said(text: str, name: str) -> tuple[object, list[str]]:
+def _content_of(text: str, name: str) -> tuple[object, list[str]]:
     """Return what a text says - keys, values, quotes - and its comments."""
-    root = parse(Source(name, lines_of(text)), text)
-    page = page_of(text)
-    comments = [page.lines[line][column:].rstrip() for line, column in page.comments.items()]
-    return _plain(root), comments
+    root = parse_yaml(Source(name, lines_of(text)), text)
+    tokenised = tokenise(text)
+    comments = [
+        tokenised.lines[line][column:].rstrip()
+        for line, column in tokenised.comment_columns.items()
+    ]
+    return _to_plain_data(root), comments
 
 
-def _plain(node: Node) -> object:
+def _to_plain_data(node: YamlNode) -> object:
     match node:
-        case Scalar(text, _, quoted):
+        case ScalarNode(text, _, quoted):
             return text, quoted
-        case Items(nodes):
-            return [_plain(part) for part in nodes]
-        case Table():
-            return [(entry.key, _plain(entry.node)) for entry in node]
+        case SequenceNode(nodes):
+            return [_to_plain_data(part) for part in nodes]
+        case MappingNode():
+            return [(entry.key, _to_plain_data(entry.node)) for entry in node]

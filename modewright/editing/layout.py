@@ -7,87 +7,91 @@ from collections.abc import Iterator
 
 import yaml
 
-from modewright.editing.page import CLOSING, OPENING, Page, Token, page_of, text_of
+from modewright.editing.page import CLOSING, OPENING, Token, TokenisedText, join_lines, tokenise
 
 INDENTATION = 2
-BEFORE_COMMENT = 2
+COMMENT_GAP = 2
 """Least blanks between a value and the comment behind it."""
 
 
-def ended(text: str) -> str:
+def strip_blanks(text: str) -> str:
     """Return a text without blanks at the ends of its lines, with single blank lines."""
-    page = page_of(text)
-    found: list[str] = []
-    for number, line in enumerate(page.lines):
-        kept = line if number in page.inside else line.rstrip(" \t")
-        if kept or number in page.inside or (found and found[-1]):
-            found.append(kept)
-    while found and not found[-1]:
-        found.pop()
-    return text_of(found)
+    tokenised = tokenise(text)
+    result: list[str] = []
+    for number, line in enumerate(tokenised.lines):
+        kept = line if number in tokenised.continuation_lines else line.rstrip(" \t")
+        if kept or number in tokenised.continuation_lines or (result and result[-1]):
+            result.append(kept)
+    while result and not result[-1]:
+        result.pop()
+    return join_lines(result)
 
 
-def indented(text: str) -> str:
+def indent_blocks(text: str) -> str:
     """Return a text with two blanks for each level of its blocks.
 
     What goes on over several lines moves with the line on which it starts.
     """
-    page = page_of(text)
-    moved = _moved(page)
-    found = []
-    for number, line in enumerate(page.lines):
+    tokenised = tokenise(text)
+    shifts = _line_shifts(tokenised)
+    result = []
+    for number, line in enumerate(tokenised.lines):
         bare = line.lstrip(" ")
         old = len(line) - len(bare)
-        found.append(" " * max(0, old + moved.get(number, 0)) + bare if bare else line)
-    return text_of(_with_comments(page, found))
+        result.append(" " * max(0, old + shifts.get(number, 0)) + bare if bare else line)
+    return join_lines(_restore_comments(tokenised, result))
 
 
-def _moved(page: Page) -> dict[int, int]:
+def _line_shifts(tokenised: TokenisedText) -> dict[int, int]:
     """Return by how many columns each line moves."""
-    first = page.first
-    found: dict[int, int] = {}
-    by = 0
-    for number, line in enumerate(page.lines):
+    first = tokenised.first_tokens
+    shifts: dict[int, int] = {}
+    shift = 0
+    for number, line in enumerate(tokenised.lines):
         token = first.get(number)
         is_start = token is not None and token.depth == 0 and token.kind not in CLOSING
-        if token and is_start and number not in page.inside - {token.line}:
-            by = INDENTATION * max(0, token.level - 1) - (len(line) - len(line.lstrip(" ")))
-        found[number] = by
-    for number in sorted(page.comments, reverse=True):
+        if token and is_start and number not in tokenised.continuation_lines - {token.line}:
+            shift = INDENTATION * max(0, token.level - 1) - (len(line) - len(line.lstrip(" ")))
+        shifts[number] = shift
+    for number in sorted(tokenised.comment_columns, reverse=True):
         if number not in first:
-            found[number] = _of_comment(page, number, found)
-    return found
+            shifts[number] = _comment_shift(tokenised, number, shifts)
+    return shifts
 
 
-def _of_comment(page: Page, number: int, moved: dict[int, int]) -> int:
+def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]) -> int:
     """A line that is all comment moves with the line below, or above where it is indented more."""
-    below = next((k for k in range(number + 1, len(page.lines)) if page.lines[k].strip()), None)
-    column = page.comments[number]
+    below = next(
+        (k for k in range(number + 1, len(tokenised.lines)) if tokenised.lines[k].strip()), None
+    )
+    column = tokenised.comment_columns[number]
     if below is not None:
-        line = page.lines[below]
+        line = tokenised.lines[below]
         if column <= len(line) - len(line.lstrip(" ")):
-            return moved[below]
-    return moved[number]
+            return shifts[below]
+    return shifts[number]
 
 
-def spaced(text: str) -> str:
+def space_tokens(text: str) -> str:
     """Return a text with its blanks inside brackets and behind the dashes of lists."""
-    page = page_of(text)
-    lines = list(page.lines)
-    starts = {(token.line, token.start) for token in page.tokens}
-    pairs = [pair for pair in itertools.pairwise(page.tokens) if pair[0].last == pair[1].line]
+    tokenised = tokenise(text)
+    lines = list(tokenised.lines)
+    starts = {(token.line, token.start_column) for token in tokenised.tokens}
+    pairs = [
+        pair for pair in itertools.pairwise(tokenised.tokens) if pair[0].end_line == pair[1].line
+    ]
     for left, right in reversed(pairs):
-        wanted = _between(left, right)
+        separator = _separator_of(left, right)
         line = lines[right.line]
-        if wanted is None or line[left.end : right.start].strip(" "):
+        if separator is None or line[left.end_column : right.start_column].strip(" "):
             continue
         if left.kind is yaml.FlowEntryToken and _is_in_column(left, right, starts):
             continue
-        lines[right.line] = line[: left.end] + wanted + line[right.start :]
-    return text_of(_with_comments(page, lines))
+        lines[right.line] = line[: left.end_column] + separator + line[right.start_column :]
+    return join_lines(_restore_comments(tokenised, lines))
 
 
-def _between(left: Token, right: Token) -> str | None:
+def _separator_of(left: Token, right: Token) -> str | None:
     """Return what stands between two tokens of a line; None where that is left as it is."""
     if left.kind in OPENING or right.kind in CLOSING:
         return ""
@@ -100,43 +104,47 @@ def _between(left: Token, right: Token) -> str | None:
 
 def _is_in_column(left: Token, right: Token, starts: set[tuple[int, int]]) -> bool:
     """Tell whether blanks behind a comma put a part below or above another one: a table."""
-    beside = {(right.line - 1, right.start), (right.line + 1, right.start)}
-    return right.start > left.end + 1 and not beside.isdisjoint(starts)
+    beside = {(right.line - 1, right.start_column), (right.line + 1, right.start_column)}
+    return right.start_column > left.end_column + 1 and not beside.isdisjoint(starts)
 
 
-def aligned(text: str) -> str:
+def align_values(text: str) -> str:
     """Return a text whose values are aligned where an author did so, comments behind them."""
-    page = page_of(text)
-    lines = list(page.lines)
-    for group in _groups(page):
-        column = _column(group)
+    tokenised = tokenise(text)
+    lines = list(tokenised.lines)
+    for group in _iter_entry_groups(tokenised):
+        column = _value_column(group)
         for colon, value in group:
             line = lines[colon.line]
-            blanks = max(1, column - colon.end)
-            lines[colon.line] = line[: colon.end] + " " * blanks + line[value.start :]
-    return text_of(_with_comments(page, lines))
+            blanks = max(1, column - colon.end_column)
+            lines[colon.line] = line[: colon.end_column] + " " * blanks + line[value.start_column :]
+    return join_lines(_restore_comments(tokenised, lines))
 
 
-def _column(group: list[tuple[Token, Token]]) -> int:
+def _value_column(group: list[tuple[Token, Token]]) -> int:
     """Return where aligned values start: where they do, else behind the longest key of them.
 
     Values are aligned where two of them start in one column and not for want of blanks; a key that
     reaches beyond that column is left alone.
     """
-    columns = [value.start for _, value in group]
-    spread = [value.start for colon, value in group if value.start > colon.end + 1]
+    columns = [value.start_column for _, value in group]
+    spread = [
+        value.start_column for colon, value in group if value.start_column > colon.end_column + 1
+    ]
     limit = max((column for column in spread if columns.count(column) > 1), default=0)
-    within = [(colon, value) for colon, value in group if colon.end < limit]
-    if all(value.start == limit for _, value in within):
+    within = [(colon, value) for colon, value in group if colon.end_column < limit]
+    if all(value.start_column == limit for _, value in within):
         return limit
-    return max((colon.end + 1 for colon, _ in within), default=0)
+    return max((colon.end_column + 1 for colon, _ in within), default=0)
 
 
-def _groups(page: Page) -> Iterator[list[tuple[Token, Token]]]:
+def _iter_entry_groups(tokenised: TokenisedText) -> Iterator[list[tuple[Token, Token]]]:
     """Yield the entries, as colon and value, of lines that follow each other at one level."""
     group: list[tuple[Token, Token]] = []
-    first = page.first
-    for before, colon, value in zip(page.tokens, page.tokens[1:], page.tokens[2:], strict=False):
+    first = tokenised.first_tokens
+    for before, colon, value in zip(
+        tokenised.tokens, tokenised.tokens[1:], tokenised.tokens[2:], strict=False
+    ):
         if colon.kind is not yaml.ValueToken or colon.depth or value.line != colon.line:
             continue
         if first[colon.line] is not before:
@@ -150,17 +158,17 @@ def _groups(page: Page) -> Iterator[list[tuple[Token, Token]]]:
         yield group
 
 
-def _with_comments(page: Page, lines: list[str]) -> list[str]:
+def _restore_comments(tokenised: TokenisedText, lines: list[str]) -> list[str]:
     """Return lines whose comments stand where they stood, or behind what has become longer."""
-    found = []
-    for number, (old, new) in enumerate(zip(page.lines, lines, strict=True)):
-        column = page.comments.get(number)
+    result = []
+    for number, (old, new) in enumerate(zip(tokenised.lines, lines, strict=True)):
+        column = tokenised.comment_columns.get(number)
         content = "" if column is None else old[:column].rstrip(" ")
         if column is None or not content:
-            found.append(new)
+            result.append(new)
             continue
         comment = old[column:]
         kept = new[: len(new) - len(comment)].rstrip(" ")
-        blanks = max(BEFORE_COMMENT, column - len(kept))
-        found.append(kept + " " * blanks + comment)
-    return found
+        blanks = max(COMMENT_GAP, column - len(kept))
+        result.append(kept + " " * blanks + comment)
+    return result

@@ -24,54 +24,54 @@ class Token:
 
     kind: type[yaml.Token]
     line: int
-    start: int
-    last: int
-    end: int
+    start_column: int
+    end_line: int
+    end_column: int
     depth: int
     level: int
 
 
 @dataclass(frozen=True)
-class Page:
+class TokenisedText:
     """A text as lines; `inside` are those within a value of several lines, `comments` columns."""
 
     lines: tuple[str, ...]
     tokens: tuple[Token, ...]
-    inside: frozenset[int]
-    comments: Mapping[int, int]
+    continuation_lines: frozenset[int]
+    comment_columns: Mapping[int, int]
 
     @property
-    def first(self) -> dict[int, Token]:
+    def first_tokens(self) -> dict[int, Token]:
         """The first token of each line that begins with one."""
-        found: dict[int, Token] = {}
+        tokens: dict[int, Token] = {}
         for token in self.tokens:
-            found.setdefault(token.line, token)
-        return found
+            tokens.setdefault(token.line, token)
+        return tokens
 
 
 @lru_cache(maxsize=4)
-def page_of(text: str) -> Page:
+def tokenise(text: str) -> TokenisedText:
     """Return the page of a text that is YAML."""
     lines = lines_of(text)
-    found = tuple(_tokens(text))
+    tokens = tuple(_scan_tokens(text))
     inside = frozenset(
         line
-        for token in found
-        if token.last > token.line
-        for line in range(token.line, token.last + (1 if token.end else 0))
+        for token in tokens
+        if token.end_line > token.line
+        for line in range(token.line, token.end_line + (1 if token.end_column else 0))
     )
     ends: dict[int, int] = {}
-    for token in found:
-        ends[token.last] = max(ends.get(token.last, 0), token.end)
+    for token in tokens:
+        ends[token.end_line] = max(ends.get(token.end_line, 0), token.end_column)
     comments = {
         number: column
         for number, line in enumerate(lines)
         if number not in inside and (column := line.find("#", ends.get(number, 0))) >= 0
     }
-    return Page(lines, found, inside, comments)
+    return TokenisedText(lines, tokens, inside, comments)
 
 
-def _tokens(text: str) -> Iterable[Token]:
+def _scan_tokens(text: str) -> Iterable[Token]:
     depth = level = 0
     for token in yaml.scan(text, Loader=yaml.CSafeLoader):
         start, end = token.start_mark, token.end_mark
@@ -89,6 +89,6 @@ def _tokens(text: str) -> Iterable[Token]:
             depth += 1
 
 
-def text_of(lines: Iterable[str]) -> str:
+def join_lines(lines: Iterable[str]) -> str:
     """Return lines as a text that ends with one line feed."""
     return "\n".join(lines) + "\n"

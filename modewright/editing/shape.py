@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from language.document import Items, Scalar, Table, lines_of
+from language.document import MappingNode, ScalarNode, SequenceNode, lines_of
 from language.problem import Source
 from language.tree import entries
-from language.yaml_tree import parse
+from language.yaml_tree import parse_yaml
 
-WORDS = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
+VALUE_TYPES = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
 """What a single value may be."""
 
 
@@ -23,8 +23,8 @@ WORDS = ("name", "text", "literal", "expression", "balance", "unit", "whole", "t
 class Value:
     """A single value: one of WORDS; of a name, what it names (`mode`), empty for a new name."""
 
-    word: str
-    of: str = ""
+    type: str
+    target: str = ""
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class Choice:
 class ListOf:
     """A list."""
 
-    item: Kind
+    item: ValueKind
 
 
 @dataclass(frozen=True)
 class MappingOf:
     """A mapping with free keys: new names (`named`), or names of something else, times ..."""
 
-    item: Kind
-    named: bool
+    item: ValueKind
+    has_new_names: bool
 
 
 @dataclass(frozen=True)
-class Part:
+class ShapeRef:
     """A mapping with known keys: the name of its shape."""
 
     shape: str
@@ -60,10 +60,10 @@ class Part:
 class Either:
     """One of several."""
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[ValueKind, ...]
 
 
-Kind = Value | Choice | ListOf | MappingOf | Part | Either
+ValueKind = Value | Choice | ListOf | MappingOf | ShapeRef | Either
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Key:
     """A key: what it holds and what it means."""
 
     name: str
-    kind: Kind
+    kind: ValueKind
     about: str
 
 
@@ -86,13 +86,13 @@ class Shape:
     name: str
     about: str
     keys: Mapping[str, Key]
-    needs: tuple[str, ...] = ()
-    when: tuple[tuple[str, str], ...] = ()
-    either: tuple[str, ...] = ()
-    over: tuple[str, ...] = ()
+    required: tuple[str, ...] = ()
+    discriminators: tuple[tuple[str, str], ...] = ()
+    alternatives: tuple[str, ...] = ()
+    overlay_kinds: tuple[str, ...] = ()
 
 
-EVERYWHERE = (
+COMMON_KEYS = (
     Key("about", Value("text"), "what this is, in words"),
     Key("req", Either((Value("text"), ListOf(Value("text")))), "the requirements that it meets"),
 )
@@ -107,84 +107,84 @@ def shapes() -> Mapping[str, Shape]:
     for file in sorted(folder.iterdir(), key=lambda file: file.name):
         if file.name.endswith(".yaml"):
             text = file.read_text("utf-8")
-            for entry in parse(Source(file.name, lines_of(text)), text):
-                assert isinstance(entry.node, Table)
-                found[entry.key] = _shape(entry.key, entry.node)
+            for entry in parse_yaml(Source(file.name, lines_of(text)), text):
+                assert isinstance(entry.node, MappingNode)
+                found[entry.key] = _read_shape(entry.key, entry.node)
     return found
 
 
-def _shape(name: str, body: Table) -> Shape:
-    keys = [_key(key, text) for key, text in _texts(body, "keys")]
+def _read_shape(name: str, body: MappingNode) -> Shape:
+    keys = [_parse_key(key, text) for key, text in _read_texts(body, "keys")]
     about = body.get("about")
     return Shape(
         name=name,
-        about=about.text if isinstance(about, Scalar) else "",
-        keys={key.name: key for key in (*keys, *(EVERYWHERE if keys else ()))},
-        needs=_words(body, "needs"),
-        when=tuple(_texts(body, "when")),
-        either=_words(body, "either"),
-        over=_words(body, "over"),
+        about=about.text if isinstance(about, ScalarNode) else "",
+        keys={key.name: key for key in (*keys, *(COMMON_KEYS if keys else ()))},
+        required=_read_words(body, "needs"),
+        discriminators=tuple(_read_texts(body, "when")),
+        alternatives=_read_words(body, "either"),
+        overlay_kinds=_read_words(body, "over"),
     )
 
 
-def _texts(body: Table, key: str) -> Iterator[tuple[str, str]]:
+def _read_texts(body: MappingNode, key: str) -> Iterator[tuple[str, str]]:
     for entry in entries(body.get(key)):
-        if isinstance(entry.node, Scalar):
+        if isinstance(entry.node, ScalarNode):
             yield entry.key, entry.node.text
 
 
-def _words(body: Table, key: str) -> tuple[str, ...]:
+def _read_words(body: MappingNode, key: str) -> tuple[str, ...]:
     node = body.get(key)
-    items = node.nodes if isinstance(node, Items) else ()
-    return tuple(item.text for item in items if isinstance(item, Scalar))
+    items = node.nodes if isinstance(node, SequenceNode) else ()
+    return tuple(item.text for item in items if isinstance(item, ScalarNode))
 
 
-def _key(name: str, text: str) -> Key:
+def _parse_key(name: str, text: str) -> Key:
     kind, _, about = text.partition(" -- ")
-    return Key(name, kind_of(kind), about)
+    return Key(name, parse_kind(kind), about)
 
 
-def kind_of(text: str) -> Kind:
+def parse_kind(text: str) -> ValueKind:
     """Return the kind that a text like `list of name of mode | any literal or course` says.
 
     What `or` joins are the items of a list or mapping; ` | ` joins whole alternatives.
     """
-    return _either(text.split(" | "))
+    return _parse_alternatives(text.split(" | "))
 
 
-def _either(options: list[str]) -> Kind:
-    kinds = tuple(_kind(option.split(" ")) for option in options)
+def _parse_alternatives(options: list[str]) -> ValueKind:
+    kinds = tuple(_parse_single_kind(option.split(" ")) for option in options)
     return kinds[0] if len(kinds) == 1 else Either(kinds)
 
 
-def _items(words: list[str]) -> Kind:
-    return _either(" ".join(words).split(" or "))
+def _parse_items(words: list[str]) -> ValueKind:
+    return _parse_alternatives(" ".join(words).split(" or "))
 
 
-def _kind(words: list[str]) -> Kind:
+def _parse_single_kind(words: list[str]) -> ValueKind:
     match words:
         case ["one", "of", *rest]:
             return Choice(tuple(" ".join(rest).split(", ")))
         case ["list", "of", *rest]:
-            return ListOf(_items(rest))
+            return ListOf(_parse_items(rest))
         case [("named" | "any") as first, *rest] if rest:
-            return MappingOf(_items(rest), first == "named")
+            return MappingOf(_parse_items(rest), first == "named")
         case ["name", "of", thing]:
             return Value("name", thing)
-        case [word] if word in WORDS:
+        case [word] if word in VALUE_TYPES:
             return Value(word)
         case [shape]:
-            return Part(shape)
+            return ShapeRef(shape)
     raise ValueError(f"not a kind: {' '.join(words)}")
 
 
-def kinds_in(kind: Kind) -> Iterator[Kind]:
+def alternatives_of(kind: ValueKind) -> Iterator[ValueKind]:
     """Iterate over the alternatives of a kind."""
     if isinstance(kind, Either):
         for each in kind.kinds:
-            yield from kinds_in(each)
-    elif isinstance(kind, Part) and shapes()[kind.shape].either:
-        for name in shapes()[kind.shape].either:
-            yield Part(name)
+            yield from alternatives_of(each)
+    elif isinstance(kind, ShapeRef) and shapes()[kind.shape].alternatives:
+        for name in shapes()[kind.shape].alternatives:
+            yield ShapeRef(name)
     else:
         yield kind

@@ -10,45 +10,45 @@ from typing import Any
 
 import jinja2
 
-from modewright.editing.difference import Change
+from modewright.editing.difference import SpecChange
 
-LONGEST = 72
+MAX_VALUE_LENGTH = 72
 """Characters of a value in a line of text; the page and the plain data have all of it."""
 SIGNS = {"added": "+", "removed": "-", "changed": "~"}
 
 
-def text_of(changes: Sequence[Change]) -> str:
+def diff_text(changes: Sequence[SpecChange]) -> str:
     """Return the changes as lines, by groups; empty where nothing differs."""
-    return "".join(f"{line}\n" for line in _lines(changes))
+    return "".join(f"{line}\n" for line in _diff_lines(changes))
 
 
-def _lines(changes: Sequence[Change]) -> Iterator[str]:
+def _diff_lines(changes: Sequence[SpecChange]) -> Iterator[str]:
     if changes:
-        yield summary_of(changes)
+        yield diff_summary(changes)
     for group, members in itertools.groupby(changes, lambda change: change.group):
         together = list(members)
         yield ""
         yield group
-        width = max(len(_title(change)) for change in together)
+        width = max(len(_change_title(change)) for change in together)
         for change in together:
-            yield f"  {SIGNS[change.kind]} {_title(change):{width}}  {_values(change)}".rstrip()
+            yield f"  {SIGNS[change.kind]} {_change_title(change):{width}}  {_change_values(change)}".rstrip()
 
 
-def _title(change: Change) -> str:
+def _change_title(change: SpecChange) -> str:
     return f"{change.thing}: {change.aspect}" if change.aspect else change.thing
 
 
-def _values(change: Change) -> str:
-    values = [_short(text) for text in (change.before, change.after) if text]
+def _change_values(change: SpecChange) -> str:
+    values = [_shorten(text) for text in (change.before, change.after) if text]
     note = f"  ({change.note})" if change.note else ""
     return " -> ".join(values) + note
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+def _shorten(text: str) -> str:
+    return text if len(text) <= MAX_VALUE_LENGTH else text[: MAX_VALUE_LENGTH - 3] + "..."
 
 
-def summary_of(changes: Sequence[Change]) -> str:
+def diff_summary(changes: Sequence[SpecChange]) -> str:
     """Return how many things of each group differ, in one line."""
     things: dict[str, set[str]] = {}
     for change in changes:
@@ -56,12 +56,12 @@ def summary_of(changes: Sequence[Change]) -> str:
     return "differs: " + ", ".join(f"{group} {len(named)}" for group, named in things.items())
 
 
-def json_of(changes: Sequence[Change]) -> dict[str, Any]:
+def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
     """Return the changes as plain data."""
     return {"changes": [dataclasses.asdict(change) for change in changes]}
 
 
-def page_of(changes: Sequence[Change], before: str, after: str) -> str:
+def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
     """Return the changes as one HTML page that needs no other file."""
     folder = resources.files("modewright.editing").joinpath("templates")
     environment = jinja2.Environment(
@@ -77,5 +77,5 @@ def page_of(changes: Sequence[Change], before: str, after: str) -> str:
         after=after,
         groups=groups,
         signs=SIGNS,
-        summary=summary_of(changes) if changes else "nothing differs",
+        summary=diff_summary(changes) if changes else "nothing differs",
     )

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.document import Scalar, Table
-from language.tree import at
+from language.document import MappingNode, ScalarNode
+from language.tree import find_node
 
-Path = tuple[str, ...]
+KeyPath = tuple[str, ...]
 
-TEXTS = "texts"
+TEXT_GROUP = "texts"
 """The group of what has no influence."""
 SUBSECTIONS = (
     *("transitions", "equations", "flow", "terms", "entry", "exit", "update", "invariant"),
     *("modes", "regions", "observer", "runs"),
 )
 """Keys of a mode that are told on their own."""
-MODE_SECTIONS = {
+MODE_SECTION_GROUPS = {
     "equations": "equations",
     "flow": "flow",
     "terms": "terms",
@@ -26,9 +26,9 @@ MODE_SECTIONS = {
     "invariant": "invariants",
 }
 """The groups of what is named inside a mode."""
-ASPECTS = {"when": "guard", "to": "target"}
+ASPECT_NAMES = {"when": "guard", "to": "target"}
 """Words for keys, where the field has another one."""
-SECTIONS = (
+NAMED_SECTIONS = (
     *("parameters", "inputs", "states", "discrete", "equations", "flow", "terms", "faults"),
     *("events", "tables", "elements", "places", "instances", "sensors", "connections", "outputs"),
     *("initial", "columns", "constants", "measures", "plots", "vary", "set", "variants", "pages"),
@@ -38,7 +38,7 @@ SECTIONS = (
 
 
 @dataclass(frozen=True)
-class Thing:
+class Subject:
     """What a path is about, and in which respect; the respect of the thing itself is empty."""
 
     group: str
@@ -46,42 +46,42 @@ class Thing:
     aspect: str
 
 
-def thing_of(path: Path, root: Table) -> Thing | None:
+def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
     """Return the thing of a path; None for a section, which is none itself."""
-    thing = _thing(path, root)
-    if thing and path[-1] in ("about", "req"):
-        return Thing(TEXTS, thing.title, thing.aspect)
-    return thing
+    subject = _find_subject(path, root)
+    if subject and path[-1] in ("about", "req"):
+        return Subject(TEXT_GROUP, subject.title, subject.aspect)
+    return subject
 
 
-def is_section(path: Path) -> bool:
+def is_section(path: KeyPath) -> bool:
     """Tell whether what a path leads to holds named things: at the root, or in a mode or region."""
-    return len(_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
+    return len(_split_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
 
 
-def _thing(path: Path, root: Table) -> Thing | None:
-    mode, rest = _mode(path)
+def _find_subject(path: KeyPath, root: MappingNode) -> Subject | None:
+    mode, rest = _split_mode(path)
     if not mode:
-        return _of_section(rest, root)
+        return _section_subject(rest, root)
     if not rest:
-        return Thing("modes", mode, "") if path[-2] == "modes" else None
+        return Subject("modes", mode, "") if path[-2] == "modes" else None
     section, *inner = rest
     if section == "transitions":
-        return _transition(mode, path, inner, root)
-    if section in MODE_SECTIONS:
+        return _transition_subject(mode, path, inner, root)
+    if section in MODE_SECTION_GROUPS:
         if not inner:
             return None
-        kind = section if MODE_SECTIONS[section] == "actions" else ""
+        kind = section if MODE_SECTION_GROUPS[section] == "actions" else ""
         aspect = " ".join((*([kind] if kind else []), *inner[1:]))
-        return Thing(MODE_SECTIONS[section], f"{inner[0]} in {mode}", aspect)
+        return Subject(MODE_SECTION_GROUPS[section], f"{inner[0]} in {mode}", aspect)
     if section in ("observer", "runs"):
-        return Thing("observers and runs", mode, ".".join(rest))
+        return Subject("observers and runs", mode, ".".join(rest))
     if section in ("modes", "regions"):
         return None
-    return Thing("modes", mode, ".".join(rest))
+    return Subject("modes", mode, ".".join(rest))
 
 
-def _mode(path: Path) -> tuple[str, Path]:
+def _split_mode(path: KeyPath) -> tuple[str, KeyPath]:
     """Return the mode that a path goes through, dotted, and the rest of the path."""
     found: list[str] = []
     k = 0
@@ -91,24 +91,26 @@ def _mode(path: Path) -> tuple[str, Path]:
     return ".".join(found), path[k:]
 
 
-def _of_section(path: Path, root: Table) -> Thing | None:
+def _section_subject(path: KeyPath, root: MappingNode) -> Subject | None:
     section, *rest = path
     node = root.get(section)
     if section in ("modes", "regions"):
         return None
-    if isinstance(node, Table) and section in SECTIONS:
+    if isinstance(node, MappingNode) and section in NAMED_SECTIONS:
         if not rest:
             return None
-        return Thing(section, rest[0], ".".join(ASPECTS.get(key, key) for key in rest[1:]))
-    return Thing("settings", section, ".".join(rest))
+        return Subject(section, rest[0], ".".join(ASPECT_NAMES.get(key, key) for key in rest[1:]))
+    return Subject("settings", section, ".".join(rest))
 
 
-def _transition(mode: str, path: Path, inner: list[str], root: Table) -> Thing | None:
+def _transition_subject(
+    mode: str, path: KeyPath, inner: list[str], root: MappingNode
+) -> Subject | None:
     if not inner:
         return None
     name, *aspect = inner
-    node = at(root, path[: len(path) - len(aspect)])
-    to = node.get("to") if isinstance(node, Table) else None
-    target = to.text if isinstance(to, Scalar) else name
+    node = find_node(root, path[: len(path) - len(aspect)])
+    to = node.get("to") if isinstance(node, MappingNode) else None
+    target = to.text if isinstance(to, ScalarNode) else name
     title = f"{mode} -> {target}" if target == name else f"{mode} -> {target} ({name})"
-    return Thing("transitions", title, ".".join(ASPECTS.get(key, key) for key in aspect))
+    return Subject("transitions", title, ".".join(ASPECT_NAMES.get(key, key) for key in aspect))

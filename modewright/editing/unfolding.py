@@ -2,46 +2,46 @@
 
 from __future__ import annotations
 
-from language.document import Entry, Node, Scalar, Table
-from language.overlay import lay, without
+from language.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.overlay import apply_overlay, without_keys
 from language.problem import Problems
 
 
-def unfolded(root: Table) -> Table:
+def expand_templates(root: MappingNode) -> MappingNode:
     """Return the tree of a spec in which no mode is `like` a template any more."""
     templates = root.get("templates")
-    known = templates if isinstance(templates, Table) else Table({}, root.span)
-    made = _below(without(root, "templates"), known)
-    return made if isinstance(made, Table) else root
+    known = templates if isinstance(templates, MappingNode) else MappingNode({}, root.span)
+    made = _expand_node(without_keys(root, "templates"), known)
+    return made if isinstance(made, MappingNode) else root
 
 
-def _below(node: Node, templates: Table) -> Node:
-    if not isinstance(node, Table):
+def _expand_node(node: YamlNode, templates: MappingNode) -> YamlNode:
+    if not isinstance(node, MappingNode):
         return node
     found = {}
     for entry in node:
         below = entry.node
-        if entry.key == "modes" and isinstance(below, Table):
-            modes = {e.key: Entry(e.key, e.span, _mode(e.node, templates)) for e in below}
-            below = Table(modes, below.span)
+        if entry.key == "modes" and isinstance(below, MappingNode):
+            modes = {e.key: Entry(e.key, e.span, _expand_mode(e.node, templates)) for e in below}
+            below = MappingNode(modes, below.span)
         elif entry.key == "regions":
-            below = _regions(below, templates)
+            below = _expand_regions(below, templates)
         found[entry.key] = Entry(entry.key, entry.span, below)
-    return Table(found, node.span)
+    return MappingNode(found, node.span)
 
 
-def _regions(node: Node, templates: Table) -> Node:
-    if not isinstance(node, Table):
+def _expand_regions(node: YamlNode, templates: MappingNode) -> YamlNode:
+    if not isinstance(node, MappingNode):
         return node
-    regions = {e.key: Entry(e.key, e.span, _below(e.node, templates)) for e in node}
-    return Table(regions, node.span)
+    regions = {e.key: Entry(e.key, e.span, _expand_node(e.node, templates)) for e in node}
+    return MappingNode(regions, node.span)
 
 
-def _mode(node: Node, templates: Table) -> Node:
-    if not isinstance(node, Table):
+def _expand_mode(node: YamlNode, templates: MappingNode) -> YamlNode:
+    if not isinstance(node, MappingNode):
         return node
     like = node.get("like")
-    template = templates.get(like.text) if isinstance(like, Scalar) else None
-    if isinstance(template, Table):
-        node = lay(template, without(node, "like"), Problems(), template=True)
-    return _below(node, templates)
+    template = templates.get(like.text) if isinstance(like, ScalarNode) else None
+    if isinstance(template, MappingNode):
+        node = apply_overlay(template, without_keys(node, "like"), Problems(), template=True)
+    return _expand_node(node, templates)

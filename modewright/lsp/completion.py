@@ -8,28 +8,36 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.document import Document, Items, Node, Scalar, Table
-from language.finding import KINDS, document_of, source_of
-from language.function import KNOWN
+from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.finding import DOCUMENT_KINDS, parse_document, source_of
+from language.function import FUNCTION_NAMES
 from language.problem import SpecError
 from language.symbols import SYMBOLS
 from modewright.editing.guide import Place, kind_of_file, places, root_shape
-from modewright.editing.shape import Choice, Kind, MappingOf, Part, Value, kinds_in, shapes
-from modewright.lsp.asked import asked
-from modewright.lsp.namespace import Declared, Namespace, namespace_of
-from modewright.lsp.positions import column_of, units_of
-from modewright.lsp.world import World
+from modewright.editing.shape import (
+    Choice,
+    MappingOf,
+    ShapeRef,
+    Value,
+    ValueKind,
+    alternatives_of,
+    shapes,
+)
+from modewright.lsp.asked import expected_symbols
+from modewright.lsp.namespace import Symbol, SymbolTable, build_symbol_table
+from modewright.lsp.positions import column_of, encoded_column
+from modewright.lsp.world import Workspace
 
-MARK = "zzCURSORzz"
+CURSOR_MARK = "zzCURSORzz"
 """Stands in the text for what is being written; no name of a spec looks like it."""
-OPENED = {"{": "}", "[": "]"}
-COMBINED = (
+CLOSING_OF = {"{": "}", "[": "]"}
+COMPOUND_UNITS = (
     *("N*m", "rad/s", "rad/s^2", "kg*m^2", "N*m/rad", "N*m*s/rad", "m/s", "m/s^2", "km/h"),
     *("N/m", "N*s/m", "1/s", "rad^2/s"),
 )
 """Combined units that are often needed; others are put together from symbols."""
-WRITABLE = ("state", "discrete variable")
-GROUPS = {
+WRITABLE_KINDS = ("state", "discrete variable")
+NAME_GROUPS = {
     "mode": ("mode",),
     "template": ("template",),
     "fault": ("fault",),
@@ -41,63 +49,69 @@ SPEC_KINDS = {
     "scenario": ("scenario", "variant"),
     "map": ("map", "variant"),
     "calibration": ("calibration",),
-    "spec": KINDS,
+    "spec": DOCUMENT_KINDS,
 }
 Item = types.CompletionItem
 K = types.CompletionItemKind
 
 
-def complete(world: World, path: Path, text: str, position: types.Position) -> list[Item]:
+def complete(workspace: Workspace, path: Path, text: str, position: types.Position) -> list[Item]:
     """Return what may be written at a position, whatever stands before it of the word."""
-    found = _marked(path, text, position, world.encoding)
-    if found is None:
-        return _heads()
-    document, before = found
-    space = namespace_of(world, path, document)
-    marked = _place(document)
-    if marked is None:
-        return _heads()
-    place, is_key = marked
-    found_here = _keys(space, place) if is_key else _at(world, space, place, before)
-    items = {item.label: item for item in found_here if MARK not in item.label}
-    dotted = _dotted(text, position, world.encoding)
-    return [_instead(item, dotted) if dotted else item for item in items.values()]
+    marked_document = _insert_mark(path, text, position, workspace.encoding)
+    if marked_document is None:
+        return _root_items()
+    document, before = marked_document
+    symbols = build_symbol_table(workspace, path, document)
+    marked_place = _marked_place(document)
+    if marked_place is None:
+        return _root_items()
+    place, is_key = marked_place
+    candidates = (
+        _key_items(symbols, place) if is_key else _value_items(workspace, symbols, place, before)
+    )
+    items = {item.label: item for item in candidates if CURSOR_MARK not in item.label}
+    dotted_range = _dotted_name_range(text, position, workspace.encoding)
+    return [_replace_range(item, dotted_range) if dotted_range else item for item in items.values()]
 
 
-def _at(world: World, space: Namespace, place: Place, before: str) -> Iterator[Item]:
+def _value_items(
+    workspace: Workspace, symbols: SymbolTable, place: Place, before: str
+) -> Iterator[Item]:
     """What a value may be: what alone fits, where one thing is asked for, else all it may read."""
-    alone = None if _is_after_number(before) else asked(space, place, before)
-    if alone is not None:
-        for name, each in alone:
+    expected = None if _is_after_number(before) else expected_symbols(symbols, place, before)
+    if expected is not None:
+        for name, each in expected:
             is_word = each.group == "value" and not name.endswith(each.name)
             word = Item(name, kind=K.EnumMember, detail=f"word of {each.name}")
-            yield word if is_word else _item(each, name)
+            yield word if is_word else _symbol_item(each, name)
         return
-    for kind in kinds_in(place.kind):
-        yield from _values(world, space, kind, before)
+    for kind in alternatives_of(place.kind):
+        yield from _kind_items(workspace, symbols, kind, before)
 
 
-def _dotted(text: str, position: types.Position, encoding: str) -> types.Range | None:
+def _dotted_name_range(text: str, position: types.Position, encoding: str) -> types.Range | None:
     """Return the place of a dotted name that is being written: editors see its last part alone."""
-    at, line, start, column = _word(text, position, encoding)
+    at, line, start, column = _word_at(text, position, encoding)
     if "." not in line[start:column]:
         return None
-    ends = (units_of(line, count, encoding) for count in (start, column))
+    ends = (encoded_column(line, count, encoding) for count in (start, column))
     return types.Range(*(types.Position(at, end) for end in ends))
 
 
-def _instead(item: Item, place: types.Range) -> Item:
+def _replace_range(item: Item, place: types.Range) -> Item:
     """Return an item that takes a place as a whole."""
     item.text_edit = types.TextEdit(place, item.insert_text or item.label)
     return item
 
 
-def _heads() -> list[Item]:
-    heads = [Item(kind, kind=K.Class, documentation=shapes()[kind].about) for kind in KINDS]
+def _root_items() -> list[Item]:
+    heads = [
+        Item(kind, kind=K.Class, documentation=shapes()[kind].about) for kind in DOCUMENT_KINDS
+    ]
     return [Item("language", kind=K.Keyword, insert_text="language: 1"), *heads]
 
 
-def _marked(
+def _insert_mark(
     path: Path, text: str, position: types.Position, encoding: str
 ) -> tuple[Document, str] | None:
     """Return the document with a mark in place of the word at a position, and what is before it.
@@ -105,21 +119,21 @@ def _marked(
     What is being written is seldom YAML: a colon, or the ends of brackets, may be missing.
     """
     lines = [*(text.splitlines() or [""]), ""]
-    at, line, start, column = _word(text, position, encoding)
+    at, line, start, column = _word_at(text, position, encoding)
     end = column + len(re.match(r"\w*", line[column:]).group())  # type: ignore[union-attr]
     before, after = line[:start], line[end:]
-    closing = _closing(before)
+    closing = _closing_brackets(before)
     for tail in (after, f": {after}", closing, f": {closing}"):
-        lines[at] = f"{before}{MARK}{tail}"
-        whole = "\n".join(lines) + "\n"
+        lines[at] = f"{before}{CURSOR_MARK}{tail}"
+        marked_text = "\n".join(lines) + "\n"
         try:
-            return document_of(source_of(path, whole), whole), before
+            return parse_document(source_of(path, marked_text), marked_text), before
         except SpecError:
             continue
     return None
 
 
-def _word(text: str, position: types.Position, encoding: str) -> tuple[int, str, int, int]:
+def _word_at(text: str, position: types.Position, encoding: str) -> tuple[int, str, int, int]:
     """Return the number of a line, its text, and from where to where a word is written there."""
     lines = [*(text.splitlines() or [""]), ""]
     at = min(position.line, len(lines) - 1)
@@ -129,7 +143,7 @@ def _word(text: str, position: types.Position, encoding: str) -> tuple[int, str,
     return at, lines[at], column - len(written.group()), column
 
 
-def _closing(text: str) -> str:
+def _closing_brackets(text: str) -> str:
     """Return the brackets that end what is open at the end of a line."""
     opened: list[str] = []
     quote = ""
@@ -138,152 +152,160 @@ def _closing(text: str) -> str:
             quote = "" if character == quote else quote
         elif character in "\"'":
             quote = character
-        elif character in OPENED:
-            opened.append(OPENED[character])
+        elif character in CLOSING_OF:
+            opened.append(CLOSING_OF[character])
         elif opened and character == opened[-1]:
             opened.pop()
     return quote + "".join(reversed(opened))
 
 
-def _place(document: Document) -> tuple[Place, bool] | None:
+def _marked_place(document: Document) -> tuple[Place, bool] | None:
     """Return the place of the mark, and whether it stands for a key of that place."""
     for place in places(document.root):
         match place.node, place.kind:
-            case Table() as node, _ if any(MARK in key for key in node.entries):
+            case MappingNode() as node, _ if any(CURSOR_MARK in key for key in node.entries):
                 return place, True
-            case Scalar(text), (Part() | MappingOf()) if MARK in text:
+            case ScalarNode(text), (ShapeRef() | MappingOf()) if CURSOR_MARK in text:
                 return place, True
-            case Scalar(text), _ if MARK in text:
+            case ScalarNode(text), _ if CURSOR_MARK in text:
                 return place, False
-            case Items() as items, _ if _holds_mark(items) and not isinstance(place.kind, Part):
+            case SequenceNode() as items, _ if _holds_mark(items) and not isinstance(
+                place.kind, ShapeRef
+            ):
                 continue
     return None
 
 
-def _holds_mark(items: Items) -> bool:
-    return any(isinstance(node, Scalar) and MARK in node.text for node in items.nodes)
+def _holds_mark(items: SequenceNode) -> bool:
+    return any(isinstance(node, ScalarNode) and CURSOR_MARK in node.text for node in items.nodes)
 
 
-def _keys(space: Namespace, place: Place) -> Iterator[Item]:
-    present: set[str] = set(place.node.entries) if isinstance(place.node, Table) else set()
-    for kind in kinds_in(place.kind):
-        if isinstance(kind, Part):
+def _key_items(symbols: SymbolTable, place: Place) -> Iterator[Item]:
+    present: set[str] = set(place.node.entries) if isinstance(place.node, MappingNode) else set()
+    for kind in alternatives_of(place.kind):
+        if isinstance(kind, ShapeRef):
             shape = shapes()[kind.shape]
-            if not place.path and isinstance(place.node, Table):
+            if not place.path and isinstance(place.node, MappingNode):
                 shape = root_shape(kind_of_file(place.node)) or shape
             for key in shape.keys.values():
                 if key.name not in present:
                     yield Item(
                         key.name,
                         kind=K.Property,
-                        detail=_said(key.kind),
+                        detail=_describe_kind(key.kind),
                         documentation=key.about,
                         insert_text=f"{key.name}: ",
                     )
         elif isinstance(kind, MappingOf):
-            yield from _named(space, place, present)
+            yield from _free_key_items(symbols, place, present)
 
 
-def _named(space: Namespace, place: Place, present: set[str]) -> Iterator[Item]:
+def _free_key_items(symbols: SymbolTable, place: Place, present: set[str]) -> Iterator[Item]:
     """What the keys of a mapping may be: targets, balanced states, what is written."""
     section = place.section
     if section == "transitions":
-        found = [_item(each, each.name.rpartition(".")[2]) for each in space.group("mode")]
+        items = [
+            _symbol_item(each, each.name.rpartition(".")[2]) for each in symbols.in_groups("mode")
+        ]
     elif section in ("reset", "entry", "exit", "update", "flow"):
-        wanted = WRITABLE if section != "flow" else ("state",)
-        found = [_item(each) for each in space.group("value") if each.kind in wanted]
+        kinds = WRITABLE_KINDS if section != "flow" else ("state",)
+        items = [_symbol_item(each) for each in symbols.in_groups("value") if each.kind in kinds]
     elif section == "connections":
-        found = list(_of_instances(space, ("input",)))
+        items = list(_instance_items(symbols, ("input",)))
     elif section in ("initial", "vary", "set", "values", "parameters", "inputs", "pages"):
-        found = list(_scope(_inside(space, place)))
+        items = list(_expression_items(_instance_symbols(symbols, place)))
     else:
-        found = []
-    yield from (item for item in found if item.label not in present)
+        items = []
+    yield from (item for item in items if item.label not in present)
 
 
-def _inside(space: Namespace, place: Place) -> Namespace:
+def _instance_symbols(symbols: SymbolTable, place: Place) -> SymbolTable:
     if place.section == "values" and len(place.path) > 1:
-        return space.instances.get(place.path[-2], space)
-    return space
+        return symbols.instances.get(place.path[-2], symbols)
+    return symbols
 
 
-def _values(world: World, space: Namespace, kind: Kind, before: str) -> Iterator[Item]:
+def _kind_items(
+    workspace: Workspace, symbols: SymbolTable, kind: ValueKind, before: str
+) -> Iterator[Item]:
     match kind:
         case Choice(words):
             yield from (Item(word, kind=K.EnumMember) for word in words)
         case Value("truth"):
             yield from (Item(word, kind=K.Keyword) for word in ("true", "false"))
         case Value("unit"):
-            yield from _units()
+            yield from _unit_items()
         case Value("name", of) if of in SPEC_KINDS:
-            yield from _specs(world, SPEC_KINDS[of])
-        case Value("name", "model_mode") if space.model:
-            model = space.model
-            for each in model.group("mode"):
-                yield _item(each, f"{model.document.name}.{each.name}")
-        case Value("name", of) if of in GROUPS:
-            yield from (_item(each, each.name) for each in space.group(*GROUPS[of]))
+            yield from _spec_items(workspace, SPEC_KINDS[of])
+        case Value("name", "model_mode") if symbols.model:
+            model = symbols.model
+            for each in model.in_groups("mode"):
+                yield _symbol_item(each, f"{model.document.name}.{each.name}")
+        case Value("name", of) if of in NAME_GROUPS:
+            yield from (
+                _symbol_item(each, each.name) for each in symbols.in_groups(*NAME_GROUPS[of])
+            )
         case Value(("expression" | "balance" | "literal" | "name"), _):
             if _is_after_number(before):
-                yield from _units()
+                yield from _unit_items()
                 return
-            yield from _scope(space)
+            yield from _expression_items(symbols)
             if kind != Value("literal"):
-                yield from (Item(f, kind=K.Function, insert_text=f"{f}(") for f in KNOWN)
+                yield from (Item(f, kind=K.Function, insert_text=f"{f}(") for f in FUNCTION_NAMES)
 
 
 def _is_after_number(before: str) -> bool:
     return re.search(r"(^|[^\w.])\d[\d.]*(e[-+]?\d+)? $", before) is not None
 
 
-def _scope(space: Namespace) -> Iterator[Item]:
+def _expression_items(symbols: SymbolTable) -> Iterator[Item]:
     """What an expression may read."""
-    yield from (_item(each) for each in space.group("value"))
-    yield from _of_instances(space, ())
+    yield from (_symbol_item(each) for each in symbols.in_groups("value"))
+    yield from _instance_items(symbols, ())
 
 
-def _of_instances(space: Namespace, kinds: tuple[str, ...]) -> Iterator[Item]:
-    for name, inner in space.instances.items():
-        for each in inner.group("value"):
+def _instance_items(symbols: SymbolTable, kinds: tuple[str, ...]) -> Iterator[Item]:
+    for name, inner in symbols.instances.items():
+        for each in inner.in_groups("value"):
             if not kinds or each.kind in kinds:
-                yield _item(each, f"{name}.{each.name}")
+                yield _symbol_item(each, f"{name}.{each.name}")
 
 
-def _item(declared: Declared, label: str = "") -> Item:
-    node = declared.node
-    unit: Node | None = node.get("unit") if isinstance(node, Table) else None
-    detail = f"{declared.kind} [{unit.text}]" if isinstance(unit, Scalar) else declared.kind
-    about = node.get("about") if isinstance(node, Table) else None
-    text = about.text if isinstance(about, Scalar) else None
-    kind = K.Variable if declared.group == "value" else K.Class
-    return Item(label or declared.name, kind=kind, detail=detail, documentation=text)
+def _symbol_item(symbol: Symbol, label: str = "") -> Item:
+    node = symbol.node
+    unit: YamlNode | None = node.get("unit") if isinstance(node, MappingNode) else None
+    detail = f"{symbol.kind} [{unit.text}]" if isinstance(unit, ScalarNode) else symbol.kind
+    about = node.get("about") if isinstance(node, MappingNode) else None
+    text = about.text if isinstance(about, ScalarNode) else None
+    kind = K.Variable if symbol.group == "value" else K.Class
+    return Item(label or symbol.name, kind=kind, detail=detail, documentation=text)
 
 
-def _units() -> Iterator[Item]:
-    return (Item(unit, kind=K.Unit) for unit in dict.fromkeys((*COMBINED, *SYMBOLS)))
+def _unit_items() -> Iterator[Item]:
+    return (Item(unit, kind=K.Unit) for unit in dict.fromkeys((*COMPOUND_UNITS, *SYMBOLS)))
 
 
-def _specs(world: World, kinds: tuple[str, ...]) -> Iterator[Item]:
-    project = world.project()
+def _spec_items(workspace: Workspace, kinds: tuple[str, ...]) -> Iterator[Item]:
+    project = workspace.project()
     for name, files in sorted(project.index.items()):
-        document = world.document(files[0])
+        document = workspace.document(files[0])
         if document and document.kind in kinds and document.kind != "effect":
             yield Item(name, kind=K.File, detail=document.kind)
 
 
-def _said(kind: Kind) -> str:
+def _describe_kind(kind: ValueKind) -> str:
     """Return what a key holds, in a few words."""
-    told = []
-    for each in kinds_in(kind):
+    texts = []
+    for each in alternatives_of(kind):
         match each:
             case Value(word, of):
-                told.append(of or word)
+                texts.append(of or word)
             case Choice(words):
-                told.append(" | ".join(words))
-            case Part(shape):
-                told.append(shape.replace("_", " "))
+                texts.append(" | ".join(words))
+            case ShapeRef(shape):
+                texts.append(shape.replace("_", " "))
             case MappingOf():
-                told.append("mapping")
+                texts.append("mapping")
             case _:
-                told.append("list")
-    return " or ".join(told)
+                texts.append("list")
+    return " or ".join(texts)

@@ -6,111 +6,119 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.constants import exact_value
-from language.document import Document, Entry, Scalar, Table
+from language.constants import evaluate_exactly
+from language.document import Document, Entry, MappingNode, ScalarNode
 from language.load import load_automaton
 from language.problem import Span, SpecError
-from language.project import shown
+from language.project import display_path
 from language.tree import entries
 from modewright.editing.guide import places
-from modewright.editing.shape import Key, Part, shapes
-from modewright.lsp.mention import Mention, mentions, mentions_of
-from modewright.lsp.namespace import Declared
-from modewright.lsp.positions import holds, range_of
-from modewright.lsp.world import World
+from modewright.editing.shape import Key, ShapeRef, shapes
+from modewright.lsp.mention import Reference, find_references, references_to
+from modewright.lsp.namespace import Symbol
+from modewright.lsp.positions import contains_position, range_of
+from modewright.lsp.world import Workspace
 
-SHOWN = ("unit", "value", "derived", "default", "initial", "range", "tunable", "type", "of")
+SHOWN_KEYS = ("unit", "value", "derived", "default", "initial", "range", "tunable", "type", "of")
 """Keys of a declaration that tell what it is, in this order."""
-MOST_READERS = 12
+MAX_READERS = 12
 
 
-def mention_at(world: World, path: Path, position: types.Position) -> Mention | None:
+def reference_at(workspace: Workspace, path: Path, position: types.Position) -> Reference | None:
     """Return what is named at a position; of parts that touch there the last one."""
-    found = [each for each in mentions(world, path) if holds(each.span, position, world.encoding)]
+    found = [
+        each
+        for each in find_references(workspace, path)
+        if contains_position(each.span, position, workspace.encoding)
+    ]
     return found[-1] if found else None
 
 
-def hover(world: World, path: Path, position: types.Position) -> types.Hover | None:
+def hover(workspace: Workspace, path: Path, position: types.Position) -> types.Hover | None:
     """Return what is told of the name or key at a position."""
-    mention = mention_at(world, path, position)
-    if mention:
-        return _told(world, _of_name(world, mention.declared), mention.span)
-    document = world.document(path)
-    found = _key_at(document, position, world.encoding) if document else None
+    reference = reference_at(workspace, path, position)
+    if reference:
+        return _make_hover(workspace, _describe_symbol(workspace, reference.symbol), reference.span)
+    document = workspace.document(path)
+    found = _key_at(document, position, workspace.encoding) if document else None
     if found is None:
         return None
     entry, key = found
-    return _told(world, f"`{key.name}` - {key.about}", entry.span)
+    return _make_hover(workspace, f"`{key.name}` - {key.about}", entry.span)
 
 
-def _told(world: World, text: str, span: Span) -> types.Hover:
+def _make_hover(workspace: Workspace, text: str, span: Span) -> types.Hover:
     content = types.MarkupContent(types.MarkupKind.Markdown, text)
-    return types.Hover(content, range_of(span, world.encoding))
+    return types.Hover(content, range_of(span, workspace.encoding))
 
 
 def _key_at(
     document: Document, position: types.Position, encoding: str
 ) -> tuple[Entry, Key] | None:
     for place in places(document.root):
-        if isinstance(place.node, Table) and isinstance(place.kind, Part):
+        if isinstance(place.node, MappingNode) and isinstance(place.kind, ShapeRef):
             for entry in place.node:
                 keys = shapes()[place.kind.shape].keys
-                if entry.key in keys and holds(entry.span, position, encoding):
+                if entry.key in keys and contains_position(entry.span, position, encoding):
                     return entry, keys[entry.key]
     return None
 
 
-def _of_name(world: World, declared: Declared) -> str:
-    lines = [f"**{declared.name}** - {declared.kind}, {_place(declared)}", ""]
-    node = declared.node.root if isinstance(declared.node, Document) else declared.node
-    about = node.get("about") if isinstance(node, Table) else None
-    if isinstance(about, Scalar):
+def _describe_symbol(workspace: Workspace, symbol: Symbol) -> str:
+    lines = [f"**{symbol.name}** - {symbol.kind}, {_format_place(symbol)}", ""]
+    node = symbol.node.root if isinstance(symbol.node, Document) else symbol.node
+    about = node.get("about") if isinstance(node, MappingNode) else None
+    if isinstance(about, ScalarNode):
         lines += [about.text, ""]
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         lines.append(f"- `{node.text}`")
-    for entry in entries(node if isinstance(node, Table) else None):
-        if entry.key in SHOWN:
-            lines.append(f"- {entry.key}: `{_text(entry)}`")
-    if isinstance(node, Table) and declared.kind == "parameter" and "derived" in node.entries:
-        lines += _computed(world, declared)
-    readers = [each for each in mentions_of(world, declared) if not each.is_declaration]
+    for entry in entries(node if isinstance(node, MappingNode) else None):
+        if entry.key in SHOWN_KEYS:
+            lines.append(f"- {entry.key}: `{_entry_text(entry)}`")
+    if isinstance(node, MappingNode) and symbol.kind == "parameter" and "derived" in node.entries:
+        lines += _derived_value_lines(workspace, symbol)
+    readers = [each for each in references_to(workspace, symbol) if not each.is_declaration]
     if readers:
-        lines += ["", "read by " + ", ".join(_readers(readers))]
+        lines += ["", "read by " + ", ".join(_reader_names(readers))]
     return "\n".join(lines)
 
 
-def _place(declared: Declared) -> str:
-    return f"{shown(declared.file)}:{declared.span.line}"
+def _format_place(symbol: Symbol) -> str:
+    return f"{display_path(symbol.file)}:{symbol.span.line}"
 
 
-def _text(entry: Entry) -> str:
+def _entry_text(entry: Entry) -> str:
     """Return what is written behind a key, on one line."""
     span = entry.node.span
-    if isinstance(entry.node, Scalar):
+    if isinstance(entry.node, ScalarNode):
         return entry.node.text
     lines = span.source.lines
     return lines[span.line - 1][span.column - 1 : span.column - 1 + span.width]
 
 
-def _computed(world: World, declared: Declared) -> list[str]:
+def _derived_value_lines(workspace: Workspace, symbol: Symbol) -> list[str]:
     """The value of a derived parameter, where its automaton can be read."""
     try:
-        automaton = load_automaton(str(declared.file), world.project())
-        formula = automaton.parameters[declared.name].derived
+        automaton = load_automaton(str(symbol.file), workspace.project())
+        formula = automaton.parameters[symbol.name].derived
         if formula is None:
             return []
-        value = float(exact_value(formula, automaton))
+        value = float(evaluate_exactly(formula, automaton))
     except (SpecError, KeyError):
         return []
     return [f"- value: `{value:.6g}` in SI"]
 
 
-def _readers(readers: list[Mention]) -> list[str]:
-    paths = dict.fromkeys(f"`{_owner(each)}{'.'.join(each.path)}`" for each in readers)
-    told = list(paths)[:MOST_READERS]
-    return told if len(paths) <= MOST_READERS else [*told, f"{len(paths) - MOST_READERS} more"]
+def _reader_names(readers: list[Reference]) -> list[str]:
+    paths = dict.fromkeys(f"`{_file_prefix(each)}{'.'.join(each.path)}`" for each in readers)
+    shown_names = list(paths)[:MAX_READERS]
+    return (
+        shown_names
+        if len(paths) <= MAX_READERS
+        else [*shown_names, f"{len(paths) - MAX_READERS} more"]
+    )
 
 
-def _owner(mention: Mention) -> str:
+def _file_prefix(reference: Reference) -> str:
     """The name of the file, where it is another one than that of the declaration."""
-    return "" if mention.is_here else f"{Path(mention.span.source.name).stem} "
+    return "" if reference.is_in_declaring_file else f"{Path(reference.span.source.name).stem} "

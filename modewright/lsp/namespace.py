@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.document import Document, Entry, Scalar, Table
+from language.document import Document, Entry, MappingNode, ScalarNode
 from language.model import CHART
 from language.problem import Span
 from language.tree import entries
 from modewright.editing.guide import places
 from modewright.editing.shape import MappingOf
-from modewright.lsp.world import World, text_at
+from modewright.lsp.world import Workspace, root_text
 
-VALUES = {
+VALUE_SECTIONS = {
     "parameters": "parameter",
     "inputs": "input",
     "states": "state",
@@ -27,18 +27,18 @@ VALUES = {
     "vary": "what varies",
 }
 """Sections that declare what expressions read, and what each declares."""
-OTHERS = {
+OTHER_SECTIONS = {
     "modes": "mode",
     "regions": "region",
     "templates": "template",
     "faults": "fault",
     "events": "event",
 }
-MOST_LAYERS = 20
+MAX_DEPTH = 20
 
 
 @dataclass(frozen=True)
-class Declared:
+class Symbol:
     """Something that has a name: where it is declared and what as.
 
     `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`;
@@ -59,127 +59,133 @@ class Declared:
 
 
 @dataclass
-class Namespace:
+class SymbolTable:
     """The names of one spec, by group and name; those of its base and model are the same things."""
 
     file: Path
     document: Document
-    names: dict[tuple[str, str], Declared] = field(default_factory=dict)
-    instances: dict[str, Namespace] = field(default_factory=dict)
-    model: Namespace | None = None
-    of: Namespace | None = None
+    names: dict[tuple[str, str], Symbol] = field(default_factory=dict)
+    instances: dict[str, SymbolTable] = field(default_factory=dict)
+    model: SymbolTable | None = None
+    target: SymbolTable | None = None
 
     @property
     def is_automaton(self) -> bool:
         """Whether this is an automaton, or a variant of one."""
         return ("spec", "automaton") in {(each.group, each.kind) for each in self.names.values()}
 
-    def group(self, *groups: str) -> list[Declared]:
+    def in_groups(self, *groups: str) -> list[Symbol]:
         """Return what is declared in some groups."""
         return [each for (group, _), each in self.names.items() if group in groups]
 
 
-def namespace(world: World, path: Path, depth: int = 0) -> Namespace | None:
+def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> SymbolTable | None:
     """Return the names of a spec; None where it cannot be read."""
-    document = world.document(path)
-    if document is None or depth > MOST_LAYERS:
+    document = workspace.document(path)
+    if document is None or depth > MAX_DEPTH:
         return None
-    return namespace_of(world, path, document, depth)
+    return build_symbol_table(workspace, path, document, depth)
 
 
-def namespace_of(world: World, path: Path, document: Document, depth: int = 0) -> Namespace:
+def build_symbol_table(
+    workspace: Workspace, path: Path, document: Document, depth: int = 0
+) -> SymbolTable:
     """Return the names of a document; `depth` counts what it was reached through."""
-    made = Namespace(path.resolve(), document)
-    base = _other(world, made, "extends", depth)
+    symbols = SymbolTable(path.resolve(), document)
+    base = _referenced_symbols(workspace, symbols, "extends", depth)
     if base:
-        made.names.update(base.names)
-        made.instances.update(base.instances)
-        made.model, made.of = base.model, base.of
-    model = _other(world, made, "model", depth)
+        symbols.names.update(base.names)
+        symbols.instances.update(base.instances)
+        symbols.model, symbols.target = base.model, base.target
+    model = _referenced_symbols(workspace, symbols, "model", depth)
     if model:
-        made.model = model
+        symbols.model = model
         shared = ("parameter", "state", "input")
-        for each in model.group("value"):
+        for each in model.in_groups("value"):
             if each.kind in shared:
-                made.names[each.group, each.name] = each
-    target = _other(world, made, "of", depth) or _tested(world, made, depth)
+                symbols.names[each.group, each.name] = each
+    target = _referenced_symbols(workspace, symbols, "of", depth) or _tested_symbols(
+        workspace, symbols, depth
+    )
     if target:
-        made.of = target
-        made.names.update(target.names)
-        made.instances.update(target.instances)
+        symbols.target = target
+        symbols.names.update(target.names)
+        symbols.instances.update(target.instances)
         if target.is_automaton:  # it runs alone, and is an instance of its own name
-            made.instances[target.document.name] = target
+            symbols.instances[target.document.name] = target
     if document.kind == "study":  # a bare name is that of all instances that have it
-        for inner in made.instances.values():
-            for each in inner.group("value"):
+        for inner in symbols.instances.values():
+            for each in inner.in_groups("value"):
                 if each.kind == "parameter":
-                    made.names.setdefault((each.group, each.name), each)
-    for declared in _declared(made.file, document):
-        made.names.setdefault((declared.group, declared.name), declared)
-    _add_instances(world, made, depth)
-    return made
+                    symbols.names.setdefault((each.group, each.name), each)
+    for symbol in _iter_symbols(symbols.file, document):
+        symbols.names.setdefault((symbol.group, symbol.name), symbol)
+    _add_instances(workspace, symbols, depth)
+    return symbols
 
 
-def _tested(world: World, space: Namespace, depth: int) -> Namespace | None:
+def _tested_symbols(workspace: Workspace, symbols: SymbolTable, depth: int) -> SymbolTable | None:
     """Return what the scenario of a test is of: one that is named, or written in the test."""
-    if space.document.kind != "test":
+    if symbols.document.kind != "test":
         return None
-    written = space.document.root.get("scenario")
-    if isinstance(written, Table):
+    written = symbols.document.root.get("scenario")
+    if isinstance(written, MappingNode):
         of = written.get("of")
-        path = world.find(of.text, space.file) if isinstance(of, Scalar) else None
-        return namespace(world, path, depth + 1) if path else None
-    scenario = _other(world, space, "scenario", depth)
-    return scenario.of if scenario else None
+        path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
+        return load_symbol_table(workspace, path, depth + 1) if path else None
+    scenario = _referenced_symbols(workspace, symbols, "scenario", depth)
+    return scenario.target if scenario else None
 
 
-def _other(world: World, space: Namespace, key: str, depth: int) -> Namespace | None:
-    name = text_at(space.document, key)
-    path = world.find(name, space.file) if name else None
-    return namespace(world, path, depth + 1) if path else None
+def _referenced_symbols(
+    workspace: Workspace, symbols: SymbolTable, key: str, depth: int
+) -> SymbolTable | None:
+    name = root_text(symbols.document, key)
+    path = workspace.find_file(name, symbols.file) if name else None
+    return load_symbol_table(workspace, path, depth + 1) if path else None
 
 
-def _add_instances(world: World, space: Namespace, depth: int) -> None:
-    for entry in entries(space.document.root.get("instances")):
-        of = entry.node.get("of") if isinstance(entry.node, Table) else None
-        path = world.find(of.text, space.file) if isinstance(of, Scalar) else None
-        inner = namespace(world, path, depth + 1) if path else None
+def _add_instances(workspace: Workspace, symbols: SymbolTable, depth: int) -> None:
+    for entry in entries(symbols.document.root.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
+        path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
+        inner = load_symbol_table(workspace, path, depth + 1) if path else None
         if inner:
-            space.instances[entry.key] = inner
+            symbols.instances[entry.key] = inner
 
 
-def _declared(file: Path, document: Document) -> Iterator[Declared]:
-    yield Declared(file, "spec", document.name, document.kind, document.name_span, document)
+def _iter_symbols(file: Path, document: Document) -> Iterator[Symbol]:
+    yield Symbol(file, "spec", document.name, document.kind, document.name_span, document)
     is_calibration = document.kind in ("calibration", "scenario")
     for place in places(document.root):
-        if not isinstance(place.node, Table) or not isinstance(place.kind, MappingOf):
+        if not isinstance(place.node, MappingNode) or not isinstance(place.kind, MappingOf):
             continue
         for entry in place.node:
-            made = None if is_calibration else _one(file, place.path, entry)
-            if made:
-                yield made
+            symbol = None if is_calibration else _make_symbol(file, place.path, entry)
+            if symbol:
+                yield symbol
 
 
-def _one(file: Path, path: tuple[str, ...], entry: Entry) -> Declared | None:
+def _make_symbol(file: Path, path: tuple[str, ...], entry: Entry) -> Symbol | None:
     section = path[-1] if path else ""
     if entry.key.startswith("$"):
         return None
     is_inner = "observer" in path or "redirect" in path
     is_value = len(path) == 1 or section == "equations"
-    if section in VALUES and not is_inner and is_value:
-        word = VALUES[section]
-        return Declared(file, "value", entry.key, word, entry.text_span, entry.node)
+    if section in VALUE_SECTIONS and not is_inner and is_value:
+        word = VALUE_SECTIONS[section]
+        return Symbol(file, "value", entry.key, word, entry.text_span, entry.node)
     if section == "columns" and "transition_table" in path:
         name = column_name(path, entry.key)
-        return Declared(file, "column", name, "column of a table", entry.text_span, entry.node)
-    if section in OTHERS:
-        word = OTHERS[section]
-        name = _name(word, path, entry.key)
-        return Declared(file, word, name, word, entry.text_span, entry.node)
+        return Symbol(file, "column", name, "column of a table", entry.text_span, entry.node)
+    if section in OTHER_SECTIONS:
+        word = OTHER_SECTIONS[section]
+        name = _symbol_name(word, path, entry.key)
+        return Symbol(file, word, name, word, entry.text_span, entry.node)
     return None
 
 
-def _name(word: str, path: tuple[str, ...], key: str) -> str:
+def _symbol_name(word: str, path: tuple[str, ...], key: str) -> str:
     if word == "mode" or (word == "region" and key != CHART):
         return mode_path((*path, key))
     return key

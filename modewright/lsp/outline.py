@@ -7,15 +7,15 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.document import Entry, Items, Node, Table
+from language.document import Entry, MappingNode, SequenceNode, YamlNode
 from language.problem import Span
 from modewright.editing.guide import places
 from modewright.editing.shape import MappingOf
 from modewright.lsp.positions import range_of
-from modewright.lsp.world import World
+from modewright.lsp.world import Workspace
 
 K = types.SymbolKind
-KINDS = {
+SECTION_KINDS = {
     "parameters": K.Constant,
     "inputs": K.Variable,
     "states": K.Variable,
@@ -38,49 +38,51 @@ KINDS = {
     "vary": K.Variable,
 }
 """Sections whose keys are shown, and as what an editor draws them."""
-Keys = tuple[str, ...]
+KeyPath = tuple[str, ...]
 
 
-def outline(world: World, path: Path) -> list[types.DocumentSymbol]:
+def outline(workspace: Workspace, path: Path) -> list[types.DocumentSymbol]:
     """Return the spec with its sections, and in these what they declare."""
-    document = world.document(path)
+    document = workspace.document(path)
     if document is None:
         return []
-    whole = document.root
-    found: dict[Keys, types.DocumentSymbol] = {
-        (): _symbol(document.name, K.File, document.name_span, whole, world.encoding)
+    root = document.root
+    symbols: dict[KeyPath, types.DocumentSymbol] = {
+        (): _document_symbol(document.name, K.File, document.name_span, root, workspace.encoding)
     }
-    found[()].detail = document.kind
-    found[()].range.start = types.Position(0, 0)
-    for place in places(whole):
-        if not isinstance(place.node, Table) or not isinstance(place.kind, MappingOf):
+    symbols[()].detail = document.kind
+    symbols[()].range.start = types.Position(0, 0)
+    for place in places(root):
+        if not isinstance(place.node, MappingNode) or not isinstance(place.kind, MappingOf):
             continue
-        kind = KINDS.get(place.section)
+        kind = SECTION_KINDS.get(place.section)
         if kind is None:
             continue
         if len(place.path) == 1:
-            _add(found, place.path, whole.entries[place.section], K.Package, world.encoding)
+            _add_symbol(
+                symbols, place.path, root.entries[place.section], K.Package, workspace.encoding
+            )
         for entry in place.node:
-            _add(found, (*place.path, entry.key), entry, kind, world.encoding)
-    return [found[()]]
+            _add_symbol(symbols, (*place.path, entry.key), entry, kind, workspace.encoding)
+    return [symbols[()]]
 
 
-def _add(
-    found: dict[Keys, types.DocumentSymbol],
-    path: Keys,
+def _add_symbol(
+    symbols: dict[KeyPath, types.DocumentSymbol],
+    path: KeyPath,
     entry: Entry,
     kind: types.SymbolKind,
     encoding: str,
 ) -> None:
     """Add a thing to the nearest that holds it."""
-    outer = next(path[:count] for count in range(len(path) - 1, -1, -1) if path[:count] in found)
-    found[path] = _symbol(entry.key, kind, entry.span, entry.node, encoding)
-    inner = found[outer].children
-    found[outer].children = [*(inner or ()), found[path]]
+    outer = next(path[:count] for count in range(len(path) - 1, -1, -1) if path[:count] in symbols)
+    symbols[path] = _document_symbol(entry.key, kind, entry.span, entry.node, encoding)
+    inner = symbols[outer].children
+    symbols[outer].children = [*(inner or ()), symbols[path]]
 
 
-def _symbol(
-    name: str, kind: types.SymbolKind, span: Span, node: Node, encoding: str
+def _document_symbol(
+    name: str, kind: types.SymbolKind, span: Span, node: YamlNode, encoding: str
 ) -> types.DocumentSymbol:
     own = range_of(span, encoding)
     last = max(_spans(node), key=lambda each: (each.line, each.column + each.width))
@@ -88,14 +90,14 @@ def _symbol(
     return types.DocumentSymbol(name or "?", kind, types.Range(own.start, end), own)
 
 
-def _spans(node: Node) -> Iterator[Span]:
+def _spans(node: YamlNode) -> Iterator[Span]:
     """Yield the places of all keys and values of a node."""
     yield node.span
     match node:
-        case Table():
+        case MappingNode():
             for entry in node:
                 yield entry.span
                 yield from _spans(entry.node)
-        case Items():
+        case SequenceNode():
             for part in node.nodes:
                 yield from _spans(part)

@@ -18,12 +18,12 @@ def range_of(span: Span, encoding: str) -> types.Range:
     line = max(0, span.line - 1)
     lines = span.source.lines
     text = lines[line] if line < len(lines) else ""
-    start = units_of(text, span.column - 1, encoding)
-    end = units_of(text, span.column - 1 + span.width, encoding)
+    start = encoded_column(text, span.column - 1, encoding)
+    end = encoded_column(text, span.column - 1 + span.width, encoding)
     return types.Range(types.Position(line, start), types.Position(line, max(end, start)))
 
 
-def holds(span: Span, position: types.Position, encoding: str) -> bool:
+def contains_position(span: Span, position: types.Position, encoding: str) -> bool:
     """Tell whether a place holds a position, or ends at it."""
     found = range_of(span, encoding)
     return found.start.line == position.line and (
@@ -38,7 +38,7 @@ def column_of(text: str, position: types.Position, encoding: str) -> int:
     return len(encoded[: width * position.character].decode(codec, errors="replace"))
 
 
-def written_at(span: Span) -> str:
+def source_text(span: Span) -> str:
     """Return the text that stands at a place."""
     lines = span.source.lines
     text = lines[span.line - 1] if 0 < span.line <= len(lines) else ""
@@ -55,7 +55,7 @@ def uri_of(path: Path) -> str:
     return path.resolve().as_uri()
 
 
-def units_of(text: str, count: int, encoding: str) -> int:
+def encoded_column(text: str, count: int, encoding: str) -> int:
     """Return where an editor sees a column of a line, from 0."""
     codec, width = CODECS[encoding]
     return len(text[: max(0, count)].encode(codec, errors="replace")) // width

@@ -7,39 +7,39 @@ from pathlib import Path
 from lsprotocol import types
 
 from language.problem import Problem
-from modewright.checking import Checked, errors_first
+from modewright.checking import CheckResult, check_without_proofs
 from modewright.lsp.positions import range_of, uri_of
-from modewright.lsp.world import World
+from modewright.lsp.world import Workspace
 
 SOURCE = "modewright"
 SEVERITIES = {
     "error": types.DiagnosticSeverity.Error,
     "warning": types.DiagnosticSeverity.Warning,
 }
-START = types.Range(types.Position(0, 0), types.Position(0, 0))
+FILE_START = types.Range(types.Position(0, 0), types.Position(0, 0))
 
 
-def diagnostics(world: World, path: Path) -> list[types.Diagnostic]:
+def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
     """Return the problems of a file without what takes long to prove.
 
     One that lies in another file is told at the start of this; so is a defect of ours, with which
     the other files are checked nevertheless.
     """
     try:
-        found = errors_first(str(path), world.root, dict(world.texts))
+        found = check_without_proofs(str(path), workspace.root, dict(workspace.texts))
     except Exception as defect:
         message = f"a defect of modewright: {type(defect).__name__}: {defect}\n"
         message += f"help: `modewright check {path.stem}` writes a report"
-        return [types.Diagnostic(START, message, SEVERITIES["error"], source=SOURCE)]
-    return told(found, path, world.encoding)
+        return [types.Diagnostic(FILE_START, message, SEVERITIES["error"], source=SOURCE)]
+    return to_diagnostics(found, path, workspace.encoding)
 
 
-def told(found: Checked, path: Path, encoding: str) -> list[types.Diagnostic]:
+def to_diagnostics(result: CheckResult, path: Path, encoding: str) -> list[types.Diagnostic]:
     """Return what was found in a file as diagnostics."""
-    return [_diagnostic(problem, path.resolve(), encoding) for problem in found.problems]
+    return [_to_diagnostic(problem, path.resolve(), encoding) for problem in result.problems]
 
 
-def _diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:
+def _to_diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:
     message = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
     place = Path(problem.span.source.name).resolve()
     related = None
@@ -48,7 +48,7 @@ def _diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic
         location = types.Location(uri_of(place), where)
         related = [types.DiagnosticRelatedInformation(location, problem.label)]
         message = f"in {problem.span}: {message}"
-        where = START
+        where = FILE_START
     return types.Diagnostic(
         range=where,
         message=message,

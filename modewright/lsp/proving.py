@@ -12,18 +12,18 @@ from pathlib import Path
 
 from lsprotocol import converters, types
 
-from modewright.checking import checked
-from modewright.lsp.problems import told
-from modewright.lsp.world import World
+from modewright.checking import check_spec
+from modewright.lsp.problems import to_diagnostics
+from modewright.lsp.world import Workspace
 
 
-async def proven(world: World, path: Path) -> list[types.Diagnostic] | None:
+async def run_background_check(workspace: Workspace, path: Path) -> list[types.Diagnostic] | None:
     """Return all problems of a file, None where they were not found; cancelled, nothing runs on."""
-    asked = {
+    request = {
         "path": str(path),
-        "root": str(world.root),
-        "encoding": world.encoding,
-        "texts": {str(file): text for file, text in world.texts.items()},
+        "root": str(workspace.root),
+        "encoding": workspace.encoding,
+        "texts": {str(file): text for file, text in workspace.texts.items()},
     }
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "modewright.lsp.proving"),
@@ -32,7 +32,7 @@ async def proven(world: World, path: Path) -> list[types.Diagnostic] | None:
         stderr=asyncio.subprocess.DEVNULL,
     )
     try:
-        answer, _ = await process.communicate(json.dumps(asked).encode())
+        answer, _ = await process.communicate(json.dumps(request).encode())
     finally:
         if process.returncode is None:
             process.kill()
@@ -44,12 +44,14 @@ async def proven(world: World, path: Path) -> list[types.Diagnostic] | None:
 
 def main() -> None:
     """Answer one question."""
-    asked = json.loads(sys.stdin.read())
-    texts = {Path(file): text for file, text in asked["texts"].items()}
-    path = Path(asked["path"])
-    found = told(checked(str(path), Path(asked["root"]), texts), path, asked["encoding"])
+    request = json.loads(sys.stdin.read())
+    texts = {Path(file): text for file, text in request["texts"].items()}
+    path = Path(request["path"])
+    diagnostics = to_diagnostics(
+        check_spec(str(path), Path(request["root"]), texts), path, request["encoding"]
+    )
     converter = converters.get_converter()
-    print(json.dumps([converter.unstructure(each) for each in found]))
+    print(json.dumps([converter.unstructure(each) for each in diagnostics]))
 
 
 if __name__ == "__main__":

@@ -9,17 +9,17 @@ from lsprotocol import types
 
 from modewright.lsp.problems import SOURCE
 
-REPAIRS = (
+REPLACEMENT_PATTERNS = (
     re.compile(r"^help: did you mean `(.+?)`\?", re.MULTILINE),
     re.compile(r"^help: write `(\S+?)`:", re.MULTILINE),
 )
 """Helps that give the very text to write at the place of the problem."""
 
 
-def repairs(uri: str, told: Sequence[types.Diagnostic]) -> Iterator[types.CodeAction]:
+def quick_fixes(uri: str, diagnostics: Sequence[types.Diagnostic]) -> Iterator[types.CodeAction]:
     """Yield the change that each problem's help names, if it names one."""
-    for problem in told:
-        found = [match for each in REPAIRS if (match := each.search(problem.message))]
+    for problem in diagnostics:
+        found = [match for each in REPLACEMENT_PATTERNS if (match := each.search(problem.message))]
         if not found or problem.source != SOURCE or problem.related_information:
             continue
         text = found[0].group(1)

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.document import Document, Scalar
+from language.document import Document, ScalarNode
 from language.finding import Project
 from language.problem import SpecError
-from modewright.lsp.name import Name, names
+from modewright.lsp.name import NameOccurrence, find_names
 
 
 @dataclass
-class World:
+class Workspace:
     """A project's folder, the open texts by resolved path, and documents as last read.
 
     `encoding` is that in which the editor counts columns.
@@ -24,8 +24,10 @@ class World:
     encoding: str = "utf-16"
     texts: dict[Path, str] = field(default_factory=dict)
     _project: Project | None = None
-    _kept: dict[Path, tuple[object, Document | None]] = field(default_factory=dict)
-    _names: dict[Path, tuple[Document, tuple[Name, ...]]] = field(default_factory=dict)
+    _document_cache: dict[Path, tuple[object, Document | None]] = field(default_factory=dict)
+    _name_cache: dict[Path, tuple[Document, tuple[NameOccurrence, ...]]] = field(
+        default_factory=dict
+    )
 
     def project(self) -> Project:
         """Return the project as it was when this was last refreshed: its index takes time."""
@@ -37,7 +39,7 @@ class World:
         """Look anew at what files there are."""
         self._project = None
 
-    def open(self, path: Path, text: str | None) -> None:
+    def set_text(self, path: Path, text: str | None) -> None:
         """Take the text of an editor for a file; None: what is on the disk counts again."""
         path = path.resolve()
         if text is None:
@@ -55,23 +57,23 @@ class World:
                 stamp = path.stat().st_mtime_ns
             except OSError:
                 return None
-        before = self._kept.get(path, (None, None))
-        if before[0] != stamp:
+        cached = self._document_cache.get(path, (None, None))
+        if cached[0] != stamp:
             try:
-                before = (stamp, self.project().read(path))
+                cached = (stamp, self.project().read(path))
             except SpecError:
-                before = (stamp, before[1])
-            self._kept[path] = before
-        return before[1]
+                cached = (stamp, cached[1])
+            self._document_cache[path] = cached
+        return cached[1]
 
-    def names(self, path: Path) -> tuple[Name, ...]:
+    def names(self, path: Path) -> tuple[NameOccurrence, ...]:
         """Return the names that are written in a file; its expressions are parsed once."""
         document = self.document(path)
         if document is None:
             return ()
-        known = self._names.get(path)
+        known = self._name_cache.get(path)
         if known is None or known[0] is not document:
-            known = self._names[path] = document, names(document)
+            known = self._name_cache[path] = document, find_names(document)
         return known[1]
 
     def documents(self) -> Iterator[tuple[Path, Document]]:
@@ -82,31 +84,31 @@ class World:
             if document is not None:
                 yield path, document
 
-    def find(self, name: str, asked_in: Path, is_effect: bool = False) -> Path | None:
+    def find_file(self, name: str, referring_file: Path, is_effect: bool = False) -> Path | None:
         """Return the file of a name or a path that a spec names."""
         if name.endswith((".yaml", ".yml")):
-            beside = asked_in.parent / name
+            beside = referring_file.parent / name
             return beside.resolve() if beside.is_file() else None
         for path in self.texts:
             document = self.document(path)
             if document and document.name == name and (document.kind == "effect") == is_effect:
                 return path
         project = self.project()
-        found = (project.effects if is_effect else project.index).get(name, [])
+        found = (project.effect_index if is_effect else project.index).get(name, [])
         return found[0].resolve() if len(found) == 1 else None
 
-    def is_ours(self, path: Path) -> bool:
+    def is_in_project(self, path: Path) -> bool:
         """Tell whether a file belongs to the project: what is shipped is not edited."""
         return path.resolve().is_relative_to(self.root.resolve())
 
 
-def root_of(path: Path) -> Path:
+def project_root_of(path: Path) -> Path:
     """Return the folder of the project of a file: that whose `spec/` holds it, else its own."""
     above = [folder.parent for folder in path.resolve().parents if folder.name == "spec"]
     return above[-1] if above else path.resolve().parent
 
 
-def text_at(document: Document, key: str) -> str:
+def root_text(document: Document, key: str) -> str:
     """Return the text of a key at the root of a document, empty where there is none."""
     node = document.root.get(key)
-    return node.text if isinstance(node, Scalar) else ""
+    return node.text if isinstance(node, ScalarNode) else ""

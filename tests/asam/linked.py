@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.asam.description import Description
-from codegen.source import c_files
+from codegen.asam.description import ModuleDescription
+from codegen.source import emit_c_files
 from codegen.tool import ARM_COMPILER
 from language.program import Program
 
@@ -50,9 +50,9 @@ TARGETS = {
 }
 
 
-def linked(
+def link_program(
     program: Program,
-    found: Description,
+    found: ModuleDescription,
     folder: Path,
     target: Target = TARGETS["host"],
     declared: str = DECLARED,
@@ -69,7 +69,7 @@ def linked(
         members=", ".join(f"(const void *){path}" for path in paths),
         use="\n".join(USE.format(name=program.name, self=s, page=p) for s, p in uses),
     )
-    files = {**c_files(program), "main.c": text}
+    files = {**emit_c_files(program), "main.c": text}
     for name, source in files.items():
         (folder / name).write_text(source)
     sources = [name for name in files if name.endswith(".c")]
@@ -78,14 +78,16 @@ def linked(
     return folder / "app.elf"
 
 
-def places(elf: Path, found: Description, target: Target = TARGETS["host"]) -> dict[str, int]:
+def symbol_addresses(
+    elf: Path, found: ModuleDescription, target: Target = TARGETS["host"]
+) -> dict[str, int]:
     """Return the address of everything that is described, as the linker filled it in."""
-    raw = section(elf, ".places", target)
+    raw = read_section(elf, ".places", target)
     named = [one.name for one in found.measurements] + [one.name for one in found.characteristics]
     return dict(zip(named, (at for (at,) in struct.iter_unpack(target.pointer, raw)), strict=True))
 
 
-def section(elf: Path, name: str, target: Target = TARGETS["host"]) -> bytes:
+def read_section(elf: Path, name: str, target: Target = TARGETS["host"]) -> bytes:
     """Return the bytes of a section."""
     out = elf.with_suffix(".bin")
     command = [target.copy, "-O", "binary", "--only-section", name, str(elf), str(out)]

@@ -12,7 +12,7 @@ from pya2l import import_a2l
 
 
 @contextmanager
-def read(text: str, folder: Path) -> Iterator[Any]:
+def open_database(text: str, folder: Path) -> Iterator[Any]:
     """Give the database that the parser makes of a text."""
     (folder / "read.a2l").write_text(text)
     session = import_a2l(
@@ -28,6 +28,6 @@ def read(text: str, folder: Path) -> Iterator[Any]:
         session.close()
 
 
-def every(session: Any, kind: str) -> dict[str, Any]:
+def elements_of_kind(session: Any, kind: str) -> dict[str, Any]:
     """Return all elements of a kind, such as Measurement, by name."""
     return {one.name: one for one in session.query(getattr(model, kind)).all()}

@@ -9,18 +9,18 @@ from pathlib import Path
 import pya2l.model as model
 import pytest
 
-from codegen.asam.a2l import Located, _unlike, a2l, located
-from codegen.asam.description import described
+from codegen.asam.a2l import ModuleLocation, _unique_name, emit_a2l, locate_module
+from codegen.asam.description import describe_module
 from codegen.asam.image import ImageError
 from codegen.exchange.page import page_constants, page_name
 from codegen.tool import ARM_COMPILER
 from language.program import Program
 from modewright.api import program as shipped
 from modewright.cli import app
-from modewright.exits import exit_code
-from tests.asam.linked import TARGETS, linked, places, section
-from tests.asam.reading import every, read
-from tests.codegen.waiting import waiting
+from modewright.exits import run_with_exit_code
+from tests.asam.linked import TARGETS, link_program, read_section, symbol_addresses
+from tests.asam.reading import elements_of_kind, open_database
+from tests.codegen.waiting import waiting_automaton
 from tests.language.making import program
 
 NEEDS_ARM = pytest.mark.skipif(
@@ -53,16 +53,18 @@ AUTOMATA = ("estimator_simple", "supervisor", "driveline")
 
 
 def text_of(used: Program, elf: Path | None = None) -> str:
-    return a2l(used, located(used, elf) if elf else None)
+    return emit_a2l(used, locate_module(used, elf) if elf else None)
 
 
 @pytest.mark.parametrize("name", AUTOMATA)
 def test_a_parser_of_others_reads_all_of_it(name: str, tmp_path: Path) -> None:
     used = shipped(name)
-    found = described(used)
-    with read(text_of(used), tmp_path) as session:
-        measured, calibrated = (every(session, k) for k in ("Measurement", "Characteristic"))
-        methods, tables = (every(session, k) for k in ("CompuMethod", "CompuVtab"))
+    found = describe_module(used)
+    with open_database(text_of(used), tmp_path) as session:
+        measured, calibrated = (
+            elements_of_kind(session, k) for k in ("Measurement", "Characteristic")
+        )
+        methods, tables = (elements_of_kind(session, k) for k in ("CompuMethod", "CompuVtab"))
         (mod_par,) = session.query(model.ModPar).all()
         assert mod_par.epk.identifier == found.digest
         assert list(measured) == [one.name for one in found.measurements]
@@ -84,7 +86,7 @@ def test_a_parser_of_others_reads_all_of_it(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["estimator", "supervisor"])
 def test_what_may_be_calibrated_is_named_as_in_pages_that_are_exchanged(name: str) -> None:
     used = shipped(name)
-    ours = [one.name for one in described(used).characteristics]
+    ours = [one.name for one in describe_module(used).characteristics]
     assert sorted(ours) == sorted(page_name(used, one) for one in page_constants(used))
 
 
@@ -93,22 +95,24 @@ def test_what_may_be_calibrated_is_named_as_in_pages_that_are_exchanged(name: st
 @pytest.mark.parametrize("name", ["estimator_simple", "supervisor", "maps"])
 def test_addresses_are_those_of_the_linker(name: str, target: str, tmp_path: Path) -> None:
     used = program(MAPS) if name == "maps" else shipped(name)
-    found, machine = described(used), TARGETS[target]
-    elf = linked(used, found, tmp_path, machine)
-    asked = places(elf, found, machine)
-    with read(a2l(used, located(used, elf, page="page")), tmp_path) as session:
-        told = {n: m.ecu_address.address for n, m in every(session, "Measurement").items()}
-        told |= {n: c.address for n, c in every(session, "Characteristic").items()}
+    found, machine = describe_module(used), TARGETS[target]
+    elf = link_program(used, found, tmp_path, machine)
+    asked = symbol_addresses(elf, found, machine)
+    with open_database(emit_a2l(used, locate_module(used, elf, page="page")), tmp_path) as session:
+        told = {
+            n: m.ecu_address.address for n, m in elements_of_kind(session, "Measurement").items()
+        }
+        told |= {n: c.address for n, c in elements_of_kind(session, "Characteristic").items()}
         assert told == asked
         assert len(set(asked.values())) > 8
 
 
 def test_the_default_page_holds_the_values_of_the_spec(tmp_path: Path) -> None:
     used = shipped("estimator")
-    elf = linked(used, described(used), tmp_path)
-    where = located(used, elf)
+    elf = link_program(used, describe_module(used), tmp_path)
+    where = locate_module(used, elf)
     assert where.page.symbol == "estimator_default_cal"
-    raw = section(elf, ".calibration.estimator")
+    raw = read_section(elf, ".calibration.estimator")
     offset, size = where.page.members["J_em"]
     assert struct.unpack_from("<d", raw, offset) == (0.05,)
     assert size == 8
@@ -121,8 +125,8 @@ def test_the_default_page_holds_the_values_of_the_spec(tmp_path: Path) -> None:
 
 
 def test_curves_and_maps_have_their_axes(tmp_path: Path) -> None:
-    with read(text_of(program(MAPS)), tmp_path) as session:
-        found = every(session, "Characteristic")
+    with open_database(text_of(program(MAPS)), tmp_path) as session:
+        found = elements_of_kind(session, "Characteristic")
         kinds = {name: (one.type, one.deposit) for name, one in found.items()}
         assert kinds == {
             "maps.share": ("CURVE", "layout.FLOAT32_IEEE"),
@@ -141,22 +145,24 @@ def test_curves_and_maps_have_their_axes(tmp_path: Path) -> None:
 
 def test_a_tunable_wait_is_shown_in_ms(tmp_path: Path) -> None:
     """Raw numbers are ticks of 10 ms; limits are those of what is shown."""
-    with read(
-        text_of(program(waiting("waiting", "10 ms", "float32", "30 ms", "[20, 500]"))), tmp_path
+    with open_database(
+        text_of(program(waiting_automaton("waiting", "10 ms", "float32", "30 ms", "[20, 500]"))),
+        tmp_path,
     ) as session:
-        found = every(session, "Characteristic")["waiting.t_on"]
+        found = elements_of_kind(session, "Characteristic")["waiting.t_on"]
         assert (found.deposit, found.lowerLimit, found.upperLimit) == ("layout.UWORD", 20, 500)
-        method = every(session, "CompuMethod")[found.conversion]
+        method = elements_of_kind(session, "CompuMethod")[found.conversion]
         assert (method.conversionType, method.unit) == ("LINEAR", "ms")
-        timer = every(session, "Measurement")["waiting.timer.low_high"]
+        timer = elements_of_kind(session, "Measurement")["waiting.timer.low_high"]
         assert (timer.conversion, timer.upperLimit) == (found.conversion, 655350)
 
 
 def test_what_would_end_a_text_does_not(tmp_path: Path) -> None:
     spec = MAPS.replace("gain: {value", "gain: {about: 'a \"quote\" \\ and 90 °C', value")
-    with read(text_of(program(spec)), tmp_path) as session:
+    with open_database(text_of(program(spec)), tmp_path) as session:
         assert (
-            every(session, "Characteristic")["maps.gain"].longIdentifier == "a 'quote' / and 90 ?C"
+            elements_of_kind(session, "Characteristic")["maps.gain"].longIdentifier
+            == "a 'quote' / and 90 ?C"
         )
 
 
@@ -168,16 +174,16 @@ SEVERAL = (
 def several(folder: Path) -> tuple[Program, Path]:
     used = shipped("contactor")
     uses = (("app.each[0]", "page"), ("app.each[1]", "page"))
-    return used, linked(used, described(used), folder, declared=SEVERAL, uses=uses)
+    return used, link_program(used, describe_module(used), folder, declared=SEVERAL, uses=uses)
 
 
 def test_one_of_several_instances_is_named(tmp_path: Path) -> None:
     used, elf = several(tmp_path)
     with pytest.raises(ImageError, match=r"there are: app\.each\[0\], app\.each\[1\]$"):
-        located(used, elf)
+        locate_module(used, elf)
     with pytest.raises(ImageError, match=r"no contactor_Self is called `app`"):
-        located(used, elf, instance="app")
-    first, second = (located(used, elf, instance=f"app.each[{k}]").instance for k in (0, 1))
+        locate_module(used, elf, instance="app")
+    first, second = (locate_module(used, elf, instance=f"app.each[{k}]").instance for k in (0, 1))
     assert first and second
     assert (
         second.address - first.address == -(-max(sum(at) for at in first.members.values()) // 4) * 4
@@ -186,23 +192,23 @@ def test_one_of_several_instances_is_named(tmp_path: Path) -> None:
 
 def test_code_of_another_spec_is_told(tmp_path: Path) -> None:
     used = shipped("contactor")
-    elf = linked(used, described(used), tmp_path)
+    elf = link_program(used, describe_module(used), tmp_path)
     with pytest.raises(ImageError, match="its contactor is of digest"):
-        located(shipped("contactor", {"t_close": "30 ms"}), elf)
+        locate_module(shipped("contactor", {"t_close": "30 ms"}), elf)
     with pytest.raises(ImageError, match="it has no estimator_Version"):
-        located(shipped("estimator"), elf)
+        locate_module(shipped("estimator"), elf)
 
 
 def test_a_program_that_tells_nothing_is_refused(tmp_path: Path) -> None:
     used = shipped("contactor")
-    elf = linked(used, described(used), tmp_path, words=("-g0",))
+    elf = link_program(used, describe_module(used), tmp_path, words=("-g0",))
     with pytest.raises(ImageError, match="is its code linked, and compiled with -g"):
-        located(used, elf)
+        locate_module(used, elf)
 
 
 def test_what_is_no_program_is_refused(tmp_path: Path) -> None:
     used = shipped("contactor")
-    whole = linked(used, described(used), tmp_path).read_bytes()
+    whole = link_program(used, describe_module(used), tmp_path).read_bytes()
     torn = {
         "empty": b"",
         "text": b"no program",
@@ -212,30 +218,34 @@ def test_what_is_no_program_is_refused(tmp_path: Path) -> None:
     for name, data in torn.items():
         (tmp_path / name).write_bytes(data)
         with pytest.raises(ImageError, match=name):
-            located(used, tmp_path / name)
+            locate_module(used, tmp_path / name)
     for other in ("nothing", "."):
         with pytest.raises(ImageError):
-            located(used, tmp_path / other)
+            locate_module(used, tmp_path / other)
 
 
 def test_another_layout_is_told(tmp_path: Path) -> None:
     used = shipped("contactor")
-    where = located(used, linked(used, described(used), tmp_path))
+    where = locate_module(used, link_program(used, describe_module(used), tmp_path))
     assert where.instance
     torn = type(where.instance)("self", 0, {**where.instance.members, "faults": (0, 8)})
     with pytest.raises(ImageError, match=r"self\.faults has 8 bytes"):
-        a2l(used, Located(where.image, where.page, torn))
+        emit_a2l(used, ModuleLocation(where.image, where.page, torn))
 
 
 def test_names_of_conversions_are_words_and_differ(tmp_path: Path) -> None:
     spec = MAPS.replace("  gain:", "  slow: {value: 2 1/s^2, tunable: true}\n  gain:")
     spec = spec.replace("T: gain *", "T: slow / 2 1/s^2 *")
-    with read(text_of(program(spec)), tmp_path) as session:
-        names = list(every(session, "CompuMethod"))
+    with open_database(text_of(program(spec)), tmp_path) as session:
+        names = list(elements_of_kind(session, "CompuMethod"))
     assert "unit._1_per_s2" in names and len(set(names)) == len(names)
     assert all(part.isidentifier() for name in names for part in name.split("."))
     taken = ("unit.m", "unit.m_2")
-    assert [_unlike("unit.m", taken[:k]) for k in range(3)] == ["unit.m", "unit.m_2", "unit.m_3"]
+    assert [_unique_name("unit.m", taken[:k]) for k in range(3)] == [
+        "unit.m",
+        "unit.m_2",
+        "unit.m_3",
+    ]
 
 
 HIDDEN = "static char raw[4096]; static {name}_Cal page;\n#define self (*({name}_Self *)raw)"
@@ -248,18 +258,20 @@ def test_the_command_says_what_has_no_address(
     assert run("a2l", "contactor", "--out", out) == 0
     assert "it has no addresses: link the C with -g" in capsys.readouterr().out
     words = ("a2l", "contactor", "--out", out, "--page", "page", "--elf")
-    assert run(*words, str(linked(used, described(used), tmp_path))) == 0
+    assert run(*words, str(link_program(used, describe_module(used), tmp_path))) == 0
     assert "address" not in capsys.readouterr().out
-    assert run(*words, str(linked(used, described(used), tmp_path, declared=HIDDEN))) == 0
+    assert (
+        run(*words, str(link_program(used, describe_module(used), tmp_path, declared=HIDDEN))) == 0
+    )
     assert "its measurements have no addresses" in capsys.readouterr().out
 
 
 def test_the_command_writes_it(tmp_path: Path) -> None:
     used = shipped("contactor")
-    elf = linked(used, described(used), tmp_path)
+    elf = link_program(used, describe_module(used), tmp_path)
     out = tmp_path / "contactor.a2l"
     assert run("a2l", "contactor", "--out", str(out), "--elf", str(elf), "--page", "page") == 0
-    assert out.read_text() == a2l(used, located(used, elf, "page"))
+    assert out.read_text() == emit_a2l(used, locate_module(used, elf, "page"))
     (tmp_path / "torn.elf").write_bytes(elf.read_bytes()[:2000])
     before = out.read_bytes()
     assert run("a2l", "contactor", "--out", str(out), "--elf", str(tmp_path / "torn.elf")) == 1
@@ -267,4 +279,4 @@ def test_the_command_writes_it(tmp_path: Path) -> None:
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(list(arguments), standalone_mode=False))
+    return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))

@@ -9,8 +9,8 @@ import time
 
 from tests.bench import with_scipy
 from tests.bench.manoeuvre import TIP_OUT
-from tests.bench.showing import errors_of, shown
-from tests.bench.timing import interleaved
+from tests.bench.showing import errors_of, format_ratio
+from tests.bench.timing import time_interleaved
 
 
 def main(module: str, pairs: int) -> None:
@@ -20,8 +20,8 @@ def main(module: str, pairs: int) -> None:
     run = rival.prepared(TIP_OUT)
     found = run()
     first = time.process_time() - start
-    ratio = interleaved(run, lambda: with_scipy.run(TIP_OUT), pairs)
-    figure = {**shown(ratio, "peer", "scipy"), "first_run_s": first}
+    ratio = time_interleaved(run, lambda: with_scipy.run(TIP_OUT), pairs)
+    figure = {**format_ratio(ratio, "peer", "scipy"), "first_run_s": first}
     print(json.dumps({**figure, "errors": errors_of(TIP_OUT, found)}))
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import FLAGS, compiler
-from codegen.source import c_files
+from codegen.build import FLAGS, find_compiler
+from codegen.source import emit_c_files
 from engine.interpreter import Interpreter
 from language.number import NumberType
 from language.program import Program
@@ -56,7 +56,7 @@ class Inputs:
         return list(zip(self.theta.tolist(), self.torque.tolist(), strict=True))
 
 
-def inputs(ticks: int) -> Inputs:
+def chart_inputs(ticks: int) -> Inputs:
     """Return the inputs of the first ticks, which repeat after 20 s."""
     t = np.arange(ticks) % 20_000 * 1e-3
     slow = 2 * np.pi * 2 * t
@@ -74,14 +74,14 @@ def program(numbers: NumberType, ranges: bool = False) -> Program:
         return program_of_spec(str(path))
 
 
-def interpreted(ticks: int) -> Run:
+def make_interpreter_run(ticks: int) -> Run:
     """Return what runs the interpreter."""
-    made, fed = program("float64"), inputs(ticks).pairs()
+    made, fed = program("float64"), chart_inputs(ticks).pairs()
 
     def run() -> int:
         stepper = Interpreter(made)
         put, tick = stepper.set, stepper.run
-        read = stepper.reader(("memory.fired", "memory.mode"))
+        read = stepper.make_reader(("memory.fired", "memory.mode"))
         fired = 0
         for theta, torque in fed:
             put("input.theta", theta)
@@ -93,12 +93,12 @@ def interpreted(ticks: int) -> Run:
     return run
 
 
-def in_c(ticks: int, ranges: bool = False, held: bool = False) -> tuple[Run, Run]:
+def make_compiled_runs(ticks: int, ranges: bool = False, held: bool = False) -> tuple[Run, Run]:
     """Return what runs our C, and what runs the peer's, both in one library.
 
     With `held` the side by hand is mode_switch_held.c, which holds its inputs in ranges as well.
     """
-    fed, loops = inputs(ticks), _library(ranges)
+    fed, loops = chart_inputs(ticks), _library(ranges)
     hand = loops.loop_by_hand_held if held else loops.loop_by_hand
     ours = np.ascontiguousarray(np.stack([fed.theta, fed.torque], axis=1))
 
@@ -117,12 +117,12 @@ def _library(ranges: bool) -> ctypes.CDLL:
     made = program("float32", ranges)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for file, text in c_files(made).items():
+        for file, text in emit_c_files(made).items():
             (folder / file).write_text(text)
         sources = [HERE / "chart_loops.c", *sorted(folder.glob("*.c"))]
         target = folder / "chart.so"
         shared = ("-fPIC", "-shared", "-Wl,-Bsymbolic", f"-I{folder}", "-o", str(target))
-        command = [*compiler(), *FLAGS, *shared, *map(str, sources), "-lm"]
+        command = [*find_compiler(), *FLAGS, *shared, *map(str, sources), "-lm"]
         subprocess.run(command, check=True)
         loaded = ctypes.CDLL(str(target))
     pointer, whole = ctypes.c_void_p, ctypes.c_int

@@ -5,9 +5,16 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from tests.bench.chart import TICKS, TICKS_IN_C, Run, in_c, inputs, interpreted
-from tests.bench.showing import shown
-from tests.bench.timing import Ratio, interleaved
+from tests.bench.chart import (
+    TICKS,
+    TICKS_IN_C,
+    Run,
+    chart_inputs,
+    make_compiled_runs,
+    make_interpreter_run,
+)
+from tests.bench.showing import format_ratio
+from tests.bench.timing import Ratio, time_interleaved
 
 Figure = dict[str, Any]
 MACHINES = {
@@ -24,7 +31,7 @@ class OtherTransitions(Exception):
     """Two sides made different transitions: nothing to compare."""
 
 
-def charts(pairs: int) -> Figure:
+def measure_charts(pairs: int) -> Figure:
     """Return the figures of the chart: ticks per second of ours over those of others."""
     found = {
         f"interpreter_over_{name}": _over_machine(module, name, pairs)
@@ -42,16 +49,18 @@ def charts(pairs: int) -> Figure:
 
 def _over_machine(module: str, name: str, pairs: int) -> Figure:
     ticks = TICKS // SHARE
-    rival: Run = importlib.import_module(f"tests.bench.{module}").prepared(inputs(ticks).pairs())
-    ours = interpreted(ticks)
+    rival: Run = importlib.import_module(f"tests.bench.{module}").prepared(
+        chart_inputs(ticks).pairs()
+    )
+    ours = make_interpreter_run(ticks)
     _same(name, ours(), rival())
-    return _rated(interleaved(rival, ours, pairs), name, "interpreter", ticks)
+    return _rated(time_interleaved(rival, ours, pairs), name, "interpreter", ticks)
 
 
 def _over_c(pairs: int, ranges: bool, held: bool = False) -> Figure:
-    generated, by_hand = in_c(TICKS_IN_C, ranges, held)
+    generated, by_hand = make_compiled_runs(TICKS_IN_C, ranges, held)
     _same("C", generated(), by_hand())
-    return _rated(interleaved(by_hand, generated, pairs), "c", "generated", TICKS_IN_C)
+    return _rated(time_interleaved(by_hand, generated, pairs), "c", "generated", TICKS_IN_C)
 
 
 def _same(name: str, own: int, other: int) -> None:
@@ -65,4 +74,4 @@ def _rated(ratio: Ratio, rival: str, own: str, ticks: int) -> Figure:
         f"{own}_ticks_per_s": ticks / ratio.seconds_other,
         "rival_ticks_per_s": ticks / ratio.seconds,
     }
-    return {**shown(ratio, rival, own), **rates, "ticks": ticks}
+    return {**format_ratio(ratio, rival, own), **rates, "ticks": ticks}

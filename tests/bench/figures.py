@@ -7,8 +7,8 @@ from typing import Any
 
 from tests.bench import in_c, ours, with_scipy
 from tests.bench.manoeuvre import CHATTER as CHATTER, TIP_OUT as TIP_OUT, Manoeuvre
-from tests.bench.showing import errors_of, shown
-from tests.bench.timing import interleaved
+from tests.bench.showing import errors_of, format_ratio
+from tests.bench.timing import time_interleaved
 from tests.bench.variants import FINE, Sweep
 
 Figure = dict[str, Any]
@@ -25,47 +25,56 @@ VARIANTS = 10_000
 
 def interpreter_over_scipy(pairs: int) -> Figure:
     """The interpreter against RK45 of scipy: rtol 1e-6, steps of at most 10 ms, events on."""
-    case = ours.ready(TIP_OUT, INTERPRETER_STEP, INTERPRETER_ROWS)
-    ratio = interleaved(case.interpreted, lambda: with_scipy.run(TIP_OUT), pairs)
+    case = ours.prepare_run(TIP_OUT, INTERPRETER_STEP, INTERPRETER_ROWS)
+    ratio = time_interleaved(case.interpreted, lambda: with_scipy.run(TIP_OUT), pairs)
     errors = {
         "interpreter": errors_of(TIP_OUT, ours.solution(case.interpreted())),
         "scipy": errors_of(TIP_OUT, with_scipy.solution(TIP_OUT)),
     }
-    return {**shown(ratio, "interpreter", "scipy"), "step": INTERPRETER_STEP, "errors": errors}
+    return {
+        **format_ratio(ratio, "interpreter", "scipy"),
+        "step": INTERPRETER_STEP,
+        "errors": errors,
+    }
 
 
 def compiled_over_c(pairs: int, step: str) -> Figure:
     """A run in our C against the rival at the same step: w_em at each millisecond, every event."""
-    run = ours.ready(TIP_OUT, step, "1 ms").compiled()
-    rival = in_c.InC(TIP_OUT, _seconds(step))
-    ratio = interleaved(run.carry_out, rival.run, pairs)
+    run = ours.prepare_run(TIP_OUT, step, "1 ms").compiled()
+    rival = in_c.CompiledRival(TIP_OUT, _seconds(step))
+    ratio = time_interleaved(run.run, rival.run, pairs)
     found = run.trajectory()
     assert found is not None
     errors = {
         "compiled": errors_of(TIP_OUT, ours.solution(found)),
         "c": errors_of(TIP_OUT, rival.solution()),
     }
-    return {**shown(ratio, "compiled", "c"), "step": step, "errors": errors}
+    return {**format_ratio(ratio, "compiled", "c"), "step": step, "errors": errors}
 
 
 def batch_over_c(pairs: int) -> Figure:
     """Variants per second of our C over the rival's loop, both on all cores."""
     sweep = Sweep(TIP_OUT, VARIANTS)
     threads = os.cpu_count() or 1
-    ratio = interleaved(lambda: sweep.theirs(threads), lambda: sweep.ours(threads), pairs)
-    fine = sweep.theirs(threads, FINE)
-    errors = {"batch": sweep.ours(threads).errors(fine), "c": sweep.theirs(threads).errors(fine)}
+    ratio = time_interleaved(
+        lambda: sweep.run_rival(threads), lambda: sweep.run_ours(threads), pairs
+    )
+    fine = sweep.run_rival(threads, FINE)
+    errors = {
+        "batch": sweep.run_ours(threads).errors(fine),
+        "c": sweep.run_rival(threads).errors(fine),
+    }
     rates = {
         "batch_variants_per_s": VARIANTS / ratio.seconds_other,
         "c_variants_per_s": VARIANTS / ratio.seconds,
     }
-    return {**shown(ratio, "c", "batch"), **rates, "variants": VARIANTS, "errors": errors}
+    return {**format_ratio(ratio, "c", "batch"), **rates, "variants": VARIANTS, "errors": errors}
 
 
 def errors_at(step: str, case: Manoeuvre) -> Figure:
     """The errors of a manoeuvre at a step: ours, and those of the rival in C."""
-    own = ours.solution(ours.ready(case, step).interpreted())
-    rival = in_c.InC(case, _seconds(step)).solution()
+    own = ours.solution(ours.prepare_run(case, step).interpreted())
+    rival = in_c.CompiledRival(case, _seconds(step)).solution()
     return {"modewright": errors_of(case, own), "c": errors_of(case, rival)}
 
 

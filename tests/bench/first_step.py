@@ -14,16 +14,16 @@ import tempfile
 import time
 from typing import Any
 
-from codegen.cache import VARIABLE
+from codegen.cache import CACHE_VARIABLE
 from tests.bench import ours
 from tests.bench.manoeuvre import TIP_OUT
 from tests.bench.rivals import ROOT
 
 
-def first_step() -> dict[str, Any]:
+def measure_first_step() -> dict[str, Any]:
     """Return what a new process with an empty cache prints."""
     with tempfile.TemporaryDirectory() as folder:
-        environ = {**os.environ, VARIABLE: folder}
+        environ = {**os.environ, CACHE_VARIABLE: folder}
         command = [sys.executable, "-m", "tests.bench.first_step"]
         done = subprocess.run(
             command, cwd=ROOT, env=environ, capture_output=True, text=True, check=True
@@ -35,8 +35,8 @@ def first_step() -> dict[str, Any]:
 def main() -> None:
     """Load, check, lower, print, compile, load and run; say what each side took."""
     start = time.process_time()
-    run = ours.ready(TIP_OUT, "5 ms").compiled()
-    assert run.carry_out()
+    run = ours.prepare_run(TIP_OUT, "5 ms").compiled()
+    assert run.run()
     own = time.process_time() - start
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     compiler = children.ru_utime + children.ru_stime

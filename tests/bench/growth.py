@@ -23,9 +23,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullLocator
 
-from language.signal import Piece, Stimulus
+from language.signal import Stimulus, StimulusPiece
 from tests.verify.processor import peak_megabytes
-from tests.verify.store import ROOT, write
+from tests.verify.store import ROOT, write_json
 
 PAGE, PICTURE, JSON = (
     ROOT / "docs" / "growth.md",
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for curve, sizes in CURVES.items()
     }
     if given.most is None:
-        write(JSON, {name: [asdict(one) for one in points] for name, points in found.items()})
+        write_json(JSON, {name: [asdict(one) for one in points] for name, points in found.items()})
         PAGE.write_text(page(found), encoding="utf-8")
         picture(found).savefig(PICTURE, dpi=110, metadata={"Software": None})
     return 0
@@ -170,7 +170,7 @@ def _lasting(seconds: int, folder: Path) -> dict[str, float]:
     from modewright.compiled import run_in_c
 
     loaded = load("ev_driveline_ideal", "tip_out", root=ROOT)
-    gentle = {"T_req": Stimulus((Piece(Fraction(0), GENTLE),))}
+    gentle = {"T_req": Stimulus((StimulusPiece(Fraction(0), GENTLE),))}
     every = dataclasses.replace(loaded.scenario, every=Fraction(1, 100), inputs=gentle)
     run_in_c(loaded.system, dataclasses.replace(every, horizon=Fraction(1, 10)))
     begin = _used()
@@ -182,10 +182,10 @@ def _variants(count: int, folder: Path) -> dict[str, float]:
     from tests.bench.manoeuvre import TIP_OUT
     from tests.bench.variants import Sweep
 
-    Sweep(TIP_OUT, 8).ours(1)
+    Sweep(TIP_OUT, 8).run_ours(1)
     sweep = Sweep(TIP_OUT, count)
     begin = _used()
-    sweep.ours(1)
+    sweep.run_ours(1)
     return {"carried out": _used() - begin}
 
 

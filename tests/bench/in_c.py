@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import FLAGS, compiler
+from codegen.build import FLAGS, find_compiler
 from tests.bench.manoeuvre import Manoeuvre
 from tests.bench.truth import Solution
 
@@ -31,7 +31,7 @@ def library() -> ctypes.CDLL:
     BUILD.mkdir(parents=True, exist_ok=True)
     target = BUILD / "driveline_rk4.so"
     source = PEERS / "driveline_rk4.c"
-    command = [*compiler(), *FLAGS, "-fPIC", "-shared", "-o", str(target), str(source), "-lm"]
+    command = [*find_compiler(), *FLAGS, "-fPIC", "-shared", "-o", str(target), str(source), "-lm"]
     subprocess.run(command, check=True)
     loaded = ctypes.CDLL(str(target))
     pointer, whole, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
@@ -42,7 +42,7 @@ def library() -> ctypes.CDLL:
     return loaded
 
 
-def parameters(case: Manoeuvre) -> Reals:
+def rival_parameters(case: Manoeuvre) -> Reals:
     """Return the parameters of a manoeuvre in the rival's order (23,)."""
     p = case.values()
     r_w, m = p["r_w"], p["m"]
@@ -54,13 +54,13 @@ def parameters(case: Manoeuvre) -> Reals:
     return np.array([*plant, drag, 0, 0, p["k_hs"], p["c_hs"], p["alpha"], *ends], dtype=float)
 
 
-class InC:
+class CompiledRival:
     """One manoeuvre at one step [s], with located events."""
 
     def __init__(self, case: Manoeuvre, step: float) -> None:
         """Take the arrays that the rival reads and fills."""
         self.step = step
-        self.parameters = parameters(case)
+        self.parameters = rival_parameters(case)
         self.w_em = np.zeros(case.horizon_ms + 1)
         self.times, self.modes = np.zeros(MOST_EVENTS), np.zeros(MOST_EVENTS)
         self._arrays = [_at(a) for a in (self.w_em, self.times, self.modes)]
@@ -83,7 +83,7 @@ class InC:
         )
 
 
-def sweep(rows: Reals, step: float, threads: int = 1) -> Reals:
+def run_sweep(rows: Reals, step: float, threads: int = 1) -> Reals:
     """Run variants (n, 23) in some threads; return w_em, first contact, events, peak (n, 4)."""
     found = np.zeros((len(rows), SUMMARY))
     parts: Sequence[NDArray[np.int64]] = np.array_split(np.arange(len(rows)), threads)

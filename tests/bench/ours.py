@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
-from codegen.library import library_of
-from engine.planned import PlannedRun
+from codegen.library import load_library
+from engine.planned import CompiledRun
 from engine.simulate import simulate
 from engine.starting import programs_of
-from engine.stimulus import resolved
+from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
 from language.experiment import Scenario, System
 from language.program import Program
@@ -48,7 +48,7 @@ record: {{every: {every}, signals: [plant.w_em]}}
 
 
 @dataclass(frozen=True)
-class Ready:
+class PreparedRun:
     """A system and scenario that are loaded, checked and lowered: what can be run."""
 
     system: System
@@ -59,14 +59,14 @@ class Ready:
         """Run once by the interpreter."""
         return simulate(self.system, self.scenario, programs=self.programs)
 
-    def compiled(self) -> PlannedRun:
+    def compiled(self) -> CompiledRun:
         """Return the run in compiled C, which can be carried out again and again."""
-        scenario = resolved(self.system, self.scenario)
-        return PlannedRun(self.system, scenario, self.programs, library_of)
+        scenario = resolve_recording(self.system, self.scenario)
+        return CompiledRun(self.system, scenario, self.programs, load_library)
 
 
 @cache
-def ready(case: Manoeuvre, step: str, every: str | None = None) -> Ready:
+def prepare_run(case: Manoeuvre, step: str, every: str | None = None) -> PreparedRun:
     """Return a manoeuvre at a step like `4 ms`; the motor's speed is kept at each of them."""
     w_em, w_w, theta_d, _ = (_digits(value) for value in case.start())
     changed = {
@@ -91,7 +91,7 @@ def ready(case: Manoeuvre, step: str, every: str | None = None) -> Ready:
         for number, part in enumerate(text.split("---\n")):
             (Path(folder) / "spec" / f"{number}.yaml").write_text(part)
         loaded = mw.load("bench", "bench_run", root=Path(folder))
-    return Ready(loaded.system, loaded.scenario, programs_of(loaded.system, loaded.scenario))
+    return PreparedRun(loaded.system, loaded.scenario, programs_of(loaded.system, loaded.scenario))
 
 
 def solution(trajectory: Trajectory) -> Solution:

@@ -26,7 +26,7 @@ class RivalMissing(Exception):
     """A rival cannot be measured: the message says what is missing."""
 
 
-def measured(name: str, pairs: int) -> dict[str, Any]:
+def measure_rival(name: str, pairs: int) -> dict[str, Any]:
     """Return a rival's processor time over that of scipy, and its errors. Raises RivalMissing."""
     module, package = RIVALS[name]
     python = _environment(name, package)

@@ -15,9 +15,9 @@ import numpy as np
 
 from codegen.build import FLAGS, compiler_version
 from tests.bench import figures, growth
-from tests.bench.charts import charts
-from tests.bench.first_step import first_step
-from tests.bench.rivals import RIVALS, RivalMissing, measured
+from tests.bench.charts import measure_charts
+from tests.bench.first_step import measure_first_step
+from tests.bench.rivals import RIVALS, RivalMissing, measure_rival
 from tests.bench.showing import table
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -47,27 +47,27 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error(f"`{name}` is none of {', '.join(RIVALS)}")
     cases = (figures.TIP_OUT, figures.CHATTER)
     found: dict[str, Any] = {
-        "machine": machine(),
+        "machine": machine_info(),
         "single_run": single_run(given.pairs),
-        "chart": charts(given.pairs),
-        "first_step": first_step(),
+        "chart": measure_charts(given.pairs),
+        "first_step": measure_first_step(),
         "sweep": {"batch_over_c": figures.batch_over_c(given.pairs)},
         "accuracy": {
             step: {case.name: figures.errors_at(step, case) for case in cases}
             for step in figures.STEPS
         },
     }
-    found["rivals"] = {name: rival(name, given.pairs) for name in peers}
+    found["rivals"] = {name: rival_figure(name, given.pairs) for name in peers}
     given.out.parent.mkdir(parents=True, exist_ok=True)
     given.out.write_text(json.dumps(found, indent=1) + "\n")
     lines = table(found)
     print("\n".join(lines))
     if given.page:
-        PAGE.write_text(with_figures(PAGE.read_text(), lines))
+        PAGE.write_text(insert_figures(PAGE.read_text(), lines))
     return 0
 
 
-def with_figures(page: str, lines: list[str]) -> str:
+def insert_figures(page: str, lines: list[str]) -> str:
     """Return a page whose last part are the figures."""
     head, mark, _ = page.partition(FIGURES)
     if not mark:
@@ -84,15 +84,15 @@ def single_run(pairs: int) -> dict[str, Any]:
     return {**found, "interpreter_over_scipy": figures.interpreter_over_scipy(pairs)}
 
 
-def rival(name: str, pairs: int) -> dict[str, Any]:
+def rival_figure(name: str, pairs: int) -> dict[str, Any]:
     """Return the figure of a tool in an environment of its own, or why there is none."""
     try:
-        return measured(name, pairs)
+        return measure_rival(name, pairs)
     except RivalMissing as missing:
         return {"missing": str(missing)}
 
 
-def machine() -> dict[str, Any]:
+def machine_info() -> dict[str, Any]:
     """Return where and with what the figures were measured."""
     return {
         "processor": _processor(),

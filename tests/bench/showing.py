@@ -7,17 +7,17 @@ from typing import Any
 
 from tests.bench.manoeuvre import Manoeuvre
 from tests.bench.timing import Ratio
-from tests.bench.truth import Solution, accuracy, truth
+from tests.bench.truth import Solution, accuracy, reference_solution
 
 Figure = dict[str, Any]
 
 
 def errors_of(case: Manoeuvre, found: Solution) -> Figure:
     """Return the errors of a solution, by name."""
-    return asdict(accuracy(found, truth(case)))
+    return asdict(accuracy(found, reference_solution(case)))
 
 
-def shown(ratio: Ratio, name: str, other: str) -> Figure:
+def format_ratio(ratio: Ratio, name: str, other: str) -> Figure:
     """Return a ratio as it stands in build/bench.json: quartiles, and both times [ms]."""
     return {
         "median": ratio.median,

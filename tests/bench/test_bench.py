@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import optimised
-from codegen.library import library_of
+from codegen.build import flags_at_level
+from codegen.library import load_library
 from tests.bench import charts, figures, ours, rivals, run, timing, variants
 from tests.bench.in_c import HERE, PEERS
 from tests.bench.manoeuvre import Manoeuvre
@@ -35,8 +35,8 @@ def test_a_small_run_has_every_figure_with_its_errors(
     monkeypatch.setattr(figures, "STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "COMPILED_STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "VARIANTS", 4)
-    monkeypatch.setattr(ours, "library_of", partial(library_of, flags=optimised("O0")))
-    monkeypatch.setattr(variants, "library_of", partial(library_of, flags=optimised("O0")))
+    monkeypatch.setattr(ours, "library_of", partial(load_library, flags=flags_at_level("O0")))
+    monkeypatch.setattr(variants, "library_of", partial(load_library, flags=flags_at_level("O0")))
     monkeypatch.setattr(timing, "SHORTEST", 0.0)
     monkeypatch.setattr(charts, "TICKS_IN_C", 2000)
     monkeypatch.setattr(run, "first_step", lambda: {"total_s": 1.0, "compiler_s": 0.5})
@@ -69,22 +69,22 @@ def test_a_rival_without_its_environment_is_left_out_with_the_reason(
 ) -> None:
     monkeypatch.setattr(rivals, "ROOT", tmp_path)
     monkeypatch.setattr(rivals, "UV", tmp_path / "uv")
-    assert run.rival("diffrax", 1) == {
+    assert run.rival_figure("diffrax", 1) == {
         "missing": f"diffrax: {tmp_path / 'uv'} is missing: make setup"
     }
     (tmp_path / "uv").write_text("#!/bin/sh\necho 'no index in reach' >&2\nexit 2\n")
     (tmp_path / "uv").chmod(0o755)
-    assert run.rival("diffrax", 1)["missing"].endswith("no index in reach")
+    assert run.rival_figure("diffrax", 1)["missing"].endswith("no index in reach")
     with pytest.raises(SystemExit):
         run.main(["--peers", "diffraks"])
 
 
 def test_the_page_ends_with_the_figures_of_the_last_run() -> None:
     page = run.PAGE.read_text()
-    once = run.with_figures(page, ["a", "b"])
+    once = run.insert_figures(page, ["a", "b"])
     assert once.startswith(page.partition("## Figures")[0])
     assert once.endswith("## Figures\n\n```text\na\nb\n```\n")
-    assert run.with_figures(once, ["c"]) == run.with_figures(page, ["c"])
+    assert run.insert_figures(once, ["c"]) == run.insert_figures(page, ["c"])
 
 
 def test_a_ratio_is_the_median_of_pairs_with_its_quartiles() -> None:

@@ -27,7 +27,7 @@ class Ratio:
     seconds_other: float
 
 
-def interleaved(run: Callable[[], object], other: Callable[[], object], pairs: int) -> Ratio:
+def time_interleaved(run: Callable[[], object], other: Callable[[], object], pairs: int) -> Ratio:
     """Return how much processor time one thing takes over another, each warmed up before."""
     counts = [_count(thing) for thing in (run, other)]
     ratios, ours, theirs = [], [], []

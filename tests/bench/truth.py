@@ -64,7 +64,7 @@ def accuracy(found: Solution, expected: Solution) -> Accuracy:
 
 
 @cache
-def truth(case: Manoeuvre) -> Solution:
+def reference_solution(case: Manoeuvre) -> Solution:
     """Return the solution of a manoeuvre."""
     with mp.workdps(DIGITS):
         return _Series(case).run()

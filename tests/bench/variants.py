@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.library import library_of
-from engine.batch import Batch, Measure
-from engine.planned_batch import PlannedBatch
+from codegen.library import load_library
+from engine.batch import Batch, SignalStatistic
+from engine.planned_batch import CompiledBatch
 from tests.bench import in_c, ours
 from tests.bench.manoeuvre import NOMINAL, Manoeuvre
 
@@ -55,14 +55,14 @@ class Sweep:
         parts = {name: 1 + part * draws.uniform(-1, 1, count) for name, part in PARTS.items()}
         self.values = {name: float(NOMINAL[name]) * part for name, part in parts.items()}
         self.rows = self._rows(case)
-        self.planned = PlannedBatch(self._batch(case), library_of)
+        self.planned = CompiledBatch(self._batch(case), load_library)
 
-    def ours(self, threads: int) -> Summary:
+    def run_ours(self, threads: int) -> Summary:
         """Carry all out by compiled C of ours."""
-        found = self.planned.carry_out(threads)
+        found = self.planned.run(threads)
         if found.note != "compiled" or found.stopped:
             raise RuntimeError(f"{found.note}, stopped: {list(found.stopped.values())[:1]}")
-        measures = found.measures
+        measures = found.statistics
         return Summary(
             measures["w_em"],
             found.event_times[:, 1],
@@ -70,9 +70,9 @@ class Sweep:
             measures["peak"],
         )
 
-    def theirs(self, threads: int, step: float = STEP) -> Summary:
+    def run_rival(self, threads: int, step: float = STEP) -> Summary:
         """Carry all out by the rival."""
-        return Summary(*in_c.sweep(self.rows, step, threads).T)
+        return Summary(*in_c.run_sweep(self.rows, step, threads).T)
 
     def _rows(self, case: Manoeuvre) -> Reals:
         cases = [
@@ -86,14 +86,14 @@ class Sweep:
             for k in range(len(self.values["m"]))
         ]
         self.twists = np.array([float(one.start()[2]) for one in cases])
-        return np.array([in_c.parameters(one) for one in cases])
+        return np.array([in_c.rival_parameters(one) for one in cases])
 
     def _batch(self, case: Manoeuvre) -> Batch:
-        ready = ours.ready(case, f"{round(1000 * STEP)} ms")
+        ready = ours.prepare_run(case, f"{round(1000 * STEP)} ms")
         swept = {f"plant.{name}": values for name, values in self.values.items()}
         measures = (
-            Measure("w_em", "plant.w_em", "final"),
-            Measure("peak", "plant.T_hs", "peak", Fraction(0)),
+            SignalStatistic("w_em", "plant.w_em", "final"),
+            SignalStatistic("peak", "plant.T_hs", "peak", Fraction(0)),
         )
         return Batch(
             system=ready.system,
@@ -101,6 +101,6 @@ class Sweep:
             count=len(self.twists),
             parameters=swept,
             initial={"plant.theta_d": self.twists, "plant.theta_b": self.values["alpha"]},
-            measures=measures,
-            most_events=2,
+            statistics=measures,
+            max_events=2,
         )

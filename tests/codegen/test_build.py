@@ -11,12 +11,12 @@ import pytest
 from codegen import build
 from codegen.build import (
     BuildError,
-    ToolMissing,
     compile_program,
-    compiler,
+    find_compiler,
     run_executable,
 )
-from codegen.harness import executable, fed, observed
+from codegen.harness import build_executable, compared_variables, tick_inputs
+from language.missing import MissingToolError
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
 
@@ -48,7 +48,7 @@ def script(path: Path, text: str) -> Path:
 
 def test_cc_names_the_compiler_with_its_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "sh -c 'a b'")
-    assert compiler() == ["sh", "-c", "a b"]
+    assert find_compiler() == ["sh", "-c", "a b"]
 
 
 def test_without_cc_the_first_of_cc_gcc_clang_is_taken(
@@ -58,14 +58,14 @@ def test_without_cc_the_first_of_cc_gcc_clang_is_taken(
     monkeypatch.setenv("PATH", str(tmp_path))
     for name in ("clang", "gcc", "cc"):
         script(tmp_path / name, SILENT)
-        assert compiler() == [name]
+        assert find_compiler() == [name]
 
 
 def test_a_compiler_that_is_missing_comes_with_the_line_that_installs_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
-    with pytest.raises(ToolMissing) as caught:
+    with pytest.raises(MissingToolError) as caught:
         compare(heater_tape())
     assert str(caught.value) == (
         "the C compiler `no-such-compiler` is missing: apt-get install gcc libc6-dev"
@@ -75,8 +75,8 @@ def test_a_compiler_that_is_missing_comes_with_the_line_that_installs_it(
 def test_no_compiler_at_all_is_missing_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ToolMissing, match="`cc` is missing: apt-get install gcc"):
-        compiler()
+    with pytest.raises(MissingToolError, match="`cc` is missing: apt-get install gcc"):
+        find_compiler()
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_a_compiler_that_hangs_is_a_build_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def hangs(*arguments: object, **options: object) -> None:
-        raise subprocess.TimeoutExpired("cc", build.SECONDS)
+        raise subprocess.TimeoutExpired("cc", build.TIMEOUT)
 
     monkeypatch.setattr("codegen.build.subprocess.run", hangs)
     with pytest.raises(BuildError, match="120 s"):
@@ -121,7 +121,7 @@ def test_a_compiler_that_hangs_is_a_build_error(
 
 
 def test_the_folder_of_an_executable_goes_away(temporary: Path) -> None:
-    with executable(heater()) as target:
+    with build_executable(heater()) as target:
         (folder,) = temporary.iterdir()
         assert {path.name for path in folder.iterdir()} >= {"heater.c", "main.c"}
         assert run_executable(target, b"") == b""
@@ -131,16 +131,16 @@ def test_the_folder_of_an_executable_goes_away(temporary: Path) -> None:
 
 
 def test_an_error_while_it_is_used_leaves_nothing_either(temporary: Path) -> None:
-    with pytest.raises(RuntimeError), executable(heater()):
+    with pytest.raises(RuntimeError), build_executable(heater()):
         raise RuntimeError
     assert list(temporary.iterdir()) == []
 
 
 def test_all_that_an_instance_carries_is_observed() -> None:
     program = heater()
-    groups = {item.name.partition(".")[0] for item in observed(program)}
+    groups = {item.name.partition(".")[0] for item in compared_variables(program)}
     assert groups == {"state", "latched", "equation", "timer", "memory"}
-    kinds = {item.name: item.kind for item in observed(program)}
+    kinds = {item.name: item.kind for item in compared_variables(program)}
     assert kinds["equation.P"] == "real"
     assert kinds["equation.low"] == kinds["memory.mode"] == kinds["timer.rest_heating"] == "whole"
-    assert [variable.name for variable in fed(program)] == ["input.T", "input.request"]
+    assert [variable.name for variable in tick_inputs(program)] == ["input.T", "input.request"]

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from codegen import cache, harness
-from codegen.build import FLAGS, compiler, linked, run_executable
-from codegen.harness import executable
+from codegen.build import FLAGS, find_compiler, run_compiler, run_executable
+from codegen.harness import build_executable
 from codegen.objects import object_of
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
@@ -34,7 +34,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
     def counting(command: list[str], target: Path) -> None:
         made.append(target)
-        linked(command, target)
+        run_compiler(command, target)
 
     monkeypatch.setattr(harness, "linked", counting)
     return made
@@ -59,10 +59,10 @@ def test_other_flags_another_compiler_and_another_program_are_compiled(
     folder: Path, compiled: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for flags in (FLAGS, (*FLAGS, "-O1")):
-        with executable(heater(), flags):
+        with build_executable(heater(), flags):
             pass
     monkeypatch.setattr(harness, "compiler_version", lambda named: "another")
-    with executable(heater()):
+    with build_executable(heater()):
         pass
     assert len(compiled) == len(programs(folder)) == 3
 
@@ -143,19 +143,19 @@ def test_a_link_and_a_file_are_no_cache_folder(folder: Path, tmp_path: Path) -> 
     folder.unlink()
     folder.write_text("")
     assert cache.cache_fault(folder)
-    with executable(heater()) as target:
+    with build_executable(heater()) as target:
         assert run_executable(target, b"") == b""
 
 
 def test_the_oldest_programs_go_after_a_day(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "MOST_PROGRAMS", 1)
-    with executable(heater()):
+    monkeypatch.setattr(cache, "MAX_PROGRAMS", 1)
+    with build_executable(heater()):
         pass
     (old,) = programs(folder)
     (seal,) = (path for path in files(folder) if path.name == f"{old.name}.sha256")
-    for path in (old, seal, folder / cache.TIDIED):
+    for path in (old, seal, folder / cache.CLEANUP_STAMP):
         os.utime(path, (1.0, 1.0))
-    with executable(heater(), (*FLAGS, "-O1")) as new:
+    with build_executable(heater(), (*FLAGS, "-O1")) as new:
         assert programs(folder) == [new]
     assert len(files(folder)) == 3, "its seal has gone too; the new one's and the stamp are there"
 
@@ -163,29 +163,29 @@ def test_the_oldest_programs_go_after_a_day(folder: Path, monkeypatch: pytest.Mo
 def test_a_folder_is_looked_through_once_an_hour(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
-    cache.tidy(tmp_path)
+    monkeypatch.setattr(cache, "MAX_PROGRAMS", 0)
+    cache.remove_old_programs(tmp_path)
     old, other = tmp_path / f"{'a' * 64}.so", tmp_path / "a file of another kind"
     thresholds = tmp_path / f"{'d' * 64}.json"
     for path in (old, other, thresholds):
         path.write_text("")
         os.utime(path, (1.0, 1.0))
-    cache.tidy(tmp_path)
+    cache.remove_old_programs(tmp_path)
     assert old.exists()
-    os.utime(tmp_path / cache.TIDIED, (time.time() - cache.HOUR - 1.0,) * 2)
-    cache.tidy(tmp_path)
+    os.utime(tmp_path / cache.CLEANUP_STAMP, (time.time() - cache.HOUR - 1.0,) * 2)
+    cache.remove_old_programs(tmp_path)
     assert not old.exists() and other.exists()
     assert thresholds.exists(), "no program belongs to it"
 
 
 def test_what_was_read_today_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
+    monkeypatch.setattr(cache, "MAX_PROGRAMS", 0)
     library, recipe = (tmp_path / f"{'b' * 64}.{ending}" for ending in ("so", "json"))
     for path in (library, recipe):
         path.write_text("")
         os.utime(path, (1.0, 1.0))
     os.utime(library, (time.time(), 1.0))
-    cache.tidy(tmp_path)
+    cache.remove_old_programs(tmp_path)
     assert library.exists() and recipe.exists(), "they belong together"
 
 
@@ -193,15 +193,15 @@ def test_folders_inside_are_looked_through_but_no_links(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Compiled candidates of a diagnosis have a folder of their own there."""
-    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
+    monkeypatch.setattr(cache, "MAX_PROGRAMS", 0)
     inside, elsewhere = tmp_path / "kept" / "candidates", tmp_path / "elsewhere"
     for folder in (inside, elsewhere):
         folder.mkdir(parents=True)
         (folder / f"{'c' * 64}.so").write_text("")
         os.utime(folder / f"{'c' * 64}.so", (1.0, 1.0))
     (tmp_path / "kept" / "link").symlink_to(elsewhere)
-    cache.tidy(tmp_path / "kept")
-    assert [path.name for path in inside.iterdir()] == [cache.TIDIED]
+    cache.remove_old_programs(tmp_path / "kept")
+    assert [path.name for path in inside.iterdir()] == [cache.CLEANUP_STAMP]
     assert (elsewhere / f"{'c' * 64}.so").exists()
 
 
@@ -212,7 +212,7 @@ def objects(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     def counting(command: list[str], target: Path) -> None:
         made.append(Path(command[-1]).name)
-        linked(command, target)
+        run_compiler(command, target)
 
     monkeypatch.setattr("codegen.objects.linked", counting)
     return made
@@ -222,10 +222,10 @@ def test_what_is_the_same_in_many_programs_is_compiled_once(
     folder: Path, compiled: list[Path], objects: list[str]
 ) -> None:
     for name in ("room", "other"):
-        with executable(dataclasses.replace(heater(), name=name)):
+        with build_executable(dataclasses.replace(heater(), name=name)):
             pass
     assert (len(compiled), objects) == (2, PARTS)
-    with executable(heater(), (*FLAGS, "-O1")):
+    with build_executable(heater(), (*FLAGS, "-O1")):
         pass
     assert (len(compiled), objects) == (3, PARTS * 2)
     assert (folder / "objects").stat().st_mode & 0o777 == 0o700
@@ -248,7 +248,7 @@ def test_an_object_follows_from_what_is_read(tmp_path: Path, objects: list[str])
     for one, beside, count in ((1, "a", 1), (1, "b", 1), (2, "b", 2)):
         header.write_text(f"#define ONE {one}\nint ha_one(void);\n")
         (tmp_path / "beside.h").write_text(beside)
-        object_of(source, [*compiler(), *FLAGS], "here", tmp_path / "room")
+        object_of(source, [*find_compiler(), *FLAGS], "here", tmp_path / "room")
         assert objects == ["ha_math.c"] * count
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS
-from codegen.cmake import FILE, OWN, cmake_file
+from codegen.cmake import FILE, SET_BY_CMAKE, emit_cmake_file
 from modewright.api import program
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 USER = """
@@ -26,12 +26,12 @@ target_link_libraries(user PRIVATE estimator)
 
 
 def test_the_flags_that_define_the_bits_are_in_it() -> None:
-    text = cmake_file(program("estimator"))[FILE]
-    for flag in set(FLAGS) - set(OWN):
+    text = emit_cmake_file(program("estimator"))[FILE]
+    for flag in set(FLAGS) - set(SET_BY_CMAKE):
         assert flag in text
     assert "C_EXTENSIONS OFF" in text
     assert "  ha_math.c\n" in text
-    assert "ha_math" not in cmake_file(program("contactor"))[FILE]
+    assert "ha_math" not in emit_cmake_file(program("contactor"))[FILE]
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake: make system-packages")
@@ -40,7 +40,7 @@ def test_cmake_builds_and_installs_it_and_a_project_of_a_user_takes_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = ["generate", "estimator", "--out", "build", "--cmake"]
-    assert exit_code(partial(app, words, standalone_mode=False)) == 0
+    assert run_with_exit_code(partial(app, words, standalone_mode=False)) == 0
     page = (ROOT / "docs" / "c_code.md").read_text()
     (tmp_path / "main.c").write_text(page.partition("```c\n")[2].partition("```")[0])
     (tmp_path / FILE).write_text(USER)
@@ -53,7 +53,7 @@ def test_cmake_builds_and_installs_it_and_a_project_of_a_user_takes_it(
 
 def test_it_goes_with_one_automaton(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["generate", "--all", "--cmake"]
-    assert exit_code(partial(app, words, standalone_mode=False)) == 2
+    assert run_with_exit_code(partial(app, words, standalone_mode=False)) == 2
     assert "not with --all" in capsys.readouterr().err
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import written_of
-from codegen.proofs.effect import called_by, places_of, with_effects, with_turns
-from codegen.proofs.outline import function_of, outlined_but
-from codegen.source import c_files, c_program
+from codegen.proofs.contract import write_contracts
+from codegen.proofs.effect import add_effect_contracts, add_loop_assigns, called_by, places_of
+from codegen.proofs.outline import function_of, outline_except
+from codegen.source import emit_c_files, run_c_passes
 from language.program import Program
 from modewright.api import program
 
@@ -21,7 +21,7 @@ JUMPS = ("jump_drive", "jump_gap", "jump_coast")
 @cache
 def printed() -> tuple[Program, str]:
     made = program("hko")
-    return c_program(made, by_amount=False), c_files(made, by_amount=False)["hko.c"]
+    return run_c_passes(made, by_magnitude=False), emit_c_files(made, by_magnitude=False)["hko.c"]
 
 
 def contract_of(text: str, name: str) -> str:
@@ -35,13 +35,13 @@ def test_what_transitions_run_has_a_contract_and_a_spread_has_none() -> None:
     called = called_by(made, JUMPS)
     assert {"back_drive_0", "rest_gap", "run_gap", "step_no_contact", "hold"} <= set(called)
     assert not {*JUMPS, "rows_gap_no_contact", "correct_gap"} & set(called)
-    told = with_effects(made, text, called)
+    told = add_effect_contracts(made, text, called)
     assert len(re.findall(r"^/\*@", told, re.M)) == len(called)
 
 
 def test_a_contract_names_what_is_written_and_nothing_else() -> None:
     made, text = printed()
-    told = with_effects(made, text, called_by(made, JUMPS))
+    told = add_effect_contracts(made, text, called_by(made, JUMPS))
     assert "assigns *work;" in contract_of(told, "guards_drive_contact")
     assert "assigns self->run_mode;" in contract_of(told, "switch_drive_contact")
     back = contract_of(told, "back_drive_0")
@@ -54,7 +54,7 @@ def test_values_of_a_step_that_live_in_a_function_are_not_seen_by_its_caller(
     tmp_path: Path,
 ) -> None:
     made = program("estimator_simple")
-    written_of(made, c_files(made, by_amount=False), tmp_path)
+    write_contracts(made, emit_c_files(made, by_magnitude=False), tmp_path)
     text = (tmp_path / "estimator_simple.c").read_text()
     function = function_of(text, "jump_gap")
     assert "work" not in function.parameters and "Work scratch;" in function.body
@@ -69,7 +69,9 @@ def test_an_array_is_written_from_end_to_end() -> None:
 
 def test_turns_of_a_loop_may_write_what_the_function_may_and_what_lives_in_it() -> None:
     made, text = printed()
-    told = with_turns(function_of(text, "locate_no_contact"), places_of(made, "locate_no_contact"))
+    told = add_loop_assigns(
+        function_of(text, "locate_no_contact"), places_of(made, "locate_no_contact")
+    )
     assert (
         "/*@ loop invariant 0 <= halving <= 24; loop assigns halving, high, is_before_end, low"
         in (told)
@@ -80,7 +82,7 @@ def test_turns_of_a_loop_may_write_what_the_function_may_and_what_lives_in_it() 
 def test_choices_that_set_no_mode_stand_in_functions_of_their_own() -> None:
     _, text = printed()
     function = function_of(text, "jump_gap")
-    *parts, whole = outlined_but(function, ("self->mode", "self->fired"))
+    *parts, whole = outline_except(function, ("self->mode", "self->fired"))
     assert len(parts) == 12, "four counts, two ranges of each of four transitions"
     assert all("self->mode" not in part.body for part in parts)
     assert whole.body.count("self->mode =") == 6
@@ -95,6 +97,6 @@ def test_choices_that_set_no_mode_stand_in_functions_of_their_own() -> None:
 @pytest.mark.parametrize("name", ["contactor", "estimator_float32"])
 def test_modes_whose_transitions_run_nothing_stay_whole(name: str, tmp_path: Path) -> None:
     made = program(name)
-    asking = written_of(made, c_files(made, by_amount=False), tmp_path)
+    asking = write_contracts(made, emit_c_files(made, by_magnitude=False), tmp_path)
     assert [options[0] for _, options in asking] == ["-wp-rte", "-wp-rte"]
     assert all(names == [f"jump_{mode.name}" for mode in made.modes] for names, _ in asking)

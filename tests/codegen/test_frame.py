@@ -6,9 +6,9 @@ import shutil
 
 import pytest
 
-from codegen.frame import apart
+from codegen.frame import select_noinline_blocks
 from codegen.proofs.stack import LIMIT
-from codegen.source import c_files, c_program
+from codegen.source import emit_c_files, run_c_passes
 from codegen.tool import ARM_COMPILER
 from language.number import NumberType
 from modewright.api import program
@@ -16,25 +16,27 @@ from modewright.code import metrics
 
 
 def test_what_computes_much_has_a_frame_of_its_own() -> None:
-    found = apart(c_program(program("estimator")))
+    found = select_noinline_blocks(run_c_passes(program("estimator")))
     assert {"predict_drive", "half_no_contact", "series_coast_contact", "point"} <= found
     assert "rates_drive_contact" not in found, "pull_drive_contact alone runs it, and is apart"
     assert not found & {"run_gap", "latch", "remember"}
 
 
 def test_what_is_alike_in_all_modes_of_a_run_stands_once_and_apart() -> None:
-    made = c_program(program("hko"))
+    made = run_c_passes(program("hko"))
     stages = {"stage_1", "stage_2", "stage_3", "stage_4", "cubic", "hold"}
-    assert stages | {"rows_gap_no_contact", "columns_gap_no_contact"} <= apart(made)
-    assert "step_no_contact" not in apart(made), "it computes nothing itself"
+    assert stages | {"rows_gap_no_contact", "columns_gap_no_contact"} <= select_noinline_blocks(
+        made
+    )
+    assert "step_no_contact" not in select_noinline_blocks(made), "it computes nothing itself"
 
 
 def test_what_a_loop_runs_is_apart() -> None:
-    assert "look_drive_contact" in apart(c_program(program("hko")))
+    assert "look_drive_contact" in select_noinline_blocks(run_c_passes(program("hko")))
 
 
 def test_whole_numbers_are_not_computed_in_software() -> None:
-    assert "jump_drive" not in apart(c_program(program("hko")))
+    assert "jump_drive" not in select_noinline_blocks(run_c_passes(program("hko")))
 
 
 @pytest.mark.long
@@ -49,5 +51,5 @@ def test_a_step_of_the_recursive_observer_takes_little_stack(
 
 @pytest.mark.parametrize("name", ["estimator_float32", "driveline"])
 def test_float32_and_continuous_automata_stay_as_they_are(name: str) -> None:
-    assert apart(c_program(program(name))) == frozenset()
-    assert "NOT_INLINED" not in c_files(program(name))[f"{name}.c"]
+    assert select_noinline_blocks(run_c_passes(program(name))) == frozenset()
+    assert "NOT_INLINED" not in emit_c_files(program(name))[f"{name}.c"]

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS, compile_program, run_executable
-from codegen.gate import LATCH, LATCH_EACH, WITHIN, centred, gated
-from codegen.mathematics import math_files
-from codegen.names import REAL
-from codegen.source import c_files
+from codegen.gate import LATCH, LATCH_EACH, WITHIN, fold_range_check, merge_range_checks
+from codegen.mathematics import emit_math_files
+from codegen.names import C_REAL_TYPE
+from codegen.source import emit_c_files
 from language.evaluate import evaluate
 from language.number import NumberType
-from language.operation import Binary, Branch, Call, Compare, Expr, Ref, Run, Unary, Value
+from language.operation import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
 from modewright.api import program as shipped
 from tests.language.making import program
 
@@ -38,23 +38,23 @@ def between(low: float, high: float) -> Expr:
 def test_one_comparison_says_what_two_said(x: float) -> None:
     for value in (x, math.nextafter(x, math.inf), math.nextafter(x, -math.inf)):
         test = between(-2.0, 2.0)
-        assert centred(test) == Compare("<=", Call("abs", (X,)), Value(2.0))
-        assert evaluate(centred(test), {"x": value}) == evaluate(test, {"x": value})
+        assert fold_range_check(test) == Compare("<=", Call("abs", (X,)), Value(2.0))
+        assert evaluate(fold_range_check(test), {"x": value}) == evaluate(test, {"x": value})
 
 
 @pytest.mark.parametrize(("low", "high"), [(-2.0, 3.0), (0.0, 2.0), (-2.0, 0.0), (-0.0, 2.0)])
 def test_a_range_around_0_is_one_comparison_of_bits(low: float, high: float) -> None:
-    assert centred(between(low, high)) == Call(WITHIN, (X, Value(low), Value(high)))
+    assert fold_range_check(between(low, high)) == Call(WITHIN, (X, Value(low), Value(high)))
 
 
 def test_outside_of_a_range_is_not_within_it() -> None:
     outside = Unary("not", between(-2.0, 3.0))
-    assert centred(outside) == Unary("not", Call(WITHIN, (X, Value(-2.0), Value(3.0))))
+    assert fold_range_check(outside) == Unary("not", Call(WITHIN, (X, Value(-2.0), Value(3.0))))
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.0, 2.0), (2.0, -2.0), (1.0, 3.0), (-3.0, -1.0)])
 def test_other_ranges_stay_two_comparisons(low: float, high: float) -> None:
-    assert centred(between(low, high)) == between(low, high)
+    assert fold_range_check(between(low, high)) == between(low, high)
 
 
 BITS = """\
@@ -97,9 +97,9 @@ def test_bits_say_what_two_comparisons_say(
     tmp_path: Path, number: NumberType, suffix: str, bits: int, multiplier: int
 ) -> None:
     """Any bits, NaN and infinities among them, and those around the ends."""
-    filled = {"suffix": suffix, "real": REAL[number], "bits": bits, "top": bits - 1}
+    filled = {"suffix": suffix, "real": C_REAL_TYPE[number], "bits": bits, "top": bits - 1}
     text = BITS.format(**filled, multiplier=multiplier)
-    for name, source in {**math_files(number), "main.c": text}.items():
+    for name, source in {**emit_math_files(number), "main.c": text}.items():
         (tmp_path / name).write_text(source)
     sources = [tmp_path / name for name in ("main.c", f"ha_math{suffix}.c")]
     compile_program(sources, tmp_path / "main", [*FLAGS, "-w"])
@@ -108,17 +108,17 @@ def test_bits_say_what_two_comparisons_say(
 
 def test_inputs_are_taken_at_once_or_each_apart() -> None:
     made = shipped("estimator")
-    blocks = gated(made).blocks
+    blocks = merge_range_checks(made).blocks
     (taken,) = blocks[LATCH]
     assert isinstance(taken, Branch)
     assert len(taken.then) == len(blocks[LATCH_EACH]) == len(made.blocks[LATCH]) > 1
-    assert taken.other == (Run(LATCH_EACH),)
+    assert taken.other == (RunBlock(LATCH_EACH),)
 
 
 def test_a_word_of_an_enumeration_is_not_asked_whether_it_is_below_0() -> None:
     """It is unsigned in C: gcc -Wextra warns of such a comparison."""
     made = program(KEYS)
-    text = c_files(made)["keys.c"]
+    text = emit_c_files(made)["keys.c"]
     assert text.count("in->key <= keys_key_ready") == text.count("in->level <= 9") == 2
     assert text.count("in->level >= 0") == 2
     assert ">= keys_key" not in text

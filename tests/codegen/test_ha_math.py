@@ -7,11 +7,11 @@ import random
 
 import pytest
 
-from language.evaluate import ELEMENTARY, Scalar, apply
+from language.evaluate import ELEMENTARY, Scalar, apply_function
 from language.functions import FUNCTIONS
-from lockstep.compare import Tape, compare
+from lockstep.compare import TickLog, compare
 from modewright.api import program
-from tests.lockstep.programs import Tick, taped
+from tests.lockstep.programs import Tick, record_ticks
 
 POINTS = 20_000
 SPEC = """\
@@ -75,7 +75,7 @@ def arguments() -> list[float]:
 
 
 @pytest.fixture(scope="module")
-def tape(tmp_path_factory: pytest.TempPathFactory) -> Tape:
+def tape(tmp_path_factory: pytest.TempPathFactory) -> TickLog:
     """The interpreter at all points; `v` and `w` are other points, special ones among them."""
     path = tmp_path_factory.mktemp("functions") / "functions.yaml"
     path.write_text(SPEC)
@@ -85,21 +85,21 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> Tape:
         {"input.u": u, "input.v": v, "input.w": w}
         for u, v, w in zip(points, others, reversed(others), strict=True)
     ]
-    return taped(program(str(path)), inputs)
+    return record_ticks(program(str(path)), inputs)
 
 
-def test_every_function_has_the_same_bits_in_c(tape: Tape) -> None:
+def test_every_function_has_the_same_bits_in_c(tape: TickLog) -> None:
     verdict = compare(tape)
     assert verdict.ticks == POINTS
     assert verdict.is_equal, str(verdict.first)
 
 
 @pytest.mark.parametrize("function", SIGNALS)
-def test_the_interpreter_has_the_bits_of_check_time(tape: Tape, function: str) -> None:
+def test_the_interpreter_has_the_bits_of_check_time(tape: TickLog, function: str) -> None:
     """Parameters are derived by language/evaluate.py, equations by the interpreter."""
     position = tape.names.index(f"equation.{SIGNALS[function]}")
     for u, record in zip(arguments()[:2000], tape.values, strict=False):
-        expected: Scalar = apply(function, [u])
+        expected: Scalar = apply_function(function, [u])
         assert same(float(tape.unpack(record)[position]), float(expected)), u
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.mcdc import EXPORTER, mcdc, with_proofs
-from codegen.proofs.infeasible import never, places_of, unshared
-from codegen.source import c_program
+from codegen.mcdc import EXPORTER, add_infeasibility_proofs, measure_mcdc
+from codegen.proofs.infeasible import decision_sites, prove_infeasible, unshare_expressions
+from codegen.source import run_c_passes
 from language.program import Program
 from modewright import code
 from modewright.api import program as program_named
 from tests.language.making import program
-from tests.lockstep.chance.kinds import chance
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.kinds import spec_of
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import program as program_of
 
 needs_llvm = pytest.mark.skipif(
@@ -74,9 +74,11 @@ HELD = {"latched.u": (-8.0, 8.0), "state.level": (0.0, 5.0)}
 
 def proven(made: Program, ranges: dict[str, tuple[float, float]] = HELD) -> dict[str, str]:
     """Return of each decision of which something is proven its text and `T`, `F` or `.`."""
-    used = unshared(c_program(made))
-    places = list(places_of(used))
-    found = never(used, ranges, [number for place in places for number in place.conditions])
+    used = unshare_expressions(run_c_passes(made))
+    places = list(decision_sites(used))
+    found = prove_infeasible(
+        used, ranges, [number for place in places for number in place.conditions]
+    )
     marks = {None: ".", True: "F", False: "T"}
     texts = {p.text: "".join(marks[found.get(n)] for n in p.conditions) for p in places}
     return {text: marks for text, marks in texts.items() if set(marks) != {"."}}
@@ -121,11 +123,11 @@ def test_a_nan_is_in_no_range() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_was_seen_is_never_proven_not_to_be(seed: int, tmp_path: Path) -> None:
     """A random spec on random inputs: of a condition that was true and false nothing is proven."""
-    spec = chance(seed)
+    spec = spec_of(seed)
     made = program_of(spec, "float64", tmp_path)
-    found = mcdc(made, [taped(spec, made, 200).inputs])
+    found = measure_mcdc(made, [record_ticks(spec, made, 200).inputs])
     hidden = [dataclasses.replace(d, shown=(False,) * len(d.shown)) for d in found.decisions]
-    said = with_proofs(dataclasses.replace(found, decisions=tuple(hidden)), made, {})
+    said = add_infeasibility_proofs(dataclasses.replace(found, decisions=tuple(hidden)), made, {})
     assert 0 < said.open < said.conditions
     for seen, claim in zip(found.decisions, said.decisions, strict=True):
         pairs = zip(seen.shown, claim.never, strict=True)
@@ -142,7 +144,7 @@ def test_each_condition_is_shown_or_proven() -> None:
 @pytest.mark.long
 def test_of_the_simple_estimator_twenty_conditions_never_turn() -> None:
     """Full counters, ranges of what is always inside: the other 37 are shown by libFuzzer."""
-    made = c_program(program_named("estimator_simple"))
+    made = run_c_passes(program_named("estimator_simple"))
     held = {
         "latched.y_em": (-400.0, 2400.0),
         "latched.y_w": (-50.0, 300.0),
@@ -151,8 +153,10 @@ def test_of_the_simple_estimator_twenty_conditions_never_turn() -> None:
         "state.w_w": (-50.0, 300.0),
         "state.theta_b": (-0.2, 0.2),
     }
-    places = list(places_of(made))
-    found = never(made, held, [number for place in places for number in place.conditions])
+    places = list(decision_sites(made))
+    found = prove_infeasible(
+        made, held, [number for place in places for number in place.conditions]
+    )
     assert len(found) == 20 and not any(found.values())
     assert sum(len(place.conditions) for place in places) == 57
 
@@ -160,17 +164,17 @@ def test_of_the_simple_estimator_twenty_conditions_never_turn() -> None:
 @pytest.mark.long
 def test_what_waits_in_a_queue_bounds_the_micro_steps() -> None:
     """`go` is heard at the beginning of a tick alone and `done` once: of three none are left."""
-    used = unshared(c_program(program(PRESS)))
-    asked = [p for p in places_of(used) if p.text == "work->is_over"]
+    used = unshare_expressions(run_c_passes(program(PRESS)))
+    asked = [p for p in decision_sites(used) if p.text == "work->is_over"]
     assert len(asked) >= 3
-    found = never(used, {}, [number for place in asked for number in place.conditions])
+    found = prove_infeasible(used, {}, [number for place in asked for number in place.conditions])
     assert all(found.get(number) is True for place in asked for number in place.conditions)
 
 
 def test_each_condition_is_an_object_of_its_own() -> None:
-    used = c_program(program(PRESS))
-    for made, is_told_apart in ((used, False), (unshared(used), True)):
-        found = [n for p in places_of(made) if p.text == "work->is_over" for n in p.conditions]
+    used = run_c_passes(program(PRESS))
+    for made, is_told_apart in ((used, False), (unshare_expressions(used), True)):
+        found = [n for p in decision_sites(made) if p.text == "work->is_over" for n in p.conditions]
         assert (len(set(found)) == len(found)) is is_told_apart
 
 

@@ -10,15 +10,15 @@ import pytest
 from codegen.proofs import reach
 from codegen.proofs.fact import AtMost, Within
 from codegen.proofs.holding import Number, holds
-from codegen.proofs.infeasible import places_of
-from codegen.proofs.invariant import invariant
-from codegen.proofs.symbolic import World
-from codegen.source import c_program
+from codegen.proofs.infeasible import decision_sites
+from codegen.proofs.invariant import find_invariants
+from codegen.proofs.symbolic import SymbolicProgram
+from codegen.source import run_c_passes
 from engine.interpreter import Interpreter
 from language.program import Program
 from modewright.api import program as program_named
-from tests.lockstep.chance.kinds import chance
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.kinds import spec_of
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import Spec, program as program_of
 from tests.verify.random_charts import programs
 
@@ -35,14 +35,18 @@ def test_facts_hold_in_runs_of_a_random_chart(number: int, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_facts_hold_in_runs_of_a_random_spec(seed: int, tmp_path: Path) -> None:
-    spec = chance(seed)
+    spec = spec_of(seed)
     checked(spec, program_of(spec, "float64", tmp_path))
 
 
 def checked(spec: Spec, made: Program) -> None:
     """Run the Program that C is printed of, and look at every fact after each tick."""
-    used = c_program(made)
-    facts = [fact for fact in invariant(World(used), {}, most_where=1) if fact.cut.loop is None]
+    used = run_c_passes(made)
+    facts = [
+        fact
+        for fact in find_invariants(SymbolicProgram(used), {}, most_where=1)
+        if fact.cut.loop is None
+    ]
     assert facts
 
     def look(run: Interpreter) -> None:
@@ -53,15 +57,15 @@ def checked(spec: Spec, made: Program) -> None:
         wrong = [fact for fact in facts if not holds(fact, number)]
         assert not wrong, wrong[:3]
 
-    taped(spec, made, TICKS, run=used, look=look)
+    record_ticks(spec, made, TICKS, run=used, look=look)
 
 
 @pytest.mark.long
 def test_of_a_chart_much_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Micro-steps, their log, histories, and which regions are left in which mode."""
     monkeypatch.setattr("codegen.proofs.invariant._last", lambda world: ())  # they take long
-    world = World(c_program(program_named("supervisor")))
-    facts = invariant(world, {}, most_where=1)
+    world = SymbolicProgram(run_c_passes(program_named("supervisor")))
+    facts = find_invariants(world, {}, most_where=1)
     said = {(f.cut.name, f.name, f.where): f.limits for f in facts if isinstance(f, Within)}
     drive = (("memory.mode", 3),)
     assert said["step", "memory.mode_operation_drive_torque", drive] == frozenset({0, 1, 2})
@@ -72,10 +76,13 @@ def test_of_a_chart_much_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_question_that_takes_too_long_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reach, "EFFORT", 100_000)
-    made = c_program(program_named("supervisor"))
-    world = World(made)
-    asked = reach.Reach(world, ())
+    made = run_c_passes(program_named("supervisor"))
+    world = SymbolicProgram(made)
+    asked = reach.Reachability(world, ())
     numbers = [
-        n for place in places_of(made) if place.text == "work->is_over" for n in place.conditions
+        n
+        for place in decision_sites(made)
+        if place.text == "work->is_over"
+        for n in place.conditions
     ]
     assert numbers and not any(asked.never(world.visits[n], True) for n in numbers)

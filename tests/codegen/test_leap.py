@@ -8,18 +8,18 @@ import re
 
 import pytest
 
-from codegen.leap import Leaps, leaping
-from codegen.source import c_files, stepped
+from codegen.leap import FastPathMode, add_fast_path
+from codegen.source import emit_c_files, restrict_to_step
 from engine.interpreter import Interpreter
-from language.number import NUMBERS, NumberType
+from language.number import NUMBER_TYPES, NumberType
 from language.operation import Branch
 from language.program import Program
-from language.traversal import block_reads, reads, walk
-from lockstep.compare import Tape, compare
+from language.traversal import block_reads, names_used, walk_ops
+from lockstep.compare import TickLog, compare
 from modewright.api import program as shipped
 from tests.language.making import program
 from tests.lockstep.heater import column
-from tests.lockstep.programs import taped
+from tests.lockstep.programs import record_ticks
 
 CART = """language: 1
 automaton: cart
@@ -64,19 +64,21 @@ def inputs(count: int = 400) -> list[dict[str, float | bool]]:
     ]
 
 
-LEAPS: tuple[Leaps, ...] = ("on", "anew")
+LEAPS: tuple[FastPathMode, ...] = ("on", "anew")
 
 
 def leaps(made: Program) -> set[str]:
-    return {name for name in leaping(stepped(made)).blocks if name.startswith("leap_")}
+    return {
+        name for name in add_fast_path(restrict_to_step(made)).blocks if name.startswith("leap_")
+    }
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 @pytest.mark.parametrize("method", ["euler", "midpoint", "rk4"])
 def test_a_leap_has_the_bits_of_the_engine(number: NumberType, method: str) -> None:
     made = cart(number, method)
     assert leaps(made) == {"leap_free", "leap_held"}
-    tape = taped(made, inputs())
+    tape = record_ticks(made, inputs())
     assert compare(tape).is_equal
     assert len(set(column(tape, "memory.mode"))) == 2
 
@@ -87,10 +89,10 @@ def test_a_leap_has_the_bits_of_the_engine(number: NumberType, method: str) -> N
 )
 def test_only_inputs_that_guards_read_are_looked_at(when: str, event: set[str]) -> None:
     made = cart(when=when)
-    tape = taped(made, inputs())
+    tape = record_ticks(made, inputs())
     assert compare(tape).is_equal
     assert len(set(column(tape, "memory.mode"))) == 2
-    text = c_files(made)["cart.c"]
+    text = emit_c_files(made)["cart.c"]
     assert set(re.findall(r"event_end = in->(\w+) != self", text)) == event
     assert set(re.findall(r"changed_\w+_end = in->(\w+) != self", text)) == {"F", "slope"}
 
@@ -98,15 +100,15 @@ def test_only_inputs_that_guards_read_are_looked_at(when: str, event: set[str]) 
 def test_a_mode_that_waits_takes_the_general_path() -> None:
     made = cart(wait=", wait: 35 ms")
     assert leaps(made) == {"leap_held"}
-    assert compare(taped(made, inputs())).is_equal
+    assert compare(record_ticks(made, inputs())).is_equal
 
 
 def test_an_automaton_without_guards_has_no_general_path() -> None:
     text = CART.format(number="float64", method="rk4", when="", wait="")
     made = program(text[: text.index("initial: free")] + "outputs: [x, v, pull]\n")
-    blocks = leaping(stepped(made)).blocks
+    blocks = add_fast_path(restrict_to_step(made)).blocks
     assert not {"segment", "limit"} & set(blocks)
-    assert compare(taped(made, inputs())).is_equal
+    assert compare(record_ticks(made, inputs())).is_equal
 
 
 @pytest.mark.parametrize(("count", "wanted"), [(1, 6), (2, 0)])
@@ -118,26 +120,26 @@ def test_regions_leap_together_with_the_chart_unless_there_are_too_many(
     modes = "low: {transitions: {high: {when: x > 0.9 m}}}, high: {}, idle: {}"
     beside = ", ".join(f"r{k}: {{initial: low, modes: {{{modes}}}}}" for k in range(count))
     made = program(text.replace("initial: free", f"regions: {{{beside}}}\ninitial: free"))
-    blocks = leaping(stepped(made), "anew").blocks
+    blocks = add_fast_path(restrict_to_step(made), "anew").blocks
     assert sum(name.startswith("leap_") for name in blocks) == wanted
     assert not leaps(made)
 
 
 def test_what_a_page_may_have_turned_is_computed_again() -> None:
     """`drag` reads a tunable parameter."""
-    block = leaping(stepped(cart())).blocks["leap_free"]
+    block = add_fast_path(restrict_to_step(cart())).blocks["leap_free"]
     before = block[:-1]
     assert isinstance(block[-1], Branch)
-    read = {name for name in reads([before]) if name.startswith("equation.")}
+    read = {name for name in names_used([before]) if name.startswith("equation.")}
     assert "equation.drag" not in read
-    text = c_files(cart())["cart.c"]
+    text = emit_c_files(cart())["cart.c"]
     leap = text[text.index("void leap_free(") :].partition("\n}\n")[0]
     assert "cal->d * self->state.v" in leap
 
 
 def test_a_page_that_turns_between_two_leaps_counts_at_once() -> None:
     made = cart()
-    tape = Tape(made, made.name)
+    tape = TickLog(made, made.name)
     stepper = Interpreter(made)
     for number, tick in enumerate(inputs(80)):
         if number == 40:
@@ -146,38 +148,38 @@ def test_a_page_that_turns_between_two_leaps_counts_at_once() -> None:
         for name, value in tick.items():
             stepper.set(name, value)
         stepper.run("step")
-        tape.record(stepper)
+        tape.record_tick(stepper)
     verdict = compare(tape)
     assert verdict.is_equal, str(verdict.first)
 
 
 def test_a_tick_that_runs_a_model_leaps_in_float32_alone() -> None:
-    blocks = leaping(stepped(shipped("estimator_float32"))).blocks
+    blocks = add_fast_path(restrict_to_step(shipped("estimator_float32"))).blocks
     assert {name for name in blocks if name.startswith("leap_gap_")} == {
         "leap_gap_drive_contact",
         "leap_gap_no_contact",
         "leap_gap_coast_contact",
     }
-    double = stepped(shipped("estimator"))
-    assert leaping(double) == double
+    double = restrict_to_step(shipped("estimator"))
+    assert add_fast_path(double) == double
 
 
 def test_a_name_is_not_given_twice() -> None:
     """Of modes `gap` and `gap_no_contact` that both run: what would be called the same stays."""
-    made = stepped(shipped("estimator_float32"))
+    made = restrict_to_step(shipped("estimator_float32"))
     taken = dataclasses.replace(made, blocks={**made.blocks, "leap_gap_no_contact": ()})
-    assert leaping(taken) == taken
+    assert add_fast_path(taken) == taken
 
 
 def test_what_happens_rarely_is_a_function_of_its_own() -> None:
-    text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
+    text = emit_c_files(shipped("estimator_float32"))["estimator_float32.c"]
     assert "static RARELY void through_events_gap(" in text
     assert "static RARELY void latch_each(" in text
-    assert "RARELY" not in c_files(shipped("contactor"))["contactor.c"]
+    assert "RARELY" not in emit_c_files(shipped("contactor"))["contactor.c"]
 
 
 def test_what_loops_alone_set_is_a_local_of_its_block() -> None:
-    text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
+    text = emit_c_files(shipped("estimator_float32"))["estimator_float32.c"]
     locate = text[text.index("void locate_no_contact(") :].partition("\n}\n")[0]
     assert "    float high;\n    bool is_before_end;\n    float low;\n" in locate
     assert "work->high" not in text
@@ -189,23 +191,23 @@ def test_a_sampled_automaton_without_a_run_stays_as_it_is() -> None:
         "initial: dark\nmodes: {dark: {transitions: {bright: {when: lit}}}, bright: {}}\n"
         "outputs: [mode]\n"
     )
-    assert leaping(stepped(made)) == stepped(made)
+    assert add_fast_path(restrict_to_step(made)) == restrict_to_step(made)
 
 
 def test_what_nobody_reads_is_not_computed() -> None:
-    for name, block in leaping(stepped(cart())).blocks.items():
+    for name, block in add_fast_path(restrict_to_step(cart())).blocks.items():
         if name.startswith("leap_"):
-            targets = [op.target for op in walk(block) if hasattr(op, "target")]
+            targets = [op.target for op in walk_ops(block) if hasattr(op, "target")]
             made = {target for target in targets if target.startswith("work.")}
-            assert made <= reads([block]) and len(made) > 10
+            assert made <= names_used([block]) and len(made) > 10
 
 
 def test_of_states_that_are_set_between_steps_no_equation_is_older_than_they_are() -> None:
-    made = stepped(shipped("blind_driveline"))
+    made = restrict_to_step(shipped("blind_driveline"))
     older = {
         one: {
             name
-            for title, block in leaping(made, one).blocks.items()
+            for title, block in add_fast_path(made, one).blocks.items()
             for name in block_reads(block)
             if title.startswith("leap_") and name.startswith("equation.")
         }
@@ -213,4 +215,4 @@ def test_of_states_that_are_set_between_steps_no_equation_is_older_than_they_are
     }
     read = {f"equation.{name}" for name in ("T_hs", "T_v", "w_d", "w_free")}
     assert older == {"on": read, "anew": set()}
-    assert leaping(made, "off") is made
+    assert add_fast_path(made, "off") is made

@@ -16,8 +16,8 @@ from hypothesis import example, given, strategies as st
 
 import modewright as mw
 from codegen.build import compile_program, run_executable
-from codegen.expression import literal
-from language.number import NUMBERS, NumberType, rounded
+from codegen.expression import format_literal
+from language.number import NUMBER_TYPES, NumberType, round_to_type
 from language.units import parse_unit
 from modewright.api import program
 
@@ -79,11 +79,11 @@ def bits(value: float, number: NumberType = "float64") -> bytes:
     return struct.pack(f"<{FORMATS[number]}", value)
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 def test_compiler_and_library_read_back_the_same_bits(number: NumberType, tmp_path: Path) -> None:
     specials = SPECIALS if number == "float64" else SPECIALS_SINGLE
     values = random_reals(number, COUNT) + [sign * x for x in specials for sign in (1.0, -1.0)]
-    texts = [literal(value, number) for value in values]
+    texts = [format_literal(value, number) for value in values]
     source = tmp_path / "reader.c"
     real, read = {"float64": ("double", "strtod"), "float32": ("float", "strtof")}[number]
     text = READER.replace("REAL", real).replace("READ", read)
@@ -107,7 +107,7 @@ def test_every_literal_of_generated_float32_code_is_read_back(name: str, tmp_pat
     lines = "\n".join([*(text.removesuffix("F") for text in texts), ""])
     found = run_executable(tmp_path / "reader", lines.encode())
     values = [struct.unpack_from("<f", found, 8 * k)[0] for k in range(len(texts))]
-    assert [literal(value, "float32") for value in values] == texts
+    assert [format_literal(value, "float32") for value in values] == texts
     assert found == b"".join(2 * bits(value, "float32") for value in values)
 
 
@@ -116,7 +116,7 @@ def test_every_literal_of_generated_float32_code_is_read_back(name: str, tmp_pat
 @example(1e16)
 @example(-0.0)
 def test_a_literal_is_a_double_in_c_and_the_shortest_one(value: float) -> None:
-    text = literal(value, "float64")
+    text = format_literal(value, "float64")
     assert bits(float(text)) == bits(value)
     assert "." in text or "e" in text
     assert len(text) <= len("-2.2250738585072014e-308")
@@ -127,16 +127,18 @@ def test_a_literal_is_a_double_in_c_and_the_shortest_one(value: float) -> None:
 @example(16777216.0)
 @example(-0.0)
 def test_a_literal_is_a_float_in_c_and_the_shortest_one(value: float) -> None:
-    text = literal(value, "float32")
+    text = format_literal(value, "float32")
     assert text.endswith("F") and ("." in text or "e" in text)
-    assert bits(rounded(Fraction(text[:-1]), "float32"), "float32") == bits(value + 0.0, "float32")
+    assert bits(round_to_type(Fraction(text[:-1]), "float32"), "float32") == bits(
+        value + 0.0, "float32"
+    )
     shortest = np.format_float_scientific(np.float32(value), unique=True)
     assert Fraction(text[:-1]) == Fraction(shortest)
     assert text.startswith("-") == (math.copysign(1.0, value) < 0.0)
 
 
 def test_truth_and_whole_numbers_have_literals_of_their_own() -> None:
-    assert [literal(value, "float64") for value in (True, False, 0, 7, -3)] == [
+    assert [format_literal(value, "float64") for value in (True, False, 0, 7, -3)] == [
         "true",
         "false",
         "0",
@@ -158,7 +160,7 @@ DECIMALS = st.builds(
 @example("179769313486231570000000000000000000000.0e270")
 def test_a_decimal_text_becomes_the_nearest_double(text: str) -> None:
     exact = Fraction(Decimal(text))
-    value = rounded(exact)
+    value = round_to_type(exact)
     assert bits(value) == bits(float(text))
     wrong = abs(Fraction(value) - exact)
     for neighbour in (math.nextafter(value, math.inf), math.nextafter(value, -math.inf)):
@@ -172,16 +174,16 @@ def test_a_tie_goes_to_the_even_double_and_a_hair_more_goes_up(low: float) -> No
     middle = (Fraction(low) + Fraction(high)) / 2
     even = low if struct.unpack("<Q", bits(low))[0] % 2 == 0 else high
     hair = Fraction(1, 10**400)
-    assert rounded(middle) == even
-    assert rounded(middle - hair) == low
-    assert rounded(middle + hair) == high
+    assert round_to_type(middle) == even
+    assert round_to_type(middle - hair) == low
+    assert round_to_type(middle + hair) == high
 
 
 def test_a_value_with_a_unit_is_rounded_once_not_twice() -> None:
     """1 km/h is 5/18 m/s: rounding factor and number each for itself gives other bits."""
     factor = parse_unit("km/h").factor
     texts = [f"{number}.{digit}" for number in range(1, 200) for digit in range(10)]
-    once = [rounded(Fraction(text) * factor) for text in texts]
+    once = [round_to_type(Fraction(text) * factor) for text in texts]
     twice = [float(text) * float(factor) for text in texts]
     assert any(a != b for a, b in zip(once, twice, strict=True))
     for text, value in zip(texts, once, strict=True):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from codegen.disassembly import Instruction
-from codegen.longest_step import Unbounded, longest_way
+from codegen.longest_step import Unbounded, longest_path
 
 Shape = int | tuple[Any, ...]
 """A number of instructions, or (`if`, then, otherwise), (`loop`, turns, body), (`then`, parts)."""
@@ -82,7 +82,7 @@ def test_the_bound_is_that_of_the_shape(shape: Shape) -> None:
     laid = Layout()
     most = laid.lay(shape, {})
     laid.put("bx", {})
-    assert longest_way({"step": tuple(laid.code)}, "step") == most + 1
+    assert longest_path({"step": tuple(laid.code)}, "step") == most + 1
 
 
 def test_a_call_takes_what_is_called_and_a_branch_out_does_too() -> None:
@@ -93,7 +93,7 @@ def test_a_call_takes_what_is_called_and_a_branch_out_does_too() -> None:
     step.put("cbz", {}, 3)
     step.put("adds", {})
     step.put("b.w", {}, 256)
-    found = longest_way({"step": tuple(step.code), "helper": tuple(helper.code)}, "step")
+    found = longest_path({"step": tuple(step.code), "helper": tuple(helper.code)}, "step")
     assert found == 1 + most + 1 + 1 + 1 + most
 
 
@@ -111,4 +111,4 @@ def test_what_has_no_bound_is_told(name: str, target: int, told: str) -> None:
     laid.put(name, {}, target)
     laid.put("bx", {})
     with pytest.raises(Unbounded, match=told):
-        longest_way({"step": tuple(laid.code)}, "step")
+        longest_path({"step": tuple(laid.code)}, "step")

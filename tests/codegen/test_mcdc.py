@@ -9,9 +9,9 @@ import struct
 import pytest
 from typer.testing import CliRunner
 
-from codegen.border import REACH
-from codegen.mcdc import EXPORTER, Covered, mcdc
-from codegen.source import c_files
+from codegen.border import NEIGHBOUR_COUNT
+from codegen.mcdc import EXPORTER, McdcCoverage, measure_mcdc
+from codegen.source import emit_c_files
 from language.program import Program
 from modewright import code
 from modewright.cli import app
@@ -42,10 +42,10 @@ def sequence(*ticks: tuple[int, int, int]) -> list[bytes]:
     return [struct.pack("<4d", *tick, 0.0) for tick in ticks]
 
 
-def guard(found: Covered) -> tuple[bool, ...]:
+def guard(found: McdcCoverage) -> tuple[bool, ...]:
     """Return what is shown of the guard of `unlit`."""
     (decision,) = (d for d in found.decisions if d.text == GUARD)
-    text = c_files(lamp())["lamp.c"].split("\n")
+    text = emit_c_files(lamp())["lamp.c"].split("\n")
     assert GUARD in text[decision.line - 1]
     return decision.shown
 
@@ -63,20 +63,22 @@ def guard(found: Covered) -> tuple[bool, ...]:
 def test_a_condition_is_shown_where_it_alone_decides(
     ticks: list[tuple[int, int, int]], shown: tuple[bool, ...]
 ) -> None:
-    assert guard(mcdc(lamp(), [sequence(*ticks)])) == shown
+    assert guard(measure_mcdc(lamp(), [sequence(*ticks)])) == shown
 
 
 def test_sequences_add_up_and_each_begins_anew() -> None:
     halves = [sequence((1, 0, 0), (1, 1, 0)), sequence((0, 0, 0), (1, 0, 1))]
-    found = mcdc(lamp(), halves)
+    found = measure_mcdc(lamp(), halves)
     assert guard(found) == (True, True, True)
     assert (found.sequences, found.steps) == (2, 4)
-    assert guard(mcdc(lamp(), halves[:1])) == (False, True, False)
+    assert guard(measure_mcdc(lamp(), halves[:1])) == (False, True, False)
 
 
 def test_a_decision_of_one_condition_has_to_be_true_and_false() -> None:
-    once = {d.text: d.shown for d in mcdc(lamp(), [sequence((1, 1, 0))]).decisions}
-    both = {d.text: d.shown for d in mcdc(lamp(), [sequence((1, 1, 0), (0, 0, 0))]).decisions}
+    once = {d.text: d.shown for d in measure_mcdc(lamp(), [sequence((1, 1, 0))]).decisions}
+    both = {
+        d.text: d.shown for d in measure_mcdc(lamp(), [sequence((1, 1, 0), (0, 0, 0))]).decisions
+    }
     (text,) = (text for text in both if text in ("!in->key", "in->key"))
     assert text not in once or once[text] == (False,)
     assert not any(text.startswith("case ") for text in both)
@@ -96,7 +98,9 @@ def test_the_command_tells_what_was_not_shown() -> None:
 @pytest.mark.long
 def test_tests_of_the_project_are_the_sequences() -> None:
     found = code.mcdc("estimator", is_proven=False)
-    assert found.sequences > 3 and (found.sequences - 3) % (2 * REACH) == 0  # and their borders
+    assert (
+        found.sequences > 3 and (found.sequences - 3) % (2 * NEIGHBOUR_COUNT) == 0
+    )  # and their borders
     assert 0 < found.shown == found.conditions - found.open < found.conditions
     (stamp,) = (d for d in found.decisions if "stamp_J_em" in d.text)
     assert stamp.shown == (False,)  # tests have the page of the spec

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from codegen.proofs.pointers import is_inside, required
-from codegen.source import c_files
+from codegen.source import emit_c_files
 from modewright.api import program
 
 HEAD = "estimator_Self *self, const estimator_In *in, estimator_Work *work"
@@ -13,7 +13,7 @@ HEAD = "estimator_Self *self, const estimator_In *in, estimator_Work *work"
 
 @pytest.mark.parametrize(("name", "inside"), [("estimator", True), ("estimator_simple", False)])
 def test_work_is_apart_only_where_it_is_no_part_of_the_instance(name: str, inside: bool) -> None:
-    text = c_files(program(name))[f"{name}.c"]
+    text = emit_c_files(program(name))[f"{name}.c"]
     assert is_inside(text) is inside
     clauses = list(required(HEAD, inside))
     assert clauses[:3] == [

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from codegen.lean import lean
-from codegen.predictor import Predictor, built, columns_of
-from codegen.source import stepped
+from codegen.lean import slice_to_outputs
+from codegen.predictor import Predictor, build_predictor, columns_of
+from codegen.source import restrict_to_step
 from engine.interpreter import Interpreter
 from language.program import Program
 from tests.language.making import program
@@ -45,9 +45,9 @@ def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
     columns = columns_of(made, ("x",))
     no_gain = np.zeros((2, 1, 1))
     page = np.array(list(columns.page.values()))
-    with built(made, columns) as library:
+    with build_predictor(made, columns) as library:
         run = Predictor(columns, library).predict(
-            page, inputs, np.zeros((200, 1)), no_gain[:0], no_gain, 1, linear=False
+            page, inputs, np.zeros((200, 1)), no_gain[:0], no_gain, 1, is_first_order_hold=False
         )
     theirs = Interpreter(made)
     found = []
@@ -55,7 +55,7 @@ def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
         theirs.set("input.u", value)
         theirs.run("step")
         found.append(theirs.get("state.x"))
-    assert run.done == 200
+    assert run.completed == 200
     assert set(run.modes) == {0, 1}
     assert max(found) * 9 > 20 and min(found) < 0
     assert run.states[:, 0].tolist() == found
@@ -63,12 +63,12 @@ def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
 
 def test_what_no_output_reads_is_not_computed() -> None:
     made = slider()
-    assert "shown" in str(stepped(made).blocks)
-    assert "shown" not in str(lean(made).blocks)
-    assert "tanh" in str(lean(made).blocks)
+    assert "shown" in str(restrict_to_step(made).blocks)
+    assert "shown" not in str(slice_to_outputs(made).blocks)
+    assert "tanh" in str(slice_to_outputs(made).blocks)
 
 
 def test_parameters_stay_though_nothing_that_is_left_reads_them() -> None:
     """The page of a fit has a column for each."""
     made = slider(only="value: 2, tunable: true, range: [0, 9]")
-    assert "only_shown" in columns_of(lean(made), ("x",)).page
+    assert "only_shown" in columns_of(slice_to_outputs(made), ("x",)).page

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from codegen.proofs.terms import Real, Terms
-from language.evaluate import EXACT, OPERATIONS
-from language.number import LARGEST, NumberType, rounded
+from language.evaluate import BINARY_OPERATIONS, ELEMENTARY_BY_TYPE
+from language.number import MAX_FINITE, NumberType, round_to_type
 
 NUMBERS: tuple[NumberType, ...] = ("float64", "float32")
 SOME = (0.0, -0.0, 1.0, -1.5, 3.0, 1e30)
@@ -36,13 +36,13 @@ def test_comparisons_and_what_is_made_of_them(number: NumberType) -> None:
     for a, b in itertools.product((*SOME, math.nan), repeat=2):
         x, y = real(terms, a), real(terms, b)
         for operator in ("<", "<=", ">", ">=", "==", "!="):
-            assert truth(terms, terms.compare(operator, x, y)) == OPERATIONS[operator](a, b)
+            assert truth(terms, terms.compare(operator, x, y)) == BINARY_OPERATIONS[operator](a, b)
         for name in ("min", "max"):
-            same(terms, terms.call(name, [x, y]), EXACT[number][name](a, b))
+            same(terms, terms.call(name, [x, y]), ELEMENTARY_BY_TYPE[number][name](a, b))
         same(terms, terms.call("abs", [x]), abs(a))
         same(terms, terms.minus(x), -a)
         held = terms.call("clip", [x, real(terms, -1.0), real(terms, 2.0)])
-        same(terms, held, EXACT[number]["clip"](a, -1.0, 2.0))
+        same(terms, held, ELEMENTARY_BY_TYPE[number]["clip"](a, -1.0, 2.0))
 
 
 def same(terms: Terms, found: Real, wanted: float) -> None:
@@ -56,17 +56,20 @@ def same(terms: Terms, found: Real, wanted: float) -> None:
 def test_a_table_gives_what_lies_within_its_bounds(number: NumberType) -> None:
     draw = Random(number)
     for _ in range(TABLES):
-        axis = sorted({rounded(draw.uniform(-9, 9), number) for _ in range(POINTS)})
+        axis = sorted({round_to_type(draw.uniform(-9, 9), number) for _ in range(POINTS)})
         values = [
-            rounded(draw.choice((1.0, 0.1, 1e-3)) * draw.uniform(-9, 9), number) for _ in axis
+            round_to_type(draw.choice((1.0, 0.1, 1e-3)) * draw.uniform(-9, 9), number) for _ in axis
         ]
         terms = Terms(number)
         x = terms.new("real", "x")
         (bound,) = terms.lemmas([terms.looked_up(values, x).value])
         for _ in range(TRIES):
             at = draw.choice((*axis, draw.uniform(-10, 10), math.nextafter(axis[-1], -math.inf)))
-            seen = rounded(
-                EXACT[number]["lookup"](axis, len(axis), values, rounded(at, number)), number
+            seen = round_to_type(
+                ELEMENTARY_BY_TYPE[number]["lookup"](
+                    axis, len(axis), values, round_to_type(at, number)
+                ),
+                number,
             )
             assert not is_refuted(terms, bound, x, at, seen)
 
@@ -84,10 +87,12 @@ def is_refuted(terms: Terms, bound: Any, x: Real, at: float, seen: float) -> boo
 def test_a_product_with_a_part_is_no_larger(number: NumberType) -> None:
     draw, terms = Random(f"product {number}"), Terms(number)
     for _ in range(TABLES):
-        part = rounded(draw.choice((1.0, -1.0, draw.uniform(-1, 1), 1e-40)), number)
-        whole = rounded(draw.choice((LARGEST[number], 0.0, draw.uniform(-1e9, 1e9))), number)
+        part = round_to_type(draw.choice((1.0, -1.0, draw.uniform(-1, 1), 1e-40)), number)
+        whole = round_to_type(
+            draw.choice((MAX_FINITE[number], 0.0, draw.uniform(-1e9, 1e9))), number
+        )
         product = terms.sum("*", real(terms, part), real(terms, whole))
-        seen = real(terms, rounded(part * whole, number))
+        seen = real(terms, round_to_type(part * whole, number))
         solver = terms.z3.Solver()
         solver.add(*terms.lemmas([product.value]), product.value == seen.value)
         solver.add(product.nan == seen.nan)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from codegen.fault import why_set
+from codegen.fault import fault_reason
 from codegen.names import c_member, transition_constants
-from codegen.purpose import purpose
-from codegen.source import ENTRIES, c_files, c_program
+from codegen.purpose import describe_function
+from codegen.source import ENTRIES, emit_c_files, run_c_passes
 from modewright.api import program
 
 SHIPPED = ("estimator", "estimator_float32", "hko", "driveline", "supervisor", "contactor")
@@ -15,19 +15,19 @@ SHIPPED = ("estimator", "estimator_float32", "hko", "driveline", "supervisor", "
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_each_function_of_a_shipped_automaton_says_what_it_is_for(name: str) -> None:
-    blocks = [block for block in c_program(program(name)).blocks if block not in ENTRIES]
+    blocks = [block for block in run_c_passes(program(name)).blocks if block not in ENTRIES]
     assert blocks
     for block in blocks:
-        assert purpose(block)
-        assert not set("[]{}") & set(purpose(block))
+        assert describe_function(block)
+        assert not set("[]{}") & set(describe_function(block))
 
 
 def test_a_purpose_names_the_mode_where_there_is_one() -> None:
-    assert purpose("rates_no_contact") == "Rates of the states in mode no_contact"
-    assert purpose("equations") == "Equations"
-    assert purpose("latch_each").startswith("Inputs one by one")
-    assert purpose("what_nobody_knows") == ""
-    both = purpose("leap_gap_no_contact", ("gap", "drive"), ("no_contact",))
+    assert describe_function("rates_no_contact") == "Rates of the states in mode no_contact"
+    assert describe_function("equations") == "Equations"
+    assert describe_function("latch_each").startswith("Inputs one by one")
+    assert describe_function("what_nobody_knows") == ""
+    both = describe_function("leap_gap_no_contact", ("gap", "drive"), ("no_contact",))
     assert both.startswith("The whole step in mode gap with the model in no_contact,")
 
 
@@ -54,13 +54,13 @@ def test_a_transition_is_called_by_its_source_and_its_name() -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_each_fault_bit_says_why_it_is_set(name: str) -> None:
     made = program(name)
-    header = c_files(made)[f"{name}.h"]
+    header = emit_c_files(made)[f"{name}.h"]
     for bit, fault in enumerate(made.faults):
-        why = why_set(made, fault)
+        why = fault_reason(made, fault)
         assert why
         assert f"#define {name}_FAULT_{fault} (1UL << {bit}) /* {why} */\n" in header
 
 
 def test_a_count_says_when_its_transition_is_due() -> None:
-    text = c_files(program("estimator"))["estimator.c"]
+    text = emit_c_files(program("estimator"))["estimator.c"]
     assert "/* due at 2 in a row: estimator modes.drive.transitions.gap.wait, 0.7 ms */" in text

@@ -9,7 +9,7 @@ import jinja2
 import pytest
 
 from codegen import rendering
-from codegen.rendering import COMPILED, render
+from codegen.rendering import TEMPLATE_CACHE, render
 
 TEMPLATE = "words_fed.jinja"
 NOTHING: dict[str, list[str]] = {"inputs": []}
@@ -47,12 +47,12 @@ def rendered() -> str:
 def test_a_template_is_compiled_once(folder: Path, compiled: list[str]) -> None:
     assert rendered() == rendered()
     assert compiled == [TEMPLATE]
-    assert (folder / COMPILED).stat().st_mode & 0o777 == 0o700
+    assert (folder / TEMPLATE_CACHE).stat().st_mode & 0o777 == 0o700
 
 
 def test_one_that_is_damaged_is_compiled_anew(folder: Path, compiled: list[str]) -> None:
     first = rendered()
-    for path in (folder / COMPILED).iterdir():
+    for path in (folder / TEMPLATE_CACHE).iterdir():
         path.write_bytes(path.read_bytes()[:40])
     assert rendered() == first
     assert len(compiled) == 2
@@ -70,8 +70,8 @@ def test_a_folder_that_goes_meanwhile_ends_nothing(folder: Path) -> None:
     first = rendered()
     rendering._environment.cache_clear()
     rendering._environment()
-    for path in (folder / COMPILED).iterdir():
+    for path in (folder / TEMPLATE_CACHE).iterdir():
         path.unlink()
-    (folder / COMPILED).rmdir()
-    (folder / COMPILED).write_text("")
+    (folder / TEMPLATE_CACHE).rmdir()
+    (folder / TEMPLATE_CACHE).write_text("")
     assert render(TEMPLATE, NOTHING) == first

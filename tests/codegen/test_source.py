@@ -11,16 +11,16 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.mathematics import math_files
+from codegen.mathematics import emit_math_files
 from codegen.names import CNames
-from codegen.rendering import version
-from codegen.source import c_files
+from codegen.rendering import product_version
+from codegen.source import emit_c_files
 from language.load import program_of
 from language.operation import Assign
 from language.printing import digest
 from language.program import Program
 from language.reserved import reserved_words
-from language.traversal import walk
+from language.traversal import walk_ops
 from modewright.api import load, program
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -56,11 +56,11 @@ PLACES = ("automaton", "parameter", "input", "state", "equation", "mode", "trans
 
 
 def files_of(name: str) -> dict[str, str]:
-    return c_files(program(name))
+    return emit_c_files(program(name))
 
 
 def unversioned(text: str) -> str:
-    return text.replace(f"modewright {version()};", "modewright VERSION;")
+    return text.replace(f"modewright {product_version()};", "modewright VERSION;")
 
 
 @pytest.mark.parametrize("name", ["heater.h", "heater.c"])
@@ -99,7 +99,7 @@ def test_every_equation_cites_its_key_path(name: str) -> None:
 
 
 def equations(used: Program) -> list[Assign]:
-    ops = [op for block in used.blocks.values() for op in walk(block)]
+    ops = [op for block in used.blocks.values() for op in walk_ops(block)]
     return [op for op in ops if isinstance(op, Assign) and op.target.startswith("equation.")]
 
 
@@ -111,7 +111,7 @@ def test_every_key_of_an_assignment_stands_beside_its_target(name: str) -> None:
     pairs = {(line.partition(" =")[0].split()[-1], cited[k]) for k, line in enumerate(lines)
              if k in cited and " =" in line}  # fmt: skip
     for block in used.blocks.values():
-        for op in walk(block):
+        for op in walk_ops(block):
             if isinstance(op, Assign) and op.key and not op.target.startswith("work."):
                 target = CNames(used)(op.target).replace("self->derived.", "derived->")
                 assert (target, op.key) in pairs
@@ -179,7 +179,7 @@ def test_two_generations_are_equal_and_math_is_the_same_for_all() -> None:
     for name in AUTOMATA:
         files = files_of(name)
         if "ha_math.c" in files:
-            assert math_files("float64").items() <= files.items()
+            assert emit_math_files("float64").items() <= files.items()
 
 
 def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
@@ -191,7 +191,7 @@ def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
         "ha_mathf.c",
         "ha_mathf.h",
     ]
-    assert math_files("float32").items() <= files.items()
+    assert emit_math_files("float32").items() <= files.items()
     for text in files.values():
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
         assert not re.search(r"\bdouble\b|\bint64_t\b", code)
@@ -200,9 +200,9 @@ def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
 
 def test_an_automaton_whose_inputs_vary_inside_a_step_has_no_c() -> None:
     automaton = load("ev_driveline", "tip_out").system.instances["plant"].automaton
-    assert c_files(program_of(automaton))
+    assert emit_c_files(program_of(automaton))
     with pytest.raises(ValueError, match="inputs of driveline vary inside a step: it has no C"):
-        c_files(program_of(automaton, ["T_em"]))
+        emit_c_files(program_of(automaton, ["T_em"]))
 
 
 def spec_with(folder: Path, place: str, name: str) -> str:

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from codegen.build import optimised
+from codegen.build import flags_at_level
 from codegen.stepper import CompiledStepper
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
@@ -16,7 +16,7 @@ from modewright.api import load
 from tests.language.making import ROOT, program
 from tests.lockstep.heater import heater
 
-stepper = partial(CompiledStepper, flags=optimised("O0"))
+stepper = partial(CompiledStepper, flags=flags_at_level("O0"))
 DRIVELINES = ROOT / "tests/data/specs/drivelines"
 
 
@@ -47,8 +47,8 @@ def test_what_leaves_its_range_is_told_once_asked() -> None:
     for run in (stepper(made), Interpreter(made)):
         run.set("input.T", 1e9)
         run.run("step")
-        assert run.left() == ("T",)
-        assert run.left() == ()
+        assert run.pop_range_violations() == ("T",)
+        assert run.pop_range_violations() == ()
 
 
 @pytest.mark.parametrize("number", ["float64", "float32"])
@@ -70,5 +70,5 @@ outputs: [gain]
         run.set("input.u", 0.7)
         run.run("step")
         names = ("equation.gain", "calibration.a", "input.u")
-        values.append((run.reader(names)(), run.has("equation.gain"), run.has("equation.z")))
+        values.append((run.make_reader(names)(), run.has("equation.gain"), run.has("equation.z")))
     assert values[0] == values[1]

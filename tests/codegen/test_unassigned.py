@@ -7,22 +7,22 @@ from fractions import Fraction
 
 import pytest
 
-from codegen.source import c_files
-from codegen.unassigned import unassigned
+from codegen.source import emit_c_files
+from codegen.unassigned import find_unassigned_reads
 from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Compare,
     Expr,
     Item,
     Loop,
     Ref,
-    Run,
+    RunBlock,
     Store,
+    Switch,
+    integer,
     real,
-    whole,
 )
 from language.program import Program, Variable
 from modewright.api import program as shipped
@@ -30,7 +30,7 @@ from modewright.api import program as shipped
 A, B = Ref("work.a"), Ref("work.b")
 SET_A = Assign("work.a", real(1.0))
 USE_A = Assign("state.x", A)
-SET_FIRST = Store("work.list", whole(0), real(1.0))
+SET_FIRST = Store("work.list", integer(0), real(1.0))
 IS_HIGH = Compare(">", Ref("state.x"), real(0.0))
 
 
@@ -41,7 +41,7 @@ def use_item(index: Expr) -> Assign:
 def early(*step: object, **blocks: Block) -> frozenset[str]:
     made = Program(
         name="made",
-        number="float64",
+        number_type="float64",
         period=Fraction(1),
         major_step=Fraction(1),
         constants=(),
@@ -53,7 +53,7 @@ def early(*step: object, **blocks: Block) -> frozenset[str]:
         functions=(),
         blocks={"step": step, **blocks},  # type: ignore[dict-item]
     )
-    return unassigned(made, "step", frozenset({"work.a", "work.b", "work.list"}))
+    return find_unassigned_reads(made, "step", frozenset({"work.a", "work.b", "work.list"}))
 
 
 @pytest.mark.parametrize(
@@ -63,13 +63,13 @@ def early(*step: object, **blocks: Block) -> frozenset[str]:
         ((USE_A, SET_A), {"work.a"}),
         ((Branch(IS_HIGH, (SET_A,)), USE_A), {"work.a"}),
         ((Branch(IS_HIGH, (SET_A,), (SET_A,)), USE_A), set()),
-        ((Choose("memory.mode", ((0, (SET_A,)), (1, (SET_A,)))), USE_A), {"work.a"}),
+        ((Switch("memory.mode", ((0, (SET_A,)), (1, (SET_A,)))), USE_A), {"work.a"}),
         ((Loop(3, "work.k", (SET_A,)), USE_A), set()),
         ((Loop(3, "work.k", (Branch(IS_HIGH, (SET_A,)),)), USE_A), {"work.a"}),
-        ((Run("sets"), USE_A), set()),
-        ((Branch(IS_HIGH, (Run("sets"),)), Run("uses")), {"work.a"}),
-        ((SET_FIRST, use_item(whole(0))), set()),
-        ((SET_FIRST, use_item(whole(1))), {"work.list"}),
+        ((RunBlock("sets"), USE_A), set()),
+        ((Branch(IS_HIGH, (RunBlock("sets"),)), RunBlock("uses")), {"work.a"}),
+        ((SET_FIRST, use_item(integer(0))), set()),
+        ((SET_FIRST, use_item(integer(1))), {"work.list"}),
         ((SET_FIRST, use_item(B)), {"work.b", "work.list"}),
     ],
 )
@@ -78,7 +78,7 @@ def test_what_may_be_read_before_it_is_set_is_found(step: Block, found: set[str]
 
 
 def test_a_tick_that_runs_a_model_sets_three_of_its_work_values_when_it_begins() -> None:
-    text = c_files(shipped("estimator"))["estimator.c"]
+    text = emit_c_files(shipped("estimator"))["estimator.c"]
     begin = text[text.index("*const work = &self->work;") : text.index("work->left = 0.001;")]
     assert begin.count(" = ") == 4  # the pointer, then these
     for line in ("guard_0 = false;", "elapsed = 0.0;", "crossed = false;"):
@@ -86,13 +86,13 @@ def test_a_tick_that_runs_a_model_sets_three_of_its_work_values_when_it_begins()
 
 
 def test_where_all_modes_are_cases_a_choice_is_always_made() -> None:
-    text = c_files(shipped("driveline"))["driveline.c"]
+    text = emit_c_files(shipped("driveline"))["driveline.c"]
     begin = text[text.index("*const work = &self->work;") : text.index("    if (self->started)")]
     assert begin.count(" = ") == 1
 
 
 def test_a_loop_ends_where_its_condition_does() -> None:
-    text = c_files(shipped("driveline"))["driveline.c"]
+    text = emit_c_files(shipped("driveline"))["driveline.c"]
     loop = "for (int32_t piece = 0; piece < 101; piece++) {"
     assert re.search(rf"{re.escape(loop)}\s+if \(!\(work->left > 0.0\)\) {{\s+break;", text)
     assert "for (int32_t halving = 0; halving < 44; halving++) {" in text

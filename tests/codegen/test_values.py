@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from codegen.proofs.values import step_counts
-from codegen.source import c_program
+from codegen.proofs.values import counter_limits
+from codegen.source import run_c_passes
 from modewright.api import program
 
 
 def test_the_value_analysis_begins_with_any_counts() -> None:
-    counts = step_counts(c_program(program("hko"), by_amount=False))
+    counts = counter_limits(run_c_passes(program("hko"), by_magnitude=False))
     assert counts["timer.gap_drive_fast"] == 6 and counts["timer.after_1"] == 60
     assert counts["memory.oldest_2"] == 49 and counts["memory.newest"] == 2
-    assert step_counts(c_program(program("supervisor"))) == {}, "it runs no model"
+    assert counter_limits(run_c_passes(program("supervisor"))) == {}, "it runs no model"

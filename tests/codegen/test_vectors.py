@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.vectors import has_vectors
+from codegen.vectors import has_gcc_vectors
 
 SAYS = """#!{python}
 print("{macros}")
@@ -32,7 +32,7 @@ def test_a_gcc_for_x86_64_has_them(
     compiler.write_text(SAYS.format(python=sys.executable, macros=told))
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", os.fspath(compiler))
-    assert has_vectors() is expected
+    assert has_gcc_vectors() is expected
 
 
 def test_one_that_does_not_run_has_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -40,4 +40,4 @@ def test_one_that_does_not_run_has_none(tmp_path: Path, monkeypatch: pytest.Monk
     compiler.write_text("no program")
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", os.fspath(compiler))
-    assert not has_vectors()
+    assert not has_gcc_vectors()

@@ -14,6 +14,6 @@ outputs: [mode]
 """
 
 
-def waiting(name: str, period: str, numbers: str, value: str, limits: str) -> str:
+def waiting_automaton(name: str, period: str, numbers: str, value: str, limits: str) -> str:
     """Return its text; `value` and `limits` are those of the wait `t_on`."""
     return TEXT.format(name=name, period=period, numbers=numbers, value=value, limits=limits)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from tests.concealed.case import Case, write_case
-from tests.concealed.order import OrderError, ordered_cases
-from tests.concealed.seal import sealed, write_labels
-from tests.concealed.solver import compiled
+from tests.concealed.order import OrderError, parse_order
+from tests.concealed.seal import seal_digest, write_labels
+from tests.concealed.solver import compile_solver
 
 
 def arguments(words: list[str] | None) -> argparse.Namespace:
@@ -49,10 +49,10 @@ def main(words: list[str] | None = None) -> int:
     if not 1 <= given.jobs <= 64:
         refused("the number of jobs is not from 1 to 64")
     try:
-        cases: list[Case] = ordered_cases(given.effects, given.seed, given.strength, given.rate)
+        cases: list[Case] = parse_order(given.effects, given.seed, given.strength, given.rate)
     except OrderError as error:
         refused(str(error))
-    compiled()
+    compile_solver()
     write = partial(write_case, folder=given.out)
     if given.jobs == 1:
         labels = [write(case) for case in cases]
@@ -60,7 +60,7 @@ def main(words: list[str] | None = None) -> int:
         with ProcessPoolExecutor(given.jobs) as pool:
             labels = list(pool.map(write, cases, chunksize=1))
     write_labels(given.labels, {case.name: one for case, one in zip(cases, labels, strict=True)})
-    print(f"{len(cases)} cases; labels' seal {sealed(given.labels)}")
+    print(f"{len(cases)} cases; labels' seal {seal_digest(given.labels)}")
     return 0
 
 

@@ -41,7 +41,7 @@ class Base:
 NOMINAL = Base()
 
 
-def drawn_base(rng: np.random.Generator) -> Base:
+def draw_base(rng: np.random.Generator) -> Base:
     """Every value off the nominal one by 5 to 20 % up or down, independently."""
     values = {}
     for field in fields(Base):

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tests.concealed.base import Base, drawn_base, values
-from tests.concealed.catalogue import CATALOGUE, changed_physics, drawn_numbers
+from tests.concealed.base import Base, draw_base, values
+from tests.concealed.catalogue import CATALOGUE, apply_effects, draw_numbers
 from tests.concealed.effect import Numbers
 from tests.concealed.manoeuvre import OTHERS, TRAINING
-from tests.concealed.measurement import Instruments, drawn_instruments, table, text
+from tests.concealed.measurement import Instruments, csv_text, draw_instruments, sample_rows
 from tests.concealed.physics import Physics
-from tests.concealed.recording import Recording, drawn_recording, moved
+from tests.concealed.recording import Recording, draw_recording, simulate_motion
 
 HELD_OUT = 4
 """Recordings held out in each case."""
@@ -43,12 +43,12 @@ class Case:
     @cached_property
     def base(self) -> Base:
         """True values."""
-        return drawn_base(self.chance(0))
+        return draw_base(self.chance(0))
 
     @cached_property
     def instruments(self) -> Instruments:
         """Noise and quanta."""
-        return drawn_instruments(self.chance(1))
+        return draw_instruments(self.chance(1))
 
     @cached_property
     def numbers(self) -> dict[str, Numbers]:
@@ -56,12 +56,12 @@ class Case:
         if self.strength == 0.0:
             return {}
         key = (self.seed, self.number, 2)
-        return {name: drawn_numbers(name, key, self.base, self.strength) for name in self.effects}
+        return {name: draw_numbers(name, key, self.base, self.strength) for name in self.effects}
 
     @cached_property
     def physics(self) -> Physics:
         """The true driveline."""
-        return changed_physics(self.base, list(self.numbers.values()))
+        return apply_effects(self.base, list(self.numbers.values()))
 
     @cached_property
     def recordings(self) -> tuple[Recording, ...]:
@@ -72,7 +72,7 @@ class Case:
         plan = [("train", *one) for one in enumerate(train)]
         plan += [("held_out", *one) for one in enumerate(others[1 : 1 + HELD_OUT])]
         return tuple(
-            drawn_recording(part, index, kind, self.base, (self.seed, self.number, 4, serial))
+            draw_recording(part, index, kind, self.base, (self.seed, self.number, 4, serial))
             for serial, (part, index, kind) in enumerate(plan)
         )
 
@@ -80,12 +80,12 @@ class Case:
 def write_case(case: Case, folder: Path) -> dict[str, Any]:
     """Write the case's recordings below `folder`; return its label."""
     for recording in case.recordings:
-        motion = moved(case.physics, recording)
-        rows = table(case.instruments, recording, motion, case.rate)
+        motion = simulate_motion(case.physics, recording)
+        rows = sample_rows(case.instruments, recording, motion, case.rate)
         place = folder / case.name / recording.part
         place.mkdir(parents=True, exist_ok=True)
         path = place / f"rec_{recording.index:02d}.csv"
-        path.write_bytes(text(rows).encode("ascii"))
+        path.write_bytes(csv_text(rows).encode("ascii"))
     return label(case)
 
 

@@ -17,7 +17,7 @@ CATALOGUE: dict[str, Effect] = {
 }
 
 
-def conflict(names: tuple[str, ...]) -> str:
+def find_conflict(names: tuple[str, ...]) -> str:
     """Why these effects cannot act in one case, or nothing."""
     for name in names:
         if name not in CATALOGUE:
@@ -31,7 +31,7 @@ def conflict(names: tuple[str, ...]) -> str:
     return ""
 
 
-def drawn_numbers(name: str, key: tuple[int, ...], base: Base, strength: float) -> Numbers:
+def draw_numbers(name: str, key: tuple[int, ...], base: Base, strength: float) -> Numbers:
     """The effect's numbers; they depend on nothing but the key, the name, base and strength."""
     rng = np.random.default_rng([*key, *name.encode()])
     return {
@@ -39,7 +39,7 @@ def drawn_numbers(name: str, key: tuple[int, ...], base: Base, strength: float) 
     }
 
 
-def changed_physics(base: Base, numbers: list[Numbers]) -> Physics:
+def apply_effects(base: Base, numbers: list[Numbers]) -> Physics:
     """The clean physics with all the effects' numbers."""
     physics = clean_physics(base)
     for of_effect in numbers:

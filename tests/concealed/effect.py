@@ -24,12 +24,12 @@ class Effect:
     group: str = ""
 
 
-def signed(rng: np.random.Generator, low: float, high: float) -> float:
+def draw_signed(rng: np.random.Generator, low: float, high: float) -> float:
     """A size between low and high, up or down."""
     size = float(rng.uniform(low, high))
     return size if rng.random() < 0.5 else -size
 
 
-def turn(rng: np.random.Generator) -> float:
+def draw_angle(rng: np.random.Generator) -> float:
     """An angle [rad]."""
     return float(rng.uniform(0.0, 2.0 * np.pi))

@@ -5,7 +5,7 @@ import numpy as np
 from tests.concealed.solver import STEP_S, Array
 
 
-def framed(
+def sample_frames(
     values: Array, rng: np.random.Generator, period_s: float, jitter_s: float, late_s: float
 ) -> Array:
     """The held values every STEP_S; before the first frame the first value [any unit]."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.concealed.base import Base
-from tests.concealed.effect import Effect, Numbers, signed, turn
+from tests.concealed.effect import Effect, Numbers, draw_angle, draw_signed
 
 PLACE = "inputs.T_em"
 
@@ -78,7 +78,7 @@ def offset(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
     Chung, Sul 1998 (current offset; here the rectified part). Same sign in both directions of
     travel, the same in all recordings: neither friction nor slope.
     """
-    return {"torque_offset": strength * signed(rng, 3.5, 8.0)}
+    return {"torque_offset": strength * draw_signed(rng, 3.5, 8.0)}
 
 
 def ripple(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
@@ -91,8 +91,8 @@ def ripple(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
         "ripple_offset": strength * float(rng.uniform(7.0, 14.0)),
         "ripple_scale": strength * float(rng.uniform(0.06, 0.12)),
         "ripple_order": float(rng.choice([2.0, 3.0, 4.0])),
-        "ripple_phase": turn(rng),
-        "ripple_phase_2": turn(rng),
+        "ripple_phase": draw_angle(rng),
+        "ripple_phase_2": draw_angle(rng),
     }
 
 

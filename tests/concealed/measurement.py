@@ -35,7 +35,7 @@ class Instruments:
     w_w: Instrument
 
 
-def drawn_instruments(rng: np.random.Generator) -> Instruments:
+def draw_instruments(rng: np.random.Generator) -> Instruments:
     """Noise and quanta within the ranges that the tool was told."""
     return Instruments(
         Instrument(float(rng.uniform(0.1, 0.4)), 0.25),
@@ -45,7 +45,7 @@ def drawn_instruments(rng: np.random.Generator) -> Instruments:
     )
 
 
-def table(instruments: Instruments, recording: Recording, motion: Motion, rate: int) -> Array:
+def sample_rows(instruments: Instruments, recording: Recording, motion: Motion, rate: int) -> Array:
     """Recorded rows at `rate` [Hz]: time, demand, brake, motor speed, wheel speed."""
     stride = round(1.0 / (rate * STEP_S))
     signals = (recording.demand, recording.brake, motion.w_em, motion.w_w)
@@ -57,6 +57,6 @@ def table(instruments: Instruments, recording: Recording, motion: Motion, rate: 
     return np.column_stack(columns)
 
 
-def text(rows: Array) -> str:
+def csv_text(rows: Array) -> str:
     """The CSV file."""
     return COLUMNS + "\n" + (ROW * len(rows)) % tuple(rows.ravel().tolist())

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.concealed.case import STRONGEST, WEAKEST, Case
-from tests.concealed.catalogue import CATALOGUE, conflict
+from tests.concealed.catalogue import CATALOGUE, find_conflict
 
 RATES_HZ = (100, 200, 500, 1000)
 
@@ -24,14 +24,14 @@ def groups(words: str) -> list[tuple[tuple[str, ...], int]]:
             found += [((one,), count) for one in CATALOGUE]
             continue
         names = () if name == "none" else tuple(name.split("+"))
-        reason = conflict(names)
+        reason = find_conflict(names)
         if reason:
             raise OrderError(f"{word!r}: {reason}")
         found.append((names, count))
     return found
 
 
-def ordered_cases(words: str, seed: int, strength: float, rate: int | None) -> list[Case]:
+def parse_order(words: str, seed: int, strength: float, rate: int | None) -> list[Case]:
     """The cases in an order by chance; within each group all rates as equal as can be."""
     if seed < 0:
         raise OrderError("the seed is negative")

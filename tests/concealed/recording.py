@@ -5,20 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tests.concealed.base import Base
-from tests.concealed.frame import framed
+from tests.concealed.frame import sample_frames
 from tests.concealed.manoeuvre import OTHERS, TRAINING
 from tests.concealed.physics import Physics
 from tests.concealed.solver import STEP_S, SUBSTEPS, Array, Motion, solve
 from tests.concealed.surroundings import (
     Slope,
     Window,
-    drawn_slope,
-    drawn_windows,
+    draw_slope,
+    draw_windows,
     motor_noise,
     roughness,
     window_torque,
 )
-from tests.concealed.trip import Trip, driven
+from tests.concealed.trip import Trip, smooth_torques
 
 SHORTEST_S, LONGEST_S = 8.0, 9.5
 TIME_GRID_S = 0.01
@@ -46,12 +46,12 @@ class Recording:
     key: tuple[int, ...]
 
 
-def drawn_seconds(rng: np.random.Generator) -> float:
+def draw_seconds(rng: np.random.Generator) -> float:
     """Length of a recording [s]."""
     return round(rng.uniform(SHORTEST_S, LONGEST_S) / TIME_GRID_S) * TIME_GRID_S
 
 
-def drawn_recording(
+def draw_recording(
     part: str, index: int, manoeuvre: str, base: Base, key: tuple[int, ...]
 ) -> Recording:
     """The recording for this key; the key gives a stream of chance to each matter."""
@@ -60,18 +60,18 @@ def drawn_recording(
         for number, matter in enumerate(("drive", "road", "motor", "slope", "windows", "heat"))
     }
     rng = chance["drive"]
-    seconds = drawn_seconds(rng)
+    seconds = draw_seconds(rng)
     rows = round(seconds / STEP_S)
     trip = Trip(seconds, base)
     pedal_s, pipe_s = rng.uniform(0.036, 0.09), rng.uniform(0.10, 0.20)
     drive = TRAINING.get(manoeuvre) or OTHERS[manoeuvre]
     drive(trip, rng)
-    given = driven(trip, rows, pedal_s, pipe_s)
+    given = smooth_torques(trip, rows, pedal_s, pipe_s)
     return Recording(
         part, index, manoeuvre, seconds, trip.first_speed, given[:, 0], given[:, 1],
         roughness(chance["road"], rows), motor_noise(chance["motor"], rows),
-        drawn_slope(chance["slope"], base),
-        drawn_windows(chance["windows"], seconds, certain=part == "train" and index % 2 == 0),
+        draw_slope(chance["slope"], base),
+        draw_windows(chance["windows"], seconds, certain=part == "train" and index % 2 == 0),
         float(chance["heat"].uniform(0.0, 0.3)), key,
     )  # fmt: skip
 
@@ -92,7 +92,7 @@ def recording_physics(physics: Physics, recording: Recording) -> Physics:
 def inputs(physics: Physics, recording: Recording) -> Array:
     """What drives the solver: demand as it arrives, all brakes, all road torques, noise."""
     rows, share = len(recording.demand), physics.unknown_share
-    demand = framed(
+    demand = sample_frames(
         recording.demand,
         np.random.default_rng([*recording.key, 100]),
         physics.input_frame_s,
@@ -104,11 +104,11 @@ def inputs(physics: Physics, recording: Recording) -> Array:
     return np.column_stack([demand, brake, road, recording.motor_noise])
 
 
-def moved(physics: Physics, recording: Recording, substeps: int = SUBSTEPS) -> Motion:
+def simulate_motion(physics: Physics, recording: Recording, substeps: int = SUBSTEPS) -> Motion:
     """The true motion, the wheel speed as it reaches the recorder, every STEP_S."""
     given = inputs(physics, recording)
     motion = solve(recording_physics(physics, recording), recording.speed, given, substeps)
-    late = framed(
+    late = sample_frames(
         motion.w_w,
         np.random.default_rng([*recording.key, 101]),
         physics.sense_frame_s,

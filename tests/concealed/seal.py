@@ -15,6 +15,6 @@ def write_labels(path: Path, cases: dict[str, dict[str, Any]]) -> None:
     path.write_bytes((json.dumps(content, indent=1) + "\n").encode("ascii"))
 
 
-def sealed(labels_path: str | Path) -> str:
+def seal_digest(labels_path: str | Path) -> str:
     """SHA-256 of the labels file: published before the tool is run, checked after."""
     return hashlib.sha256(Path(labels_path).read_bytes()).hexdigest()

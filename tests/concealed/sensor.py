@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.concealed.base import Base
-from tests.concealed.effect import Effect, Numbers, signed, turn
+from tests.concealed.effect import Effect, Numbers, draw_angle, draw_signed
 
 PLACE = "outputs.w_s"
 
@@ -16,7 +16,7 @@ def eccentricity(rng: np.random.Generator, base: Base, strength: float) -> Numbe
     """
     return {
         "eccentricity": strength * float(rng.uniform(0.008, 0.02)),
-        "eccentricity_phase": turn(rng),
+        "eccentricity_phase": draw_angle(rng),
     }
 
 
@@ -59,7 +59,7 @@ def offset(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
 
     Ding 2013, Model-Based Fault Diagnosis Techniques (additive sensor fault).
     """
-    return {"sense_offset": strength * signed(rng, 0.25, 0.6)}
+    return {"sense_offset": strength * draw_signed(rng, 0.25, 0.6)}
 
 
 EFFECTS = (

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.concealed.base import RATIO, Base
-from tests.concealed.effect import Effect, Numbers, signed, turn
+from tests.concealed.effect import Effect, Numbers, draw_angle, draw_signed
 
 PLACE = "elements.half_shaft"
 
@@ -17,9 +17,9 @@ def unequal(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
     """
     return {
         "two_shafts": 1.0,
-        "share_left": 0.5 + 0.5 * strength * signed(rng, 0.15, 0.4),
+        "share_left": 0.5 + 0.5 * strength * draw_signed(rng, 0.15, 0.4),
         "gap_skew": min(0.9, strength * float(rng.uniform(0.45, 0.75))),
-        "gap_shift": strength * base.alpha * signed(rng, 0.2, 0.5),
+        "gap_shift": strength * base.alpha * draw_signed(rng, 0.2, 0.5),
     }
 
 
@@ -76,7 +76,7 @@ def position(rng: np.random.Generator, base: Base, strength: float) -> Numbers:
     return {
         "joint_1": strength * float(rng.uniform(0.10, 0.20)),
         "joint_3": strength * float(rng.uniform(0.05, 0.12)),
-        "joint_phase": turn(rng),
+        "joint_phase": draw_angle(rng),
     }
 
 

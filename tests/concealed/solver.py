@@ -57,7 +57,7 @@ def cache_folder() -> Path:
     return Path(root) / "concealed-driveline"
 
 
-def compiled() -> Path:
+def compile_solver() -> Path:
     """The shared library for the present sources, compiled if it is not there yet."""
     here = Path(__file__).parent
     text = header() + " ".join(COMPILE) + "".join((here / name).read_text() for name in SOURCES)
@@ -80,7 +80,7 @@ def compiled() -> Path:
 @cache
 def solver() -> ctypes.CDLL:
     """The loaded library."""
-    library = ctypes.CDLL(str(compiled()))
+    library = ctypes.CDLL(str(compile_solver()))
     pointer = ctypes.POINTER(ctypes.c_double)
     whole = ctypes.c_long
     library.driveline_run.argtypes = [

@@ -51,7 +51,7 @@ def motor_noise(rng: np.random.Generator, rows: int) -> Array:
     return coloured(rng, rows, rng.uniform(0.1, 0.4), rng.uniform(0.003, 0.010))
 
 
-def drawn_slope(rng: np.random.Generator, base: Base) -> Slope:
+def draw_slope(rng: np.random.Generator, base: Base) -> Slope:
     """Slopes of 1 to 5 % up or down, in half of the recordings changing by 1 to 3 %."""
     weight = base.J_v / WHEEL_RADIUS_M**2 * GRAVITY * WHEEL_RADIUS_M
     first = rng.choice([-1.0, 1.0]) * rng.uniform(0.01, 0.05)
@@ -60,7 +60,7 @@ def drawn_slope(rng: np.random.Generator, base: Base) -> Slope:
     return Slope(float(weight * first), float(weight * (first + change)), float(at), float(length))
 
 
-def drawn_windows(rng: np.random.Generator, seconds: float, certain: bool) -> tuple[Window, ...]:
+def draw_windows(rng: np.random.Generator, seconds: float, certain: bool) -> tuple[Window, ...]:
     """None to two windows, at least one if `certain`, apart from each other."""
     count = int(rng.integers(1, 3)) if certain else int(rng.integers(0, 3))
     windows = []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.concealed.catalogue import CATALOGUE, conflict
+from tests.concealed.catalogue import CATALOGUE, find_conflict
 from tests.concealed.twin import case_of, clean_recordings, contrast
 
 SHOWING = 3.0
@@ -88,7 +88,7 @@ def test_places_and_number() -> None:
 
 def test_conflicts_are_named() -> None:
     """Unknown names, doubles and two forms of the same part."""
-    assert conflict(("tyre_slip", "brake_drag")) == ""
-    assert "no effect" in conflict(("tyre_slop",))
-    assert "twice" in conflict(("tyre_slip", "tyre_slip"))
-    assert "group" in conflict(("added_inertia", "tyre_slip"))
+    assert find_conflict(("tyre_slip", "brake_drag")) == ""
+    assert "no effect" in find_conflict(("tyre_slop",))
+    assert "twice" in find_conflict(("tyre_slip", "tyre_slip"))
+    assert "group" in find_conflict(("added_inertia", "tyre_slip"))

@@ -11,7 +11,7 @@ import pytest
 from tests.concealed.__main__ import main
 from tests.concealed.manoeuvre import OTHERS, TRAINING
 from tests.concealed.measurement import COLUMNS
-from tests.concealed.seal import sealed
+from tests.concealed.seal import seal_digest
 
 ORDER = "unknown_input+actuator_delay:1,sensor_delay:1"
 
@@ -22,7 +22,7 @@ def written(folder: Path, *words: str) -> tuple[dict[str, bytes], dict[str, Any]
     given = ["--out", str(out), "--labels", str(labels), "--seed", "9", "--rate", "100"]
     assert main([*given, *words]) == 0
     files = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*.csv"))}
-    assert sealed(labels) == hashlib.sha256(labels.read_bytes()).hexdigest()
+    assert seal_digest(labels) == hashlib.sha256(labels.read_bytes()).hexdigest()
     return files, json.loads(labels.read_text())
 
 

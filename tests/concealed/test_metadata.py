@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 
 from tests.concealed.case import Case
-from tests.concealed.measurement import COLUMNS, ROW, text
-from tests.concealed.order import ordered_cases
-from tests.concealed.recording import drawn_seconds
+from tests.concealed.measurement import COLUMNS, ROW, csv_text
+from tests.concealed.order import parse_order
+from tests.concealed.recording import draw_seconds
 from tests.concealed.solver import Array
 
 RECORDINGS = 13
@@ -19,7 +19,7 @@ def visible(case: Case) -> list[float]:
     rows = []
     for serial in range(RECORDINGS):
         rng = np.random.default_rng([case.seed, case.number, 4, serial, 0])
-        rows.append(round(drawn_seconds(rng) * case.rate))
+        rows.append(round(draw_seconds(rng) * case.rate))
     sizes = [len(COLUMNS) + 1 + width * count for count in rows]
     return [float(case.rate), float(case.number), *map(float, rows), *map(float, sizes)]
 
@@ -35,14 +35,14 @@ def nearest_is_right(features: Array, names: list[str]) -> int:
 
 def test_the_listing_is_the_one_that_is_written() -> None:
     """The lengths used below are the recordings' own."""
-    case = ordered_cases("all:1", 4, 1.0, None)[5]
+    case = parse_order("all:1", 4, 1.0, None)[5]
     rows = [float(round(one.seconds * case.rate)) for one in case.recordings]
     assert visible(case)[2 : 2 + RECORDINGS] == rows
 
 
 def test_nearest_neighbour_is_at_chance() -> None:
     """Not better than chance by four standard deviations, for 26 effects and for clean or not."""
-    cases = ordered_cases("all:8,none:208", 4, 1.0, None)
+    cases = parse_order("all:8,none:208", 4, 1.0, None)
     features = np.array([visible(case) for case in cases])
     names = ["+".join(case.effects) for case in cases]
     acting = [one for one, name in enumerate(names) if name]
@@ -55,7 +55,7 @@ def test_nearest_neighbour_is_at_chance() -> None:
 
 def test_the_order_of_names_is_at_chance() -> None:
     """A case's neighbour in the order of names has its effect as often as chance says."""
-    names = ["+".join(case.effects) for case in ordered_cases("all:40", 6, 1.0, None)]
+    names = ["+".join(case.effects) for case in parse_order("all:40", 6, 1.0, None)]
     same = sum(one == other for one, other in itertools.pairwise(names))
     expected = 39.0
     assert abs(same - expected) < 4.0 * np.sqrt(expected)
@@ -64,6 +64,6 @@ def test_the_order_of_names_is_at_chance() -> None:
 def test_numbers_have_one_width() -> None:
     """Whatever the values and signs, a row has the same length."""
     rows = np.array([[0.0, -119.75, 0.0, -88.1, 0.005], [9.4999, 249.75, 1503.0, 900.05, 99.99]])
-    lines = text(rows).splitlines()
+    lines = csv_text(rows).splitlines()
     assert len(lines[1]) == len(lines[2])
     assert [float(word) for word in lines[2].split(",")] == [9.4999, 249.75, 1503.0, 900.05, 99.99]

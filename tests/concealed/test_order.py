@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.concealed.__main__ import main
-from tests.concealed.order import RATES_HZ, OrderError, ordered_cases
+from tests.concealed.order import RATES_HZ, OrderError, parse_order
 
 NONSENSE = [
     ["--effects", "tyre_slop:1"],
@@ -50,7 +50,7 @@ def test_places_are_refused(tmp_path: Path) -> None:
 
 def test_every_effect_gets_all_rates_equally() -> None:
     """Three cases at each rate of twelve; `none` too."""
-    cases = ordered_cases("all:12,none:8", 3, 1.0, None)
+    cases = parse_order("all:12,none:8", 3, 1.0, None)
     shared = Counter((case.effects, case.rate) for case in cases)
     assert len(shared) == 27 * len(RATES_HZ)
     assert all(count == (3 if names else 2) for (names, _), count in shared.items())
@@ -58,7 +58,7 @@ def test_every_effect_gets_all_rates_equally() -> None:
 
 def test_the_seed_permutes() -> None:
     """Numbers are consecutive, the order of effects another one with each seed."""
-    one, two = (ordered_cases("all:2,none:5", seed, 1.0, None) for seed in (1, 2))
+    one, two = (parse_order("all:2,none:5", seed, 1.0, None) for seed in (1, 2))
     assert [case.number for case in one] == list(range(57))
     assert [case.effects for case in one] != [case.effects for case in two]
     assert Counter(case.effects for case in one) == Counter(case.effects for case in two)
@@ -66,6 +66,6 @@ def test_the_seed_permutes() -> None:
 
 def test_one_rate_for_all() -> None:
     """`--rate` overrules the sharing."""
-    assert {case.rate for case in ordered_cases("all:1", 1, 1.0, 500)} == {500}
+    assert {case.rate for case in parse_order("all:1", 1, 1.0, 500)} == {500}
     with pytest.raises(OrderError):
-        ordered_cases("all:1", 1, 1.0, 0)
+        parse_order("all:1", 1, 1.0, 0)

@@ -9,7 +9,7 @@ from tests.concealed.base import NOMINAL
 from tests.concealed.catalogue import CATALOGUE
 from tests.concealed.physics import Physics, clean_physics
 from tests.concealed.solver import STEP_S, SUBSTEPS, Array, solve
-from tests.concealed.twin import case_of, clean_recordings, difference, motion_of
+from tests.concealed.twin import case_of, clean_recordings, motion_of, rms_difference
 
 LEAST_NOISE = (0.05, 0.01)
 """Smallest noise of motor and wheel speed that a case can have [rad/s]."""
@@ -33,8 +33,8 @@ def test_half_the_step_changes_little(names: tuple[str, ...]) -> None:
     serial = serial_of("launch")
     whole = motion_of(names, serial)
     half = motion_of(names, serial, substeps=2 * SUBSTEPS)
-    assert difference(whole.w_em, half.w_em, scaled=False) < LEAST_NOISE[0] / 20
-    assert difference(whole.w_w, half.w_w, scaled=False) < LEAST_NOISE[1] / 20
+    assert rms_difference(whole.w_em, half.w_em, scaled=False) < LEAST_NOISE[0] / 20
+    assert rms_difference(whole.w_w, half.w_w, scaled=False) < LEAST_NOISE[1] / 20
 
 
 def plain_rates(p: Physics, y: list[float], torque: float) -> tuple[list[float], float]:
@@ -75,8 +75,8 @@ def test_against_the_brief_s_equations() -> None:
     coarse, fine = (plain_motion(physics, 20.0, torque, substeps) for substeps in (25, 50))
     plain = 2.0 * fine - coarse
     assert np.count_nonzero(np.diff(motion.contact[:, 0])) >= 4
-    assert difference(motion.w_em, plain[:, 0], scaled=False) < LEAST_NOISE[0] / 20
-    assert difference(motion.w_w, plain[:, 1], scaled=False) < LEAST_NOISE[1] / 20
+    assert rms_difference(motion.w_em, plain[:, 0], scaled=False) < LEAST_NOISE[0] / 20
+    assert rms_difference(motion.w_w, plain[:, 1], scaled=False) < LEAST_NOISE[1] / 20
 
 
 @pytest.mark.parametrize("names", [(), ("unequal_half_shafts",), ("second_gap",)])

@@ -78,7 +78,7 @@ class Trip:
         self.speed += change - math.copysign(min(abs(stop), abs(self.speed)), stop)
 
 
-def hann(values: Array, width_s: float) -> Array:
+def smooth_hann(values: Array, width_s: float) -> Array:
     """Smoothed by a raised cosine of that whole width, the ends held [N*m]."""
     half = max(1, round(0.5 * width_s / STEP_S))
     window = np.hanning(2 * half + 1)
@@ -86,7 +86,7 @@ def hann(values: Array, width_s: float) -> Array:
     return np.convolve(padded, window / window.sum(), mode="valid")
 
 
-def driven(trip: Trip, rows: int, pedal_s: float, pipe_s: float) -> Array:
+def smooth_torques(trip: Trip, rows: int, pedal_s: float, pipe_s: float) -> Array:
     """Demand and brake torque [N*m] every STEP_S, smoothed by pedal and brake pipe."""
     ratio = round(TICK_S / STEP_S)
     torque = np.repeat(np.array(trip.torque), ratio)
@@ -97,5 +97,5 @@ def driven(trip: Trip, rows: int, pedal_s: float, pipe_s: float) -> Array:
     rate = math.log(last / first) / time[-1] if last > first else 1e-9
     phase = 2.0 * np.pi * first * np.expm1(rate * time) / rate
     weaker = 1.0 / np.hypot(1.0, first * np.exp(rate * time) / SWEEP_CORNER_HZ)
-    swept = hann(torque, pedal_s) + amplitude * weaker * np.sin(phase)
-    return np.column_stack([swept, np.maximum(hann(brake, pipe_s), 0.0)])
+    swept = smooth_hann(torque, pedal_s) + amplitude * weaker * np.sin(phase)
+    return np.column_stack([swept, np.maximum(smooth_hann(brake, pipe_s), 0.0)])

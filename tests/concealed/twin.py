@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from tests.concealed.case import Case
-from tests.concealed.recording import Recording, moved
+from tests.concealed.recording import Recording, simulate_motion
 from tests.concealed.solver import SUBSTEPS, Array, Motion
 
 
@@ -27,10 +27,10 @@ def motion_of(
     effects: tuple[str, ...], serial: int, strength: float = 1.0, substeps: int = SUBSTEPS
 ) -> Motion:
     """What the training recording `serial` moves."""
-    return moved(case_of(effects, strength).physics, clean_recordings()[serial], substeps)
+    return simulate_motion(case_of(effects, strength).physics, clean_recordings()[serial], substeps)
 
 
-def difference(one: Array, other: Array, scaled: bool) -> float:
+def rms_difference(one: Array, other: Array, scaled: bool) -> float:
     """Root mean square of the difference, after the best constant re-scaling if `scaled`."""
     gain = float(one @ other / (other @ other)) if scaled else 1.0
     return float(np.sqrt(np.mean((one - gain * other) ** 2)))
@@ -41,6 +41,6 @@ def contrast(effects: tuple[str, ...], serial: int, strength: float, scaled: boo
     instruments = case_of(()).instruments
     motion, clean = motion_of(effects, serial, strength), motion_of((), serial)
     return max(
-        difference(motion.w_em, clean.w_em, scaled) / instruments.w_em.sd,
-        difference(motion.w_w, clean.w_w, scaled) / instruments.w_w.sd,
+        rms_difference(motion.w_em, clean.w_em, scaled) / instruments.w_em.sd,
+        rms_difference(motion.w_w, clean.w_w, scaled) / instruments.w_w.sd,
     )

@@ -13,7 +13,7 @@ Transition = tuple[str, Mapping[str, Any]]
 MOST = 64
 
 
-class Endless(Exception):
+class EndlessMacrostep(Exception):
     """A macrostep does not end."""
 
 
@@ -36,7 +36,7 @@ class Oracle:
     def send(self, event: str) -> None:
         """Take an external event."""
         self.steps = 0
-        self._microstep(self._selected(event))
+        self._microstep(self._select_transitions(event))
         self._run_to_completion()
 
     @property
@@ -72,41 +72,45 @@ class Oracle:
         return outer in self._ancestors(state)
 
     def _run_to_completion(self) -> None:
-        while chosen := self._selected(None):
+        while chosen := self._select_transitions(None):
             self._microstep(chosen)
 
-    def _selected(self, event: str | None) -> list[Transition]:
+    def _select_transitions(self, event: str | None) -> list[Transition]:
         enabled: list[Transition] = []
         for leaf in sorted(self.atomic, key=self.order.__getitem__):
             for state in (leaf, *self._ancestors(leaf)):
                 found = next(
-                    (w for w in self.states[state].get("transitions", ()) if self._fits(w, event)),
+                    (
+                        w
+                        for w in self.states[state].get("transitions", ())
+                        if self._is_enabled(w, event)
+                    ),
                     None,
                 )
                 if found is not None:
                     if not any(found is way for _, way in enabled):
                         enabled.append((state, found))
                     break
-        return self._without_conflicts(enabled)
+        return self._remove_conflicting(enabled)
 
-    def _fits(self, way: Mapping[str, Any], event: str | None) -> bool:
-        if event is None or not way.get("event"):
-            if event is not None or way.get("event"):
+    def _is_enabled(self, transition: Mapping[str, Any], event: str | None) -> bool:
+        if event is None or not transition.get("event"):
+            if event is not None or transition.get("event"):
                 return False
-        elif event not in way["event"]:
+        elif event not in transition["event"]:
             return False
-        condition = way.get("cond", "true")
+        condition = transition.get("cond", "true")
         if condition.startswith("In("):
             return condition[3:-1] in self.active
         return True
 
-    def _without_conflicts(self, enabled: list[Transition]) -> list[Transition]:
+    def _remove_conflicting(self, enabled: list[Transition]) -> list[Transition]:
         kept: list[Transition] = []
         for first in enabled:
             removed: list[Transition] = []
             preempted = False
             for second in kept:
-                if self._exits(first) & self._exits(second):
+                if self._exit_set(first) & self._exit_set(second):
                     if self._inside(first[0], second[0]):
                         removed.append(second)
                     else:
@@ -116,7 +120,7 @@ class Oracle:
                 kept = [way for way in kept if not any(way is r for r in removed)] + [first]
         return kept
 
-    def _exits(self, transition: Transition) -> set[str]:
+    def _exit_set(self, transition: Transition) -> set[str]:
         if not transition[1].get("target"):
             return set()
         domain = self._domain(transition)
@@ -124,7 +128,7 @@ class Oracle:
 
     def _domain(self, transition: Transition) -> str | None:
         source, way = transition
-        targets = self._effective(way.get("target", ()))
+        targets = self._effective_targets(way.get("target", ()))
         if not targets:
             return None
         inside = all(self._inside(target, source) for target in targets)
@@ -136,17 +140,21 @@ class Oracle:
                 return outer
         return self.root
 
-    def _effective(self, targets: Iterable[str]) -> list[str]:
+    def _effective_targets(self, targets: Iterable[str]) -> list[str]:
         found: list[str] = []
         for target in targets:
             if self._kind(target) == "history":
                 known = self.history.get(target)
-                found += known if known is not None else self._effective(self._default(target))
+                found += (
+                    known
+                    if known is not None
+                    else self._effective_targets(self._history_default(target))
+                )
             else:
                 found.append(target)
         return found
 
-    def _default(self, history: str) -> list[str]:
+    def _history_default(self, history: str) -> list[str]:
         targets: list[str] = self.states[history]["transitions"][0]["target"]
         return targets
 
@@ -155,12 +163,12 @@ class Oracle:
             return
         self.steps += 1
         if self.steps > MOST:
-            raise Endless
+            raise EndlessMacrostep
         self._exit(chosen)
         self._enter(chosen)
 
     def _exit(self, chosen: list[Transition]) -> None:
-        leaving = set[str]().union(*(self._exits(way) for way in chosen))
+        leaving = set[str]().union(*(self._exit_set(way) for way in chosen))
         for state in leaving:
             for child in self.states[state].get("children", ()):
                 if child["kind"] == "history":
@@ -179,14 +187,14 @@ class Oracle:
             domain = self.root if at_root else self._domain(transition)
             for target in transition[1].get("target", ()):
                 self._add_descendants(target, coming)
-            for target in self._effective(transition[1].get("target", ())):
+            for target in self._effective_targets(transition[1].get("target", ())):
                 self._add_ancestors(target, domain, coming)
         self.active |= coming
 
     def _add_descendants(self, state: str, coming: set[str]) -> None:
         if self._kind(state) == "history":
             known = self.history.get(state)
-            targets = known if known is not None else self._default(state)
+            targets = known if known is not None else self._history_default(state)
             for target in targets:
                 self._add_descendants(target, coming)
             for target in targets:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
-from tests.conformance.oracle import Endless, Oracle
+from tests.conformance.oracle import EndlessMacrostep, Oracle
 
 Raw = dict[str, Any]
 EVENTS = ("e1", "e2", "e3")
@@ -19,7 +19,7 @@ def random_case(draw: Random) -> Raw:
         chart = _Chart(draw).made()
         try:
             return _played(draw, chart)
-        except Endless:
+        except EndlessMacrostep:
             continue
 
 

@@ -8,32 +8,32 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from codegen.build import FLAGS, WARNINGS, compiler
+from codegen.build import FLAGS, WARNINGS, find_compiler
 from codegen.names import CNames
-from codegen.source import c_files
+from codegen.source import emit_c_files
 from engine.interpreter import Interpreter
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.program import Program
 from language.project import Project, read_document
-from tests.conformance.translation import Case, translated
+from tests.conformance.translation import Case, translate_case
 
 Active = frozenset[str]
 
 
 @dataclass(frozen=True)
-class Made:
+class LoadedCase:
     """A case with its Program, the script of its events, and what is to be active after each."""
 
     case: Case
     automaton: Automaton
     program: Program
     events: Sequence[str | None]
-    wanted: Sequence[Active]
+    expected: Sequence[Active]
 
     def active(self, numbers: Mapping[str, int]) -> Active:
         """Return the ids of the innermost active states, from the numbers of the regions."""
-        chart = self.automaton.tree
+        chart = self.automaton.statechart
         assert chart is not None
         found = set()
         for region in chart.regions:
@@ -43,9 +43,9 @@ class Made:
         return frozenset(found)
 
 
-def made(raw: Mapping[str, Any], name: str, folder: Path) -> Made:
+def load_case(raw: Mapping[str, Any], name: str, folder: Path) -> LoadedCase:
     """Return a case through the whole front end."""
-    case = translated(raw, name)
+    case = translate_case(raw, name)
     home = folder / name / "spec"
     home.mkdir(parents=True)
     (home / f"{name}.yaml").write_text(case.text)
@@ -53,32 +53,34 @@ def made(raw: Mapping[str, Any], name: str, folder: Path) -> Made:
     automaton = automaton_of(read_document(project.path_of(name)), project)
     events = [None, *(step["event"] for step in raw["steps"])]
     wanted = [raw["initial"], *(step["expect"] for step in raw["steps"])]
-    return Made(case, automaton, program_of(automaton), events, [frozenset(w) for w in wanted])
+    return LoadedCase(
+        case, automaton, program_of(automaton), events, [frozenset(w) for w in wanted]
+    )
 
 
-def interpreted(one: Made) -> list[Active]:
+def run_interpreted(loaded: LoadedCase) -> list[Active]:
     """Return what is active after each event, as the interpreter has it."""
-    stepper = Interpreter(one.program)
+    stepper = Interpreter(loaded.program)
     found = []
-    for event in one.events:
-        for name, ours in one.case.events.items():
+    for event in loaded.events:
+        for name, ours in loaded.case.events.items():
             stepper.set(f"input.{ours}", name == event)
         stepper.run("step")
         assert stepper.get("memory.faults") == 0
-        variables = one.program.mode_variables().items()
-        found.append(one.active({region: stepper.get(name) for region, name in variables}))
+        variables = loaded.program.mode_variables().items()
+        found.append(loaded.active({region: stepper.get(name) for region, name in variables}))
     return found
 
 
-def compiled(cases: Sequence[Made], folder: Path) -> list[list[Active]]:
+def run_compiled(cases: Sequence[LoadedCase], folder: Path) -> list[list[Active]]:
     """Return the same of C: all cases are one executable, for a compiler's start takes longest."""
     for one in cases:
-        for name, text in c_files(one.program).items():
+        for name, text in emit_c_files(one.program).items():
             (folder / name).write_text(text)
     (folder / "all.c").write_text(_main(cases))
     sources = ["all.c", *(f"{one.program.name}.c" for one in cases)]
     flags = [flag for flag in FLAGS if not flag.startswith("-O")]
-    command = [*compiler(), *flags, "-O0", *WARNINGS, "-Werror", *sources, "-o", "all"]
+    command = [*find_compiler(), *flags, "-O0", *WARNINGS, "-Werror", *sources, "-o", "all"]
     built = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
     assert built.returncode == 0, built.stderr[:4000]
     run = subprocess.run(["./all"], cwd=folder, capture_output=True, text=True, timeout=60)
@@ -91,7 +93,7 @@ def compiled(cases: Sequence[Made], folder: Path) -> list[list[Active]]:
     return found
 
 
-def _main(cases: Iterable[Made]) -> str:
+def _main(cases: Iterable[LoadedCase]) -> str:
     lines = ["#include <stdio.h>", "#include <string.h>"]
     lines += [f'#include "{one.program.name}.h"' for one in cases]
     body = ["int main(void)", "{"]
@@ -100,7 +102,7 @@ def _main(cases: Iterable[Made]) -> str:
     return "\n".join([*lines, *body, "    return 0;", "}", ""])
 
 
-def _script(one: Made) -> list[str]:
+def _script(one: LoadedCase) -> list[str]:
     """The events of one case; after each, the modes of its regions on one line."""
     name, place = one.program.name, CNames(one.program)
     modes = [place(v).replace("self->", "self.") for v in one.program.mode_variables().values()]

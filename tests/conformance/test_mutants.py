@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from language import entering, leaving, selecting
-from language.chart import Chart, Node
-from language.charting import Charting
+from language.chart import Chart, ChartNode
+from language.charting import ChartContext
 from language.operation import Assign, Block, Op, Value
 from tests.conformance.random_chart import random_case
-from tests.conformance.running import interpreted, made
+from tests.conformance.running import load_case, run_interpreted
 from tests.conformance.test_statecharts import RAW, SHOWING
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -25,10 +25,10 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 def _targets_around(patch: pytest.MonkeyPatch) -> None:
     """A target around its source is not left and entered again."""
 
-    def domain(self: Chart, source: Node, targets: Any, internal: bool) -> int | None:
+    def domain(self: Chart, source: ChartNode, targets: Any, internal: bool) -> int | None:
         wanted = [target.index for target in targets]
-        for node in self.outer(source):
-            if node.kind == "compound" and all(node.holds(w) for w in wanted):
+        for node in self.ancestors(source):
+            if node.kind == "compound" and all(node.contains(w) for w in wanted):
                 return node.index
         return 0
 
@@ -37,29 +37,29 @@ def _targets_around(patch: pytest.MonkeyPatch) -> None:
 
 def _no_history(patch: pytest.MonkeyPatch) -> None:
     """What a mode was left in is not kept."""
-    old = leaving._one
+    old = leaving._exit_node
 
-    def one(charting: Charting, node: Node) -> list[Op]:
+    def one(charting: ChartContext, node: ChartNode) -> list[Op]:
         return [op for op in old(charting, node) if not str(op).count("memory.left_")]
 
-    patch.setattr(leaving, "_one", one)
+    patch.setattr(leaving, "_exit_node", one)
 
 
 def _shallow_is_deep(patch: pytest.MonkeyPatch) -> None:
     """A shallow history enters all that was active."""
-    old = entering._Entry.recalled
+    old = entering._EntrySet.enter_history
 
-    def recalled(self: Any, node: Node, how: str, usual: Block) -> Block:
+    def recalled(self: Any, node: ChartNode, how: str, usual: Block) -> Block:
         return old(self, node, "deep", usual)
 
-    patch.setattr(entering._Entry, "recalled", recalled)
+    patch.setattr(entering._EntrySet, "enter_history", recalled)
 
 
 def _outer_first(patch: pytest.MonkeyPatch) -> None:
     """A transition of the outer mode wins."""
     old = selecting.selection_blocks
 
-    def blocks(charting: Charting) -> dict[str, Block]:
+    def blocks(charting: ChartContext) -> dict[str, Block]:
         chart = dataclasses.replace(charting.chart, order="outer_first")
         return old(dataclasses.replace(charting, chart=chart))
 
@@ -68,29 +68,29 @@ def _outer_first(patch: pytest.MonkeyPatch) -> None:
 
 def _all_wishes(patch: pytest.MonkeyPatch) -> None:
     """Regions that leave each other all get what they wish."""
-    patch.setattr(selecting, "_rivals", lambda charting, region: [])
+    patch.setattr(selecting, "_conflicting_regions", lambda charting, region: [])
 
 
 def _first_stays(patch: pytest.MonkeyPatch) -> None:
     """A wish from further inside does not drive out one from outside."""
-    patch.setattr(Chart, "is_inside", lambda self, region, other: False)
+    patch.setattr(Chart, "is_region_inside", lambda self, region, other: False)
 
 
 def _regions_at_initial(patch: pytest.MonkeyPatch) -> None:
     """Of several targets only the first is entered."""
-    old = entering._Entry.side_by_side
+    old = entering._EntrySet.enter_parallel
 
-    def side_by_side(self: Any, node: Node, wanted: Any) -> Block:
+    def side_by_side(self: Any, node: ChartNode, wanted: Any) -> Block:
         return old(self, node, list(wanted)[:1])
 
-    patch.setattr(entering._Entry, "side_by_side", side_by_side)
+    patch.setattr(entering._EntrySet, "enter_parallel", side_by_side)
 
 
 def _still_active(patch: pytest.MonkeyPatch) -> None:
     """Regions of a mode that is left stay active."""
-    old = entering.entering
+    old = entering.lower_entry_set
 
-    def enter(charting: Charting, transition: Any, way: Any) -> Block:
+    def enter(charting: ChartContext, transition: Any, way: Any) -> Block:
         numbers = {region.inactive for region in charting.automaton.regions}
         ops = old(charting, transition, way)
         return tuple(op for op in ops if not _sets(op, numbers))
@@ -129,7 +129,7 @@ def test_a_mistake_in_what_a_chart_does_is_seen(
 ) -> None:
     MUTANTS[mutant](monkeypatch)
     for number, raw in enumerate(_raw()):
-        one = made(json.loads(json.dumps(raw)), f"{mutant}_{number}", tmp_path)
-        if interpreted(one) != list(one.wanted):
+        one = load_case(json.loads(json.dumps(raw)), f"{mutant}_{number}", tmp_path)
+        if run_interpreted(one) != list(one.expected):
             return
     pytest.fail(f"nothing shows that {MUTANTS[mutant].__doc__}")

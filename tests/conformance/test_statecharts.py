@@ -10,7 +10,7 @@ import pytest
 
 from tests.conformance.oracle import Oracle
 from tests.conformance.random_chart import random_case
-from tests.conformance.running import Active, Made, compiled, interpreted, made
+from tests.conformance.running import Active, LoadedCase, load_case, run_compiled, run_interpreted
 
 FILE = Path(__file__).resolve().parents[1] / "data" / "conformance" / "statechart_cases.json"
 RAW = json.loads(FILE.read_text("utf-8"))
@@ -23,26 +23,28 @@ RANDOM = 24
 
 
 @pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory) -> list[Made]:
+def cases(tmp_path_factory: pytest.TempPathFactory) -> list[LoadedCase]:
     folder = tmp_path_factory.mktemp("conformance")
-    return [made(raw, f"case_{number}", folder) for number, raw in enumerate(RAW)]
+    return [load_case(raw, f"case_{number}", folder) for number, raw in enumerate(RAW)]
 
 
 @pytest.fixture(scope="module")
-def from_c(cases: list[Made], tmp_path_factory: pytest.TempPathFactory) -> list[list[Active]]:
-    return compiled(cases, tmp_path_factory.mktemp("conformance_c"))
+def from_c(cases: list[LoadedCase], tmp_path_factory: pytest.TempPathFactory) -> list[list[Active]]:
+    return run_compiled(cases, tmp_path_factory.mktemp("conformance_c"))
 
 
 @pytest.mark.parametrize("number", range(len(RAW)), ids=NAMES)
-def test_the_interpreter_has_the_active_modes_of_the_case(cases: list[Made], number: int) -> None:
-    assert interpreted(cases[number]) == list(cases[number].wanted)
+def test_the_interpreter_has_the_active_modes_of_the_case(
+    cases: list[LoadedCase], number: int
+) -> None:
+    assert run_interpreted(cases[number]) == list(cases[number].expected)
 
 
 @pytest.mark.parametrize("number", range(len(RAW)), ids=NAMES)
 def test_the_c_has_the_active_modes_of_the_case(
-    cases: list[Made], from_c: list[list[Active]], number: int
+    cases: list[LoadedCase], from_c: list[list[Active]], number: int
 ) -> None:
-    assert from_c[number] == list(cases[number].wanted)
+    assert from_c[number] == list(cases[number].expected)
 
 
 def test_the_oracle_has_the_active_modes_of_the_cases() -> None:
@@ -58,7 +60,7 @@ def test_the_oracle_has_the_active_modes_of_the_cases() -> None:
 def test_random_charts_do_what_the_algorithm_of_scxml_says(tmp_path: Path) -> None:
     seeds: list[int | str] = [*SHOWING, *(f"chart {k}" for k in range(RANDOM))]
     raw = [random_case(Random(seed)) for seed in seeds]
-    charts = [made(one, f"chart_{k}", tmp_path) for k, one in enumerate(raw)]
+    charts = [load_case(one, f"chart_{k}", tmp_path) for k, one in enumerate(raw)]
     for one in charts:
-        assert interpreted(one) == list(one.wanted), one.case.text
-    assert compiled(charts[:8], tmp_path) == [list(one.wanted) for one in charts[:8]]
+        assert run_interpreted(one) == list(one.expected), one.case.text
+    assert run_compiled(charts[:8], tmp_path) == [list(one.expected) for one in charts[:8]]

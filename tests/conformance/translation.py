@@ -26,7 +26,7 @@ class Case:
     ids: Mapping[str, str]
 
 
-def translated(case: Mapping[str, Any], name: str) -> Case:
+def translate_case(case: Mapping[str, Any], name: str) -> Case:
     """Return a case as an automaton of a name."""
     return _Translation(case, name).result()
 

@@ -8,28 +8,28 @@ from typing import Any, cast
 
 import numpy as np
 
-from codegen.predictor import Columns
-from diagnosis.bench import NOT_CANDIDATES
+from codegen.predictor import PredictorColumns
+from diagnosis.bench import EXCLUDED_EFFECTS
 from diagnosis.candidate import Candidate
 from diagnosis.case import Case
 from diagnosis.diagnose import Diagnosis
-from diagnosis.dossier import Dossier
+from diagnosis.dossier import DiagnosisReport
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import Evidence
-from diagnosis.layers import Layer, automaton, fitting
-from diagnosis.library import described, library
-from diagnosis.naming import named
-from diagnosis.normal import Normal
-from diagnosis.point import Point, is_own
-from diagnosis.recipe import Recipe
-from diagnosis.search import Tried
+from diagnosis.evidence import LikelihoodGain
+from diagnosis.layers import PlacedEffect, automaton_with_effects, find_placements
+from diagnosis.library import describe_effect, library_effects
+from diagnosis.naming import named_effect_of
+from diagnosis.normal import NormalEquations
+from diagnosis.point import ParameterVector, per_recording_mask
+from diagnosis.recipe import CompiledModel
+from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
-from diagnosis.uncertain import Uncertain, uncertain_of
+from diagnosis.uncertain import FreeParameter, free_parameters_of
 from diagnosis.verdict import Verdict
 from language.document import Document
-from language.effect import own_names
+from language.effect import added_names
 from language.map import read_map
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 
 BASE = "blind_driveline"
 MOVED = 0.2
@@ -41,52 +41,60 @@ NOTHING = cast(Any, None)
 
 def base_of(project: Project) -> Document:
     """Return the expanded base."""
-    return expanded(read_document(project.path_of(BASE)), project)
+    return expand_document(read_document(project.path_of(BASE)), project)
 
 
-def acceptable(project: Project) -> list[Layer]:
+def acceptable_layers(project: Project) -> list[PlacedEffect]:
     """Return every effect of the library that can be accepted, wherever the base takes it."""
     base = base_of(project)
-    effects = [one for one in library(project) if one.name not in NOT_CANDIDATES]
-    return [layer for one in effects for layer in described(one, base, project).layers]
+    effects = [one for one in library_effects(project) if one.name not in EXCLUDED_EFFECTS]
+    return [layer for one in effects for layer in describe_effect(one, base, project).placements]
 
 
-def layers_of(project: Project, ids: Sequence[str]) -> list[Layer]:
+def layers_of(project: Project, ids: Sequence[str]) -> list[PlacedEffect]:
     """Return effects at places, named `effect@place`."""
     base = base_of(project)
-    known = {one.name: one for one in library(project)}
-    fits = [layer for name in ids for layer in fitting(base, known[name.partition("@")[0]])]
+    known = {one.name: one for one in library_effects(project)}
+    fits = [layer for name in ids for layer in find_placements(base, known[name.partition("@")[0]])]
     return [next(layer for layer in fits if layer.id == name) for name in ids]
 
 
-def accepted(project: Project, layers: Sequence[Layer]) -> Dossier:
+def make_dossier(project: Project, layers: Sequence[PlacedEffect]) -> DiagnosisReport:
     """Return a dossier in which layers were accepted, with parameters away from neutral values."""
     base = base_of(project)
     mapping = read_map(read_document(project.path_of("blind_columns")), project)
     case = Case(base, project, mapping, (Path("a.csv"), Path("b.csv")))
-    whole = automaton(base, project, layers)
-    brought = [layer.named(name) for layer in layers for name in own_names(layer.effect.body)]
-    uncertain = uncertain_of(whole, brought)
-    recipe = Recipe(Columns(BASE, (), (), (), (), (), {}), 1, (), uncertain, (), (), ())
+    whole = automaton_with_effects(base, project, layers)
+    brought = [
+        layer.qualified_name(name) for layer in layers for name in added_names(layer.effect.body)
+    ]
+    uncertain = free_parameters_of(whole, brought)
+    recipe = CompiledModel(
+        PredictorColumns(BASE, (), (), (), (), (), {}), 1, (), uncertain, (), (), ()
+    )
     candidate = Candidate(tuple(layers), recipe, NOTHING)
     z = np.array([_coordinate(one) for one in uncertain])
     each = np.tile(np.eye(len(z)) * DATA, (2, 1, 1))
     blocks = np.arange(2)
-    normal = Normal(each, np.zeros((2, len(z))), is_own(candidate), blocks, blocks)
-    point = Point(z, np.tile(z, (2, 1)))
+    normal = NormalEquations(
+        each, np.zeros((2, len(z))), per_recording_mask(candidate), blocks, blocks
+    )
+    point = ParameterVector(z, np.tile(z, (2, 1)))
     model = Estimate(candidate, point, 0.0, NOTHING, NOTHING, NOTHING, normal)
-    gains = Evidence(100.0, 90.0, (50.0, 40.0))
-    tried = tuple(Tried(layer, 100.0, model, gains) for layer in layers)
+    gains = LikelihoodGain(100.0, 90.0, (50.0, 40.0))
+    tried = tuple(CandidateFit(layer, 100.0, model, gains) for layer in layers)
     selection = Selection(model, model, tried, tried, ())
-    plain = automaton(base, project, ())
-    effects = tuple(named(layer, model, plain) for layer in layers)
+    plain = automaton_with_effects(base, project, ())
+    effects = tuple(named_effect_of(layer, model, plain) for layer in layers)
     verdict = Verdict(
         "effect", effects, (), 1.0, (), (), {"train": {}}, {}, None, 1.0, (), {"a.csv": "0" * 16}
     )
-    return Dossier(case, plain, NOTHING, verdict, Diagnosis(verdict, selection, NOTHING, ()))
+    return DiagnosisReport(
+        case, plain, NOTHING, verdict, Diagnosis(verdict, selection, NOTHING, ())
+    )
 
 
-def _coordinate(one: Uncertain) -> float:
+def _coordinate(one: FreeParameter) -> float:
     """Return where a parameter stands: where it shows most, or a little off what was declared."""
     low, high = one.bounds
     z = one.coordinate(one.starts[-1]) if one.starts and one.starts[-1] else MOVED

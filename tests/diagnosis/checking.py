@@ -5,22 +5,26 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from diagnosis.mistakes import mistakes_of
+from diagnosis.mistakes import find_clock_and_sign_errors
 from diagnosis.recording_check import RecordingCheck, check_recordings
 from engine.recording import Recording
 from language.project import Project
-from modewright.compiled import carried_out
+from modewright.compiled import simulate_resolved
 from tests.diagnosis.driving import (
-    bench,
     document,
     driveline,
+    read_recording_map,
 )
 
 
 def check(*recordings: Recording) -> RecordingCheck:
-    mistakes = partial(mistakes_of, document(), Project(Path()), driveline(), bench())
-    return check_recordings(recordings, bench(), driveline(), carried_out, mistakes)
+    mistakes = partial(
+        find_clock_and_sign_errors, document(), Project(Path()), driveline(), read_recording_map()
+    )
+    return check_recordings(
+        recordings, read_recording_map(), driveline(), simulate_resolved, mistakes
+    )
 
 
-def seen(found: RecordingCheck) -> set[tuple[str, str, str]]:
+def finding_keys(found: RecordingCheck) -> set[tuple[str, str, str]]:
     return {(one.severity, one.kind, one.channel) for one in found.findings}

@@ -15,7 +15,7 @@ import pytest
 from codegen import predictor
 from codegen.cache import cache_folder
 from diagnosis import recipe
-from diagnosis.dossier import finite
+from diagnosis.dossier import replace_non_finite
 from diagnosis.verdict import Verdict
 from tests.language.making import ROOT
 
@@ -31,7 +31,7 @@ def _every_verdict_has_its_form() -> Iterator[None]:
 
     def checked(self: Verdict, *arguments: Any, **named: Any) -> None:
         made(self, *arguments, **named)
-        VALIDATOR.validate(finite(self.json()))
+        VALIDATOR.validate(replace_non_finite(self.to_json()))
         shares = [one.probability for one in self.candidates]
         assert sum(shares) + self.other == pytest.approx(1.0)
 
@@ -47,5 +47,5 @@ def _predictors_are_compiled_soon() -> Iterator[None]:
     folder.mkdir(mode=0o700, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(predictor, "LIBRARY_FLAGS", SOON)
-        patch.setattr(recipe, "_folder", lambda: folder)
+        patch.setattr(recipe, "_cache_folder", lambda: folder)
         yield

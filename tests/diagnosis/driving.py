@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.free_run import free_run
+from diagnosis.free_run import simulate_free_run
 from engine.recording import Channel, Recording
 from language.document import Document
 from language.experiment import RecordingMap
-from language.finding import document_of
+from language.finding import parse_document
 from language.load import automaton_of, command_line_value
 from language.map import read_map
 from language.model import Automaton
@@ -72,12 +72,14 @@ def driveline(*values: tuple[str, str]) -> Automaton:
 
 @cache
 def document() -> Document:
-    return document_of(Source("small_driveline.yaml", tuple(SPEC.splitlines())), SPEC)
+    return parse_document(Source("small_driveline.yaml", tuple(SPEC.splitlines())), SPEC)
 
 
 @cache
-def bench() -> RecordingMap:
-    return read_map(document_of(Source("map.yaml", tuple(MAP.splitlines())), MAP), Project(Path()))
+def read_recording_map() -> RecordingMap:
+    return read_map(
+        parse_document(Source("map.yaml", tuple(MAP.splitlines())), MAP), Project(Path())
+    )
 
 
 def recording_of(name: str, times: Values, values: dict[str, Values]) -> Recording:
@@ -88,7 +90,9 @@ def recording_of(name: str, times: Values, values: dict[str, Values]) -> Recordi
         if not kept.any():
             continue
         stamps = tuple(Fraction(round(float(t) * 10000), 10000) for t in times[kept])
-        channels[key] = Channel(bench().columns[key], stamps, tuple(column[kept].tolist()))
+        channels[key] = Channel(
+            read_recording_map().columns[key], stamps, tuple(column[kept].tolist())
+        )
     first = channels["torque"].times
     return Recording(name, channels, first[-1], first[0])
 
@@ -103,7 +107,9 @@ def tip_in(constant: bool = False) -> tuple[Values, dict[str, Values]]:
     if constant:
         torque, brake = 0.0 * times + 20.0, 0.0 * times
     blank = {"torque": torque, "brake": brake, "motor": 0.0 * times - 9.0, "wheel": 0.0 * times - 1}
-    run = free_run(driveline(*TRUE.items()), recording_of("true", times, blank), bench())
+    run = simulate_free_run(
+        driveline(*TRUE.items()), recording_of("true", times, blank), read_recording_map()
+    )
     chance = np.random.default_rng(1)
 
     def measured(values: Values, noise: float, quantum: float) -> Values:
@@ -113,12 +119,12 @@ def tip_in(constant: bool = False) -> tuple[Values, dict[str, Values]]:
     return times, {
         "torque": measured(torque, 0.3, 0.25),
         "brake": brake,
-        "motor": measured(run.compared["motor"].simulated, 0.1, 0.05),
-        "wheel": measured(run.compared["wheel"].simulated, 0.02, 0.01),
+        "motor": measured(run.comparisons["motor"].simulated, 0.1, 0.05),
+        "wheel": measured(run.comparisons["wheel"].simulated, 0.02, 0.01),
     }
 
 
-def spoiled(spoil: Spoil | None = None, name: str = "tip_in") -> Recording:
+def spoil_recording(spoil: Spoil | None = None, name: str = "tip_in") -> Recording:
     """The recording, spoiled."""
     times, values = tip_in()
     copy = {key: column.copy() for key, column in values.items()}
@@ -127,7 +133,7 @@ def spoiled(spoil: Spoil | None = None, name: str = "tip_in") -> Recording:
     return recording_of(name, times, copy)
 
 
-def later(key: str, seconds: float) -> Spoil:
+def delay_channel(key: str, seconds: float) -> Spoil:
     """Spoil by a logger of one channel whose clock is late."""
 
     def spoil(_: Values, values: dict[str, Values]) -> None:
@@ -137,7 +143,7 @@ def later(key: str, seconds: float) -> Spoil:
     return spoil
 
 
-def scaled(key: str, factor: float) -> Spoil:
+def scale_channel(key: str, factor: float) -> Spoil:
     """Spoil by a wrong unit or sign."""
 
     def spoil(_: Values, values: dict[str, Values]) -> None:
@@ -146,8 +152,8 @@ def scaled(key: str, factor: float) -> Spoil:
     return spoil
 
 
-def shortened(recording: Recording, seconds: int) -> Recording:
+def truncate_recording(recording: Recording, seconds: int) -> Recording:
     """The first seconds of a recording."""
-    from engine.recording import cut
+    from engine.recording import crop
 
-    return replace(cut(recording, (Fraction(0), Fraction(seconds))), windows=())
+    return replace(crop(recording, (Fraction(0), Fraction(seconds))), windows=())

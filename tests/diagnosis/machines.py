@@ -18,7 +18,7 @@ TIP_OUTS = {
 """Parts of the LEAF's drives around what a gap does there."""
 
 
-def emps(recordings: Path) -> Figure:
+def diagnose_emps(recordings: Path) -> Figure:
     """Friction and offset of the servo axis: trained on the first half, shown on the second."""
     file = recordings / "emps" / "emps.csv.gz"
     verdict = mw.diagnose("emps", [f"{file}@0..12.4"], [f"{file}@12.4..24.9"]).verdict
@@ -35,7 +35,7 @@ def emps(recordings: Path) -> Figure:
     }
 
 
-def leaf(recordings: Path, train: str, other: str) -> Figure:
+def diagnose_leaf(recordings: Path, train: str, other: str) -> Figure:
     """The gap of the LEAF's half-shafts: trained on one drive, shown on the tip-outs of another."""
     folder = recordings / "nissan_leaf"
     held_out = [f"{folder / other}.csv{part}" for part in TIP_OUTS[other]]
@@ -54,7 +54,7 @@ def leaf(recordings: Path, train: str, other: str) -> Figure:
     }
 
 
-def damper(recordings: Path, file: str) -> Figure:
+def diagnose_damper(recordings: Path, file: str) -> Figure:
     """The gap of the friction damper in eight seconds of one series."""
     train = f"{recordings / 'brfd_damper' / file}@2..10"
     verdict = mw.diagnose("brfd_damper", [train]).verdict

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 from tests.language.making import ROOT
 
 SPEC = """\
@@ -51,7 +51,7 @@ J, B, T_C = 0.55, 0.12, 2.0
 RATE, SECONDS, FINE = 100, 10, 20
 
 
-def bench(folder: Path, T_c: float = T_C, hit: float = 0.0) -> Path:
+def write_project(folder: Path, T_c: float = T_C, hit: float = 0.0) -> Path:
     """Make a project with recordings `run_0.csv` ... `run_2.csv` and a library of effects.
 
     In each a torque that is not recorded acts for a second: a `hit` [N*m].
@@ -91,8 +91,8 @@ COMMAND = (
 )
 
 
-def run(folder: Path, *arguments: str) -> int:
+def run_command(folder: Path, *arguments: str) -> int:
     """Run the command line in a folder; return its exit code."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        return exit_code(lambda: app(list(arguments), standalone_mode=False))
+        return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))

@@ -5,39 +5,41 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.adaptation import adapted, turned
-from diagnosis.bench import Bench
-from diagnosis.estimate import looked_at
-from diagnosis.layers import fitting, shipped_effects
-from diagnosis.point import point_of
-from diagnosis.prediction import noises_of
-from tests.diagnosis.test_estimation import TRUTH, bench, recorded
+from diagnosis.adaptation import reestimate_per_recording, restart_phases
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import evaluate
+from diagnosis.layers import find_placements, shipped_effects
+from diagnosis.point import vector_of
+from diagnosis.prediction import measured_noise_levels
+from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]
 PHASE = -2.3
 
 
 @pytest.mark.parametrize("before", [0.8, 2.4, -5.0])
-def test_a_phase_is_found_far_from_that_of_other_recordings(bench: Bench, before: float) -> None:
+def test_a_phase_is_found_far_from_that_of_other_recordings(bench: ModelSet, before: float) -> None:
     effect = next(one for one in shipped_effects() if one.name == "sensor_eccentricity")
-    layer = next(one for one in fitting(bench.document, effect) if one.place == "w_s")
-    candidate = bench.candidate((layer,))
+    layer = next(one for one in find_placements(bench.document, effect) if one.place == "w_s")
+    candidate = bench.compile_candidate((layer,))
     known = {**TRUTH, "ecc_w_s": 0.02}
-    held = recorded(candidate, {**known, "ph_w_s": PHASE})
-    point = point_of(candidate, len(held), {**known, "ph_w_s": before})
-    model = looked_at(candidate, held, noises_of(held, {}), point)
-    found = adapted(model, held)
+    held = simulate_recordings(candidate, {**known, "ph_w_s": PHASE})
+    point = vector_of(candidate, len(held), {**known, "ph_w_s": before})
+    model = evaluate(candidate, held, measured_noise_levels(held, {}), point)
+    found = reestimate_per_recording(model, held)
     for k in range(len(held)):
         apart = np.remainder(found.values(k)["ph_w_s"] - PHASE + np.pi, 2.0 * np.pi) - np.pi
         assert abs(apart) < 0.15
         assert found.values(k)["ecc_w_s"] == model.values(k)["ecc_w_s"]
 
 
-def test_a_phase_that_is_right_is_not_turned_to_a_start(bench: Bench) -> None:
+def test_a_phase_that_is_right_is_not_turned_to_a_start(bench: ModelSet) -> None:
     effect = next(one for one in shipped_effects() if one.name == "sensor_eccentricity")
-    layer = next(one for one in fitting(bench.document, effect) if one.place == "w_s")
-    candidate = bench.candidate((layer,))
+    layer = next(one for one in find_placements(bench.document, effect) if one.place == "w_s")
+    candidate = bench.compile_candidate((layer,))
     known = {**TRUTH, "ecc_w_s": 0.02, "ph_w_s": PHASE}
-    held = recorded(candidate, known)
-    model = looked_at(candidate, held, noises_of(held, {}), point_of(candidate, len(held), known))
-    assert turned(model, held).values(0)["ph_w_s"] == pytest.approx(PHASE)
+    held = simulate_recordings(candidate, known)
+    model = evaluate(
+        candidate, held, measured_noise_levels(held, {}), vector_of(candidate, len(held), known)
+    )
+    assert restart_phases(model, held).values(0)["ph_w_s"] == pytest.approx(PHASE)

@@ -10,28 +10,28 @@ import numpy as np
 import pytest
 
 from diagnosis.adequacy import (
-    FAINT,
-    hardly_shows,
+    SMALL_GAIN,
+    has_autocorrelated_residuals,
+    has_autocorrelated_residuals_in_most,
+    has_stacked_effects,
     is_inadequate,
-    piles_up,
-    refused,
-    remembers,
-    remembers_mostly,
+    lacks_simulation_improvement,
+    reject_effects,
 )
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.estimation import estimated
-from diagnosis.evidence import evidence, inflations
-from diagnosis.joined import burnt
-from diagnosis.layers import effects_in, fitting
-from diagnosis.level import settled, units_of
-from diagnosis.search import Tried
+from diagnosis.estimation import estimate_parameters
+from diagnosis.evidence import integrated_autocorrelation_by_recording, likelihood_gain
+from diagnosis.joined import burn_in_samples
+from diagnosis.layers import find_placements, read_effects
+from diagnosis.level import disturbance_units, fit_with_noise
+from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
-from diagnosis.series import Series
-from diagnosis.stirring import resting, stirring
-from diagnosis.strain import is_strained, strain
+from diagnosis.series import SampledRecording
+from diagnosis.stirring import input_dependence, standstill_dependence
+from diagnosis.strain import bound_score, rejects_bounds
 from tests.diagnosis.test_estimation import bench
-from tests.diagnosis.test_location import based, with_effect
+from tests.diagnosis.test_location import fit_first_base, with_effect
 from tests.language.making import ROOT
 
 __all__ = ["bench"]
@@ -43,20 +43,24 @@ STRONG = {"T_c_w_em": 10.0}
 
 
 @pytest.fixture(scope="module")
-def rubbing(bench: Bench) -> Bench:
+def rubbing(bench: ModelSet) -> ModelSet:
     """Return recordings of a driveline with dry friction at the motor."""
     return with_effect(bench, "coulomb_friction@w_em", STRONG)
 
 
-def accepting(bench: Bench, rubbing: Bench, effect: str, base: Estimate | None = None) -> Selection:
+def select_effect(
+    bench: ModelSet, rubbing: ModelSet, effect: str, base: Estimate | None = None
+) -> Selection:
     """Return a selection that has accepted an effect for what is recorded, over a base."""
-    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
-    base = base or based(rubbing)
-    units = units_of(base.candidate, rubbing.series, base.values(0))
-    candidate = rubbing.candidate((layers[effect],))
-    model = settled(candidate, rubbing.series, base.noises, base.values(0), units)
-    known = evidence(model, base, rubbing.series)
-    tried = Tried(layers[effect], known.train, model, known)
+    layers = {
+        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
+    }
+    base = base or fit_first_base(rubbing)
+    units = disturbance_units(base.candidate, rubbing.series, base.values(0))
+    candidate = rubbing.compile_candidate((layers[effect],))
+    model = fit_with_noise(candidate, rubbing.series, base.noise_levels, base.values(0), units)
+    known = likelihood_gain(model, base, rubbing.series)
+    tried = CandidateFit(layers[effect], known.penalised, model, known)
     return Selection(base, model, (tried,), (tried,), ())
 
 
@@ -64,9 +68,9 @@ def accepting(bench: Bench, rubbing: Bench, effect: str, base: Estimate | None =
     ("effect", "inadequate"), [("coulomb_friction@w_em", False), ("sensor_lag@w_em", True)]
 )
 def test_what_explains_less_than_it_leaves_is_inadequate(
-    bench: Bench, rubbing: Bench, effect: str, inadequate: bool
+    bench: ModelSet, rubbing: ModelSet, effect: str, inadequate: bool
 ) -> None:
-    selection = accepting(bench, rubbing, effect)
+    selection = select_effect(bench, rubbing, effect)
     assert is_inadequate(rubbing, selection, NEEDED) is inadequate
 
 
@@ -74,35 +78,39 @@ def test_what_explains_less_than_it_leaves_is_inadequate(
     ("effect", "does"), [("coulomb_friction@w_em", False), ("sensor_lag@w_em", True)]
 )
 def test_innovations_remember_what_is_still_missing(
-    bench: Bench, rubbing: Bench, effect: str, does: bool
+    bench: ModelSet, rubbing: ModelSet, effect: str, does: bool
 ) -> None:
-    base = based(rubbing)
-    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
-    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
-    selection = accepting(bench, rubbing, effect, alone)
-    start = selection.model.candidate, rubbing.series, quiet.noises, selection.model.point
-    selection = dataclasses.replace(selection, model=estimated(*start))
-    assert remembers(rubbing, selection) is does
-    assert remembers_mostly(rubbing, selection) is does
+    base = fit_first_base(rubbing)
+    quiet = dataclasses.replace(
+        base, noise_levels=dataclasses.replace(base.noise_levels, process={})
+    )
+    alone = estimate_parameters(quiet.candidate, rubbing.series, quiet.noise_levels, quiet.point)
+    selection = select_effect(bench, rubbing, effect, alone)
+    start = selection.model.candidate, rubbing.series, quiet.noise_levels, selection.model.point
+    selection = dataclasses.replace(selection, model=estimate_parameters(*start))
+    assert has_autocorrelated_residuals(rubbing, selection) is does
+    assert has_autocorrelated_residuals_in_most(rubbing, selection) is does
 
 
 @pytest.mark.parametrize(("further", "piles"), [(0.3, False), (0.4, True)])
 def test_two_that_gain_alike_at_one_place_are_neither(
-    bench: Bench, rubbing: Bench, further: float, piles: bool
+    bench: ModelSet, rubbing: ModelSet, further: float, piles: bool
 ) -> None:
-    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    selection = select_effect(bench, rubbing, "coulomb_friction@w_em")
     (first,) = selection.accepted
-    assert first.evidence is not None
-    less = dataclasses.replace(first.evidence, train=further * first.evidence.train)
-    second = dataclasses.replace(first, evidence=less)
-    assert piles_up(dataclasses.replace(selection, accepted=(first, second))) is piles
-    assert not piles_up(selection)
+    assert first.likelihood_gain is not None
+    less = dataclasses.replace(
+        first.likelihood_gain, penalised=further * first.likelihood_gain.penalised
+    )
+    second = dataclasses.replace(first, likelihood_gain=less)
+    assert has_stacked_effects(dataclasses.replace(selection, accepted=(first, second))) is piles
+    assert not has_stacked_effects(selection)
 
 
-def test_what_was_refused_is_not_likely(bench: Bench, rubbing: Bench) -> None:
-    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+def test_what_was_refused_is_not_likely(bench: ModelSet, rubbing: ModelSet) -> None:
+    selection = select_effect(bench, rubbing, "coulomb_friction@w_em")
     assert selection.probabilities()["coulomb_friction@w_em"] > 0.9
-    left = refused(selection)
+    left = reject_effects(selection)
     assert left.model is selection.base
     assert left.accepted == ()
     assert left.probabilities()["other"] > 0.9
@@ -111,76 +119,80 @@ def test_what_was_refused_is_not_likely(bench: Bench, rubbing: Bench) -> None:
 def test_an_unknown_that_comes_when_inputs_move_answers_to_them() -> None:
     time = np.arange(0.0, 10.0, 0.01)
     torque = np.where((time > 3.0) & (time < 6.0), 100.0, 0.0)
-    series = Series("a", Fraction(1, 100), Fraction(0), torque[:, None], torque[:, None])
+    series = SampledRecording("a", Fraction(1, 100), Fraction(0), torque[:, None], torque[:, None])
     answer = np.exp(-np.abs(time - 3.05) / 0.1) - np.exp(-np.abs(time - 6.05) / 0.1)
     other = np.exp(-np.abs(time - 1.5) / 0.1) + np.exp(-np.abs(time - 8.0) / 0.1)
-    start = burnt(series)
-    assert stirring([series], [answer[start:]]) > 0.8
-    assert stirring([series], [other[start:]]) < 0.1
-    assert stirring([series], [0.0 * answer[start:]]) == 0.0
+    start = burn_in_samples(series)
+    assert input_dependence([series], [answer[start:]]) > 0.8
+    assert input_dependence([series], [other[start:]]) < 0.1
+    assert input_dependence([series], [0.0 * answer[start:]]) == 0.0
 
 
 def test_an_unknown_that_is_heard_near_rest_is_what_a_friction_lacks() -> None:
     time = np.arange(0.0, 10.0, 0.01)
     speed = 50.0 * np.cos(0.3 * np.pi * time)
-    series = Series("a", Fraction(1, 100), Fraction(0), speed[:, None], speed[:, None])
-    start = burnt(series)
+    series = SampledRecording("a", Fraction(1, 100), Fraction(0), speed[:, None], speed[:, None])
+    start = burn_in_samples(series)
     rubs = np.exp(-((speed / 4.0) ** 2)) * np.sign(np.gradient(speed))
     hit = np.exp(-np.abs(time - 3.3) / 0.1)
-    assert resting([series], [rubs[start:]]) > 0.9
-    assert resting([series], [hit[start:]]) < 0.3
+    assert standstill_dependence([series], [rubs[start:]]) > 0.9
+    assert standstill_dependence([series], [hit[start:]]) < 0.3
 
 
 def test_a_few_recordings_in_which_much_is_left_do_not_speak_for_all(
-    bench: Bench, rubbing: Bench
+    bench: ModelSet, rubbing: ModelSet
 ) -> None:
-    base = based(rubbing)
-    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
-    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
-    right = accepting(bench, rubbing, "coulomb_friction@w_em", alone)
-    before = alone.outcome.innovations
+    base = fit_first_base(rubbing)
+    quiet = dataclasses.replace(
+        base, noise_levels=dataclasses.replace(base.noise_levels, process={})
+    )
+    alone = estimate_parameters(quiet.candidate, rubbing.series, quiet.noise_levels, quiet.point)
+    right = select_effect(bench, rubbing, "coulomb_friction@w_em", alone)
+    before = alone.prediction.innovations
     assert len(before) > FEW
     for bad, mostly in ((FEW, False), (len(before), True)):
-        outcome = dataclasses.replace(right.model.outcome)
+        outcome = dataclasses.replace(right.model.prediction)
         after = list(outcome.innovations)
-        for k in np.argsort(-inflations(alone, rubbing.series))[:bad]:
+        for k in np.argsort(-integrated_autocorrelation_by_recording(alone, rubbing.series))[:bad]:
             after[k] = LOUDER * before[k]
         vars(outcome)["joined"] = np.concatenate(after)
-        model = dataclasses.replace(right.model, outcome=outcome)
+        model = dataclasses.replace(right.model, prediction=outcome)
         selection = dataclasses.replace(right, model=model)
-        assert remembers(rubbing, selection)
-        assert remembers_mostly(rubbing, selection) is mostly
+        assert has_autocorrelated_residuals(rubbing, selection)
+        assert has_autocorrelated_residuals_in_most(rubbing, selection) is mostly
 
 
 @pytest.mark.parametrize(("most", "strained"), [(100, False), (2, True)])
 def test_what_is_pulled_out_of_its_range_is_something_else(
-    bench: Bench, rubbing: Bench, most: int, strained: bool, tmp_path: Path
+    bench: ModelSet, rubbing: ModelSet, most: int, strained: bool, tmp_path: Path
 ) -> None:
     """Friction of which no more than a fifth may act would gain much beyond that."""
     text = (ROOT / "spec" / "effects" / "coulomb_friction.yaml").read_text()
     limited = text.replace("range: [0, 100]", f"range: [0, {most}]")
     (tmp_path / "coulomb_friction.yaml").write_text(limited)
-    own = dataclasses.replace(rubbing, effects=effects_in(tmp_path), _made={})
-    selection = accepting(own, own, "coulomb_friction@w_em")
+    own = dataclasses.replace(rubbing, effects=read_effects(tmp_path), _compiled={})
+    selection = select_effect(own, own, "coulomb_friction@w_em")
     given = selection.model, selection.accepted
-    assert is_strained(*given) is strained
-    assert (strain(*given) < 1.0) is not strained
+    assert rejects_bounds(*given) is strained
+    assert (bound_score(*given) < 1.0) is not strained
 
 
 @pytest.mark.parametrize(("part", "loud"), [(0.1, 0.95), (10.0, 0.95), (0.1, 0.5)])
 def test_what_gained_little_has_to_show_in_simulations(
-    bench: Bench, rubbing: Bench, part: float, loud: float, monkeypatch: pytest.MonkeyPatch
+    bench: ModelSet, rubbing: ModelSet, part: float, loud: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A faint name falls where simulations stay nearly as they were; a strong one need not show."""
-    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    selection = select_effect(bench, rubbing, "coulomb_friction@w_em")
     (first,) = selection.accepted
-    assert first.evidence is not None
-    assert not hardly_shows(rubbing, selection)
-    known = dataclasses.replace(first.evidence, train=part * FAINT)
-    faint = dataclasses.replace(selection, accepted=(dataclasses.replace(first, evidence=known),))
+    assert first.likelihood_gain is not None
+    assert not lacks_simulation_improvement(rubbing, selection)
+    known = dataclasses.replace(first.likelihood_gain, penalised=part * SMALL_GAIN)
+    faint = dataclasses.replace(
+        selection, accepted=(dataclasses.replace(first, likelihood_gain=known),)
+    )
     sizes = {
         id(selection.base): np.array([0.1, 0.2]),
         id(selection.model): loud * np.array([0.1, 0.2]),
     }
     monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
-    assert hardly_shows(rubbing, faint) is (part < 1.0 and loud > 0.85)
+    assert lacks_simulation_improvement(rubbing, faint) is (part < 1.0 and loud > 0.85)

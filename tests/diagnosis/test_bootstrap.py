@@ -12,27 +12,27 @@ import numpy as np
 import pytest
 
 import diagnosis.bootstrap as bootstrap
-from diagnosis.alone import SIMULATED
-from diagnosis.bench import Bench, balance_drifts
+from diagnosis.alone import OUTPUT_ERROR_THRESHOLDS
+from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.bootstrap import (
-    CEILING,
-    FLOOR,
-    bootstrapped,
-    kept_thresholds,
-    near,
-    tail,
+    MAX_THRESHOLD,
+    MIN_THRESHOLD,
+    bootstrap_thresholds,
+    cached_thresholds,
+    exponential_tail_quantile,
+    round_to_preferred,
     threshold_key,
     thresholds_of,
 )
 from diagnosis.estimate import Estimate
-from diagnosis.layers import Layer, drift, fitting, shipped_effects
-from diagnosis.level import settled
-from diagnosis.prediction import noises_of
-from diagnosis.replicate import replicate
-from diagnosis.series import Series
-from diagnosis.threshold import USUAL, Thresholds, thresholds_in, written
+from diagnosis.layers import PlacedEffect, disturbance_effect, find_placements, shipped_effects
+from diagnosis.level import fit_with_noise
+from diagnosis.prediction import measured_noise_levels
+from diagnosis.replicate import simulate_replicate
+from diagnosis.series import SampledRecording
+from diagnosis.threshold import DEFAULT_THRESHOLD, Thresholds, format_thresholds, read_thresholds
 from language.load import automaton_of
-from language.project import expanded
+from language.project import expand_document
 from modewright.diagnoses import diagnose
 from tests.language.making import ROOT, SHIPPED, document
 
@@ -51,7 +51,7 @@ COUNT = 300
 DRIFT = "drift_balance_w"
 
 
-def recorded(seed: int) -> Series:
+def recorded(seed: int) -> SampledRecording:
     """Return a recording that nothing is known of but that it moves, in quanta of 0.01 rad/s."""
     random = np.random.default_rng(seed)
     torque = np.repeat(random.normal(0.0, 8.0, 6), COUNT // 6)
@@ -60,23 +60,25 @@ def recorded(seed: int) -> Series:
         speeds.append(speed)
         speed += float(PERIOD) * (value - 0.4 * speed) / 2.0
     measured = np.round((np.array(speeds) + random.normal(0.0, 0.03, COUNT)) / 0.01) * 0.01
-    return Series(f"{seed}", PERIOD, Fraction(0), torque[:, np.newaxis], measured[:, np.newaxis])
+    return SampledRecording(
+        f"{seed}", PERIOD, Fraction(0), torque[:, np.newaxis], measured[:, np.newaxis]
+    )
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
-    made = expanded(document(TEXT), SHIPPED)
+def bench() -> ModelSet:
+    made = expand_document(document(TEXT), SHIPPED)
     automaton = automaton_of(made, SHIPPED)
     effects = [e for e in shipped_effects() if e.name in ("coulomb_friction", "torque_offset")]
     series = (recorded(1), recorded(2))
-    drifts = balance_drifts(made, automaton)
-    return Bench(made, SHIPPED, automaton, tuple(effects), series, ("w",), drifts)
+    drifts = balance_disturbances(made, automaton)
+    return ModelSet(made, SHIPPED, automaton, tuple(effects), series, ("w",), drifts)
 
 
 @pytest.fixture(scope="module")
-def base(bench: Bench) -> Estimate:
-    noises = noises_of(bench.series, {DRIFT: 0.5})
-    return settled(bench.candidate(()), bench.series, noises, {}, {DRIFT: 1.0})
+def base(bench: ModelSet) -> Estimate:
+    noises = measured_noise_levels(bench.series, {DRIFT: 0.5})
+    return fit_with_noise(bench.compile_candidate(()), bench.series, noises, {}, {DRIFT: 1.0})
 
 
 @pytest.fixture
@@ -89,22 +91,24 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     yield folder
 
 
-def test_the_same_seed_gives_the_same_recordings(bench: Bench, base: Estimate) -> None:
+def test_the_same_seed_gives_the_same_recordings(bench: ModelSet, base: Estimate) -> None:
     place = (base.candidate, base, bench.series)
     first, again, other = (
-        replicate(*place, np.random.default_rng((5, number))) for number in (0, 0, 1)
+        simulate_replicate(*place, np.random.default_rng((5, number))) for number in (0, 0, 1)
     )
     assert first and again and other
     assert all(np.array_equal(a.measured, b.measured) for a, b in zip(first, again, strict=True))
     assert not np.array_equal(first[0].measured, other[0].measured)
 
 
-def test_noise_quanta_and_gaps_are_those_of_the_recording(bench: Bench, base: Estimate) -> None:
+def test_noise_quanta_and_gaps_are_those_of_the_recording(bench: ModelSet, base: Estimate) -> None:
     gappy = dataclasses.replace(bench.series[0], measured=bench.series[0].measured.copy())
     gappy.measured[7::50] = np.nan
-    noises = dataclasses.replace(base.noises, drifts={})
-    calm = dataclasses.replace(base, noises=noises)
-    made = [replicate(base.candidate, calm, (gappy,), np.random.default_rng(k)) for k in (1, 2)]
+    noises = dataclasses.replace(base.noise_levels, process={})
+    calm = dataclasses.replace(base, noise_levels=noises)
+    made = [
+        simulate_replicate(base.candidate, calm, (gappy,), np.random.default_rng(k)) for k in (1, 2)
+    ]
     first, second = (one[0].measured[:, 0] for one in made if one)
     known = np.isfinite(gappy.measured[:, 0])
     assert np.array_equal(np.isfinite(first), known)
@@ -113,23 +117,23 @@ def test_noise_quanta_and_gaps_are_those_of_the_recording(bench: Bench, base: Es
     assert np.std(difference) == pytest.approx(2.0**0.5 * 0.03, rel=0.2)
 
 
-def test_a_drift_is_a_slow_torque_of_its_size(bench: Bench, base: Estimate) -> None:
+def test_a_drift_is_a_slow_torque_of_its_size(bench: ModelSet, base: Estimate) -> None:
     """Between two runs of the same inputs: w' = (d1 - d2 - b w) / J, each d of 0.5 N*m."""
-    quiet = dataclasses.replace(base.noises, drifts={DRIFT: 0.5})
-    model = dataclasses.replace(base, noises=quiet)
+    quiet = dataclasses.replace(base.noise_levels, process={DRIFT: 0.5})
+    model = dataclasses.replace(base, noise_levels=quiet)
     long = dataclasses.replace(
         bench.series[0], inputs=np.zeros((20000, 1)), measured=np.ones((20000, 1))
     )
-    made = replicate(base.candidate, model, (long,), np.random.default_rng(3))
+    made = simulate_replicate(base.candidate, model, (long,), np.random.default_rng(3))
     assert made is not None
     values = base.values(0)
-    rate, memory = values["b"] / values["J"], base.candidate.recipe.memories[0]
+    rate, memory = values["b"] / values["J"], base.candidate.compiled.memories[0]
     spread = 0.5 / values["J"] * (1.0 / (rate * (rate + 1.0 / memory))) ** 0.5
     assert np.std(made[0].measured[2000:]) == pytest.approx(spread, rel=0.2)
 
 
 def test_what_was_done_before_a_kill_is_not_done_again(
-    bench: Bench, base: Estimate, kept: Path
+    bench: ModelSet, base: Estimate, kept: Path
 ) -> None:
     told: list[str] = []
 
@@ -138,28 +142,28 @@ def test_what_was_done_before_a_kill_is_not_done_again(
         if text.startswith("bootstrap 2"):
             raise KeyboardInterrupt
 
-    assert kept_thresholds(bench, bench.series) is None
+    assert cached_thresholds(bench, bench.series) is None
     with pytest.raises(KeyboardInterrupt):
-        bootstrapped(bench, base, {DRIFT: 1.0}, bench.series, ended)
-    assert kept_thresholds(bench, bench.series) is None
+        bootstrap_thresholds(bench, base, {DRIFT: 1.0}, bench.series, ended)
+    assert cached_thresholds(bench, bench.series) is None
     told.clear()
-    found = bootstrapped(bench, base, {DRIFT: 1.0}, bench.series, told.append)
+    found = bootstrap_thresholds(bench, base, {DRIFT: 1.0}, bench.series, told.append)
     assert [text.split(":")[0] for text in told] == ["bootstrap 3 of 3"]
-    assert kept_thresholds(bench, bench.series) == found
+    assert cached_thresholds(bench, bench.series) == found
     (file,) = kept.iterdir()
     in_parts = file.read_text()
     file.unlink()
-    assert bootstrapped(bench, base, {DRIFT: 1.0}, bench.series) == found
+    assert bootstrap_thresholds(bench, base, {DRIFT: 1.0}, bench.series) == found
     assert file.read_text() == in_parts
     assert len(json.loads(in_parts)) == 3
 
 
-def test_cases_of_a_spec_rate_and_rounded_length_share_thresholds(bench: Bench) -> None:
+def test_cases_of_a_spec_rate_and_rounded_length_share_thresholds(bench: ModelSet) -> None:
     key = threshold_key(bench, bench.series)
     (one, two), text = bench.series, TEXT.replace("value: 2 kg", "value: 3 kg")
     shorter = dataclasses.replace(two, inputs=two.inputs[:-30], measured=two.measured[:-30])
     faster = [dataclasses.replace(s, period=Fraction(1, 100)) for s in (one, one, two, two)]
-    other = dataclasses.replace(bench, document=expanded(document(text), SHIPPED))
+    other = dataclasses.replace(bench, document=expand_document(document(text), SHIPPED))
     fewer = dataclasses.replace(bench, effects=bench.effects[:1])
     assert threshold_key(bench, (shorter, one)) == key
     assert threshold_key(bench, (one,) * 6) != key
@@ -169,53 +173,55 @@ def test_cases_of_a_spec_rate_and_rounded_length_share_thresholds(bench: Bench) 
 
 
 def test_lengths_are_rounded_by_their_ratio() -> None:
-    assert [near(s) for s in (0.9, 13.0, 15.0, 31.0, 32.0, 54.0, 70.0, 72.0, 800.0)] == [
-        *(1.0, 10.0, 20.0, 20.0, 50.0, 50.0, 50.0, 100.0, 1000.0)
-    ]
+    assert [
+        round_to_preferred(s) for s in (0.9, 13.0, 15.0, 31.0, 32.0, 54.0, 70.0, 72.0, 800.0)
+    ] == [*(1.0, 10.0, 20.0, 20.0, 50.0, 50.0, 50.0, 100.0, 1000.0)]
 
 
 def test_the_tail_of_an_exponential_distribution_is_found() -> None:
     """Its quantile is log(1 / (1 - level))."""
     values = -np.log(1.0 - (np.arange(400) + 0.5) / 400)
-    assert tail(values.tolist(), 0.975) == pytest.approx(np.log(40.0), rel=0.03)
+    assert exponential_tail_quantile(values.tolist(), 0.975) == pytest.approx(
+        np.log(40.0), rel=0.03
+    )
     lost = [*values.tolist()[:-1], 1e6]
-    assert tail(lost, 0.975) == pytest.approx(np.log(40.0), rel=0.03)
-    assert tail([0.0] * 30, 0.975) == 0.0
+    assert exponential_tail_quantile(lost, 0.975) == pytest.approx(np.log(40.0), rel=0.03)
+    assert exponential_tail_quantile([0.0] * 30, 0.975) == 0.0
 
 
 def test_what_gains_often_needs_more_and_nothing_needs_less_than_the_floor() -> None:
     replicates = [{"slow": 10.0 + 2.0 * k, "brisk": 1.0} for k in range(20)] + [{}] * 10
     found = thresholds_of(replicates)
-    assert 48.0 < found.groups["slow"] < CEILING
-    assert found.groups["brisk"] == FLOOR
-    assert found.usual == FLOOR
+    assert 48.0 < found.groups["slow"] < MAX_THRESHOLD
+    assert found.groups["brisk"] == MIN_THRESHOLD
+    assert found.default == MIN_THRESHOLD
     lost = [{"slow": 900.0}] * 10 + [{}] * 6
-    assert thresholds_of(lost).groups["slow"] == CEILING
-    assert thresholds_of([{}] * 30) == Thresholds({}, FLOOR, found.origin, modes=1.0)
+    assert thresholds_of(lost).groups["slow"] == MAX_THRESHOLD
+    assert thresholds_of([{}] * 30) == Thresholds({}, MIN_THRESHOLD, found.origin, mode_factor=1.0)
 
 
-def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: Bench) -> None:
+def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: ModelSet) -> None:
     friction, offset = bench.effects
     found = Thresholds({"coulomb_friction": 30.0}, 25.0)
-    assert found.of(fitting(bench.document, friction)[0]) == 30.0
-    assert found.of(fitting(bench.document, offset)[0]) == 25.0
-    assert found.of(drift("balance", "w")) == 25.0
-    assert (found.text, found.most, Thresholds().text) == ("25 to 30", 30.0, "75")
+    assert found.threshold_of(find_placements(bench.document, friction)[0]) == 30.0
+    assert found.threshold_of(find_placements(bench.document, offset)[0]) == 25.0
+    assert found.threshold_of(disturbance_effect("balance", "w")) == 25.0
+    assert (found.text, found.largest, Thresholds().text) == ("25 to 30", 30.0, "75")
 
 
 def test_an_effect_that_brings_modes_has_to_gain_twice_the_usual() -> None:
     gap = next(effect for effect in shipped_effects() if effect.name == "backlash")
-    layer = Layer(gap, "half_shaft", "half_shaft")
-    assert Thresholds().of(layer) == 2.0 * USUAL
-    assert Thresholds({"backlash": 60.0}).of(layer) == 60.0
-    assert SIMULATED.of(layer) == SIMULATED.usual
+    layer = PlacedEffect(gap, "half_shaft", "half_shaft")
+    assert Thresholds().threshold_of(layer) == 2.0 * DEFAULT_THRESHOLD
+    assert Thresholds({"backlash": 60.0}).threshold_of(layer) == 60.0
+    assert OUTPUT_ERROR_THRESHOLDS.threshold_of(layer) == OUTPUT_ERROR_THRESHOLDS.default
 
 
 def test_thresholds_are_read_as_they_were_written(tmp_path: Path) -> None:
     file = tmp_path / "thresholds.json"
-    found = Thresholds({"backlash": 31.25}, 25.0, "by 30 replicates", modes=1.0)
-    file.write_text(written(found))
-    assert thresholds_in(file) == found
+    found = Thresholds({"backlash": 31.25}, 25.0, "by 30 replicates", mode_factor=1.0)
+    file.write_text(format_thresholds(found))
+    assert read_thresholds(file) == found
 
 
 @pytest.mark.parametrize(
@@ -233,7 +239,7 @@ def test_other_files_are_refused(tmp_path: Path, text: str, told: str) -> None:
     file = tmp_path / "thresholds.json"
     file.write_text(text)
     with pytest.raises(ValueError, match=told):
-        thresholds_in(file)
+        read_thresholds(file)
 
 
 def test_a_word_for_thresholds_that_is_none_is_refused(tmp_path: Path) -> None:

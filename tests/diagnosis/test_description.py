@@ -5,22 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
-from diagnosis.description import described
-from diagnosis.excess import excess_at
-from diagnosis.formula import formula_of
-from diagnosis.layers import automaton
-from diagnosis.level import units_of
-from diagnosis.locus import Locus
-from diagnosis.regression import Columns, Problem, forward, problem_of, ranking, weights
-from diagnosis.term import ORDERS, Signals, Term, terms_of
+from diagnosis.bench import ModelSet
+from diagnosis.description import discover_equation
+from diagnosis.excess import regression_at
+from diagnosis.formula import build_formula
+from diagnosis.layers import automaton_with_effects
+from diagnosis.level import disturbance_units
+from diagnosis.locus import Location
+from diagnosis.regression import (
+    RegressionProblem,
+    TermColumns,
+    build_problem,
+    coefficients_of,
+    rank_terms,
+    select_terms,
+)
+from diagnosis.term import ORDERS, LibraryTerm, Signals, generate_terms
 from tests.diagnosis.test_estimation import FRICTION, bench
-from tests.diagnosis.test_location import based, with_effect
+from tests.diagnosis.test_location import fit_first_base, with_effect
 
 __all__ = ["bench"]
 
 
-def problem(noise: float) -> tuple[Problem, list[Columns]]:
+def problem(noise: float) -> tuple[RegressionProblem, list[TermColumns]]:
     """Two recordings: parameters, a shared column 2, a sine with phases 1.0 and -0.5, chance."""
     rng = np.random.default_rng(5)
     time = np.arange(800) * 0.01
@@ -31,16 +38,16 @@ def problem(noise: float) -> tuple[Problem, list[Columns]]:
         2.0 * x + 3.0 * np.sin(9 * time + phase) + noise * rng.normal(size=800) + m[:, 0]
         for x, m, phase in zip(shared, moved, (1.0, -0.5), strict=True)
     ]
-    columns = [Columns("shared", (2,), False), Columns("sine", (3, 4), True)]
-    return problem_of(known, moved, waves, 1.0), columns
+    columns = [TermColumns("shared", (2,), False), TermColumns("sine", (3, 4), True)]
+    return build_problem(known, moved, waves, 1.0), columns
 
 
 def test_terms_come_one_after_the_other_with_their_coefficients() -> None:
     given, columns = problem(0.5)
-    chosen = forward(given, columns, 2, 20.0)
+    chosen = select_terms(given, columns, 2, 20.0)
     assert [one.columns.name for one in chosen] == ["sine", "shared"]
-    assert chosen[1].left_out > 500.0
-    sine, shared = weights(given, [one.columns for one in chosen])
+    assert chosen[1].cross_validated > 500.0
+    sine, shared = coefficients_of(given, [one.columns for one in chosen])
     assert shared[:, 0] == pytest.approx(2.0, abs=0.1)
     assert np.hypot(*sine.T) == pytest.approx(3.0, abs=0.1)
     assert np.arctan2(sine[:, 1], sine[:, 0]) == pytest.approx([1.0, -0.5], abs=0.05)
@@ -50,12 +57,12 @@ def test_what_is_all_chance_is_no_term() -> None:
     rng = np.random.default_rng(6)
     parts = [rng.normal(size=800) for _ in range(2)]
     waves = [rng.normal(size=(800, 20)) for _ in range(2)]
-    given = problem_of(parts, [rng.normal(size=(800, 2)) for _ in range(2)], waves, 1.0)
-    columns = [Columns(f"{k}", (2 + k,), False) for k in range(20)]
-    assert forward(given, columns, 2, 5.0) == []
+    given = build_problem(parts, [rng.normal(size=(800, 2)) for _ in range(2)], waves, 1.0)
+    columns = [TermColumns(f"{k}", (2 + k,), False) for k in range(20)]
+    assert select_terms(given, columns, 2, 5.0) == []
 
 
-def signals(bench: Bench) -> Signals:
+def signals(bench: ModelSet) -> Signals:
     rng = np.random.default_rng(1)
     names = ("w_em", "w_w", "T_em", "T_hs", "(theta_d - theta_b)")
     units = dict(zip(names, ("rad/s", "rad/s", "N*m", "N*m", "rad"), strict=True))
@@ -67,18 +74,18 @@ def signals(bench: Bench) -> Signals:
     ("section", "place"), [("flow", "w_em"), ("elements", "half_shaft"), ("outputs", "w_s")]
 )
 def test_all_terms_together_are_a_sound_effect_with_units_of_their_own(
-    bench: Bench, section: str, place: str
+    bench: ModelSet, section: str, place: str
 ) -> None:
     known = signals(bench)
     if section == "outputs":
         known.values["w_s"] = known.values["w_w"]  # type: ignore[index]
         known.units["w_s"] = "rad/s"  # type: ignore[index]
-    terms = [one for one in terms_of(known, section, "w_s") if one.order in (0, ORDERS[2])]
+    terms = [one for one in generate_terms(known, section, "w_s") if one.order in (0, ORDERS[2])]
     units = set()
     for some in (terms[k : k + 14] for k in range(0, len(terms), 14)):
         sizes = [np.ones((3, len(term.values))) for term in some]
-        formula = formula_of(bench, section, place, some, sizes)
-        made = automaton(bench.document, bench.project, [formula.layer])
+        formula = build_formula(bench, section, place, some, sizes)
+        made = automaton_with_effects(bench.document, bench.project, [formula.placed_effect])
         brought = [name for name in made.parameters if name.startswith("a_")]
         assert len(brought) == len(some)
         units |= {made.parameters[name].unit.text for name in brought}
@@ -86,34 +93,34 @@ def test_all_terms_together_are_a_sound_effect_with_units_of_their_own(
     assert expected[section] <= units
 
 
-def test_an_order_of_a_torque_is_written_with_a_phase_for_each_recording(bench: Bench) -> None:
+def test_an_order_of_a_torque_is_written_with_a_phase_for_each_recording(bench: ModelSet) -> None:
     term = next(
         one
-        for one in terms_of(signals(bench), "elements")
+        for one in generate_terms(signals(bench), "elements")
         if one.name == "T_hs times order 3 of the angle of w_w"
     )
-    assert isinstance(term, Term)
+    assert isinstance(term, LibraryTerm)
     size = np.array([[0.2 * np.cos(p), 0.2 * np.sin(p)] for p in (0.4, -1.0)])
-    formula = formula_of(bench, "elements", "half_shaft", [term], [size])
+    formula = build_formula(bench, "elements", "half_shaft", [term], [size])
     assert "a_1 * base * sin((turns_1 - floor(turns_1)) * 1 rev)" in formula.text
     assert "ph_1: {value: 0 rad, range: [-3.2, 3.2], per: recording}" in formula.text
-    assert formula.start["a_1_half_shaft"] == pytest.approx(0.2)
+    assert formula.initial_values["a_1_half_shaft"] == pytest.approx(0.2)
     assert formula.phases["ph_1_half_shaft"] == pytest.approx((0.4, -1.0))
 
 
 def test_a_friction_without_a_name_becomes_its_formula(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
+    bench: ModelSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("diagnosis.description.FITTED", 1)
+    monkeypatch.setattr("diagnosis.description.MAX_FITS", 1)
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
-    base = based(hidden)
-    excess = excess_at(hidden, base, "flow", "w_em")
-    assert ranking(excess.problem, excess.columns)[0][1].name == "the sign of w_em"
-    units = units_of(base.candidate, hidden.series, base.values(0))
-    locus = Locus("flow", "w_em", 100.0, 2.0, free=base)
-    found = described(hidden, base, [locus], units, 45.0)
+    base = fit_first_base(hidden)
+    excess = regression_at(hidden, base, "flow", "w_em")
+    assert rank_terms(excess.problem, excess.columns)[0][1].name == "the sign of w_em"
+    units = disturbance_units(base.candidate, hidden.series, base.values(0))
+    locus = Location("flow", "w_em", 100.0, 2.0, free_model=base)
+    found = discover_equation(hidden, base, [locus], units, 45.0)
     assert found is not None
     amount, rest = found.text.split(" N*m * ")
     assert float(amount) == pytest.approx(-FRICTION["T_c_w_em"], rel=0.15)
     assert rest.startswith("tanh(w_em / (")
-    assert found.evidence.least > 100.0
+    assert found.likelihood_gain.smaller > 100.0

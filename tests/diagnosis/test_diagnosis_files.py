@@ -23,11 +23,11 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from diagnosis.dossier import verdict_json
-from diagnosis.shelf import Shelf, hash_of
-from diagnosis.variant import needed
+from diagnosis.dossier import verdict_to_json
+from diagnosis.shelf import FitCache, hash_of
+from diagnosis.variant import missing_effect_notes
 from modewright.diagnoses import base_of
-from tests.diagnosis.spinning import COMMAND, RIDER, SCHEMA, T_C, B, J, bench, run
+from tests.diagnosis.spinning import COMMAND, RIDER, SCHEMA, T_C, B, J, run_command, write_project
 
 RIG = """language: 1
 system: rig
@@ -70,7 +70,7 @@ def _killed(folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
-    folder = bench(tmp_path_factory.mktemp("bench") / "project")
+    folder = write_project(tmp_path_factory.mktemp("bench") / "project")
     _killed(folder)
     code = "import sys\n"
     code += "def hook(event, about):\n"
@@ -166,7 +166,7 @@ def test_the_commands_of_the_report_do_what_it_says(
         "check", "simulate", "generate", "lockstep", "explain",
     ]  # fmt: skip
     for command in [*commands, "check found/scenario.yaml"]:
-        assert run(found.folder, *shlex.split(command)) == 0, command
+        assert run_command(found.folder, *shlex.split(command)) == 0, command
     assert "equal, bit for bit" in capsys.readouterr().out
     assert (found.folder / "run.png").exists() and list((found.folder / "build").glob("*.c"))
 
@@ -183,7 +183,7 @@ def test_the_worst_window_is_a_table_for_other_tools(found: Found) -> None:
 
 
 def test_a_spec_that_is_a_file_anywhere_is_extended_as_a_file(
-    found: Found, dossier: mw.Dossier, monkeypatch: pytest.MonkeyPatch
+    found: Found, dossier: mw.DiagnosisReport, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(found.folder)
     shutil.copy("spec/spinner.yaml", "other.yaml")
@@ -193,15 +193,17 @@ def test_a_spec_that_is_a_file_anywhere_is_extended_as_a_file(
     assert base_of(dossier, "spec/spinner.yaml", Path("found")) == "spinner"
 
 
-def test_an_effect_that_the_project_does_not_have_is_asked_for(dossier: mw.Dossier) -> None:
-    assert needed(dossier) == []
+def test_an_effect_that_the_project_does_not_have_is_asked_for(dossier: mw.DiagnosisReport) -> None:
+    assert missing_effect_notes(dossier) == []
     assert dossier.diagnosis
     (tried,) = dossier.diagnosis.selection.accepted
-    effect = dataclasses.replace(tried.layer.effect, name="house_friction")
-    other = dataclasses.replace(tried, layer=dataclasses.replace(tried.layer, effect=effect))
+    effect = dataclasses.replace(tried.placed_effect.effect, name="house_friction")
+    other = dataclasses.replace(
+        tried, placed_effect=dataclasses.replace(tried.placed_effect, effect=effect)
+    )
     selection = dataclasses.replace(dossier.diagnosis.selection, accepted=(other,))
     diagnosis = dataclasses.replace(dossier.diagnosis, selection=selection)
-    (told,) = needed(dataclasses.replace(dossier, diagnosis=diagnosis))
+    (told,) = missing_effect_notes(dataclasses.replace(dossier, diagnosis=diagnosis))
     assert told.endswith(
         "library/coulomb_friction.yaml has to be below spec/: the variant lays this effect by name"
     )
@@ -255,7 +257,7 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
 
 
 @pytest.fixture(scope="module")
-def dossier(found: Found) -> mw.Dossier:
+def dossier(found: Found) -> mw.DiagnosisReport:
     """The same diagnosis in Python, with everything compiled."""
     train = [found.folder / f"run_{k}.csv" for k in (0, 1)]
     held_out = [found.folder / "run_2.csv"]
@@ -263,23 +265,25 @@ def dossier(found: Found) -> mw.Dossier:
     return mw.diagnose("spinner", train, held_out, effects=library, root=found.folder)
 
 
-def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.Dossier) -> None:
+def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.DiagnosisReport) -> None:
     """The fixture's first run was killed."""
-    again = verdict_json(dossier.verdict)
+    again = verdict_to_json(dossier.verdict)
     assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
 
 
 @pytest.mark.parametrize("is_alone", [False, True])
 def test_a_fit_that_was_kept_has_the_bits_of_the_one_that_was_made(
-    is_alone: bool, dossier: mw.Dossier, tmp_path: Path
+    is_alone: bool, dossier: mw.DiagnosisReport, tmp_path: Path
 ) -> None:
     assert dossier.diagnosis
-    series, model = dossier.diagnosis.bench.series, dossier.diagnosis.selection.model
-    model = dataclasses.replace(model, noises=dataclasses.replace(model.noises, is_alone=is_alone))
-    shelf = Shelf(tmp_path, "key")
+    series, model = dossier.diagnosis.model_set.series, dossier.diagnosis.selection.model
+    model = dataclasses.replace(
+        model, noise_levels=dataclasses.replace(model.noise_levels, is_output_error=is_alone)
+    )
+    shelf = FitCache(tmp_path, "key")
 
     def kept(given: float, make: Callable[[], Any]) -> Any:
-        return shelf.kept("fit", model.candidate, series, [given], make)
+        return shelf.load_or_fit("fit", model.candidate, series, [given], make)
 
     def unwanted() -> None:
         raise AssertionError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.digits import change, per_cent, significant, with_spread
+from diagnosis.digits import format_change, format_percent, format_significant, format_with_std
 
 
 @pytest.mark.parametrize(
@@ -21,17 +21,17 @@ from diagnosis.digits import change, per_cent, significant, with_spread
     ],
 )
 def test_a_number_has_as_many_digits_as_are_known(value: float, std: float, text: str) -> None:
-    assert with_spread(value, std) == text
+    assert format_with_std(value, std) == text
 
 
 def test_numbers_are_told_without_exponents() -> None:
-    assert [significant(x) for x in (1556.4, 0.021349, 0.0, 35.44, 0.99999)] == [
+    assert [format_significant(x) for x in (1556.4, 0.021349, 0.0, 35.44, 0.99999)] == [
         "1560", "0.0213", "0", "35.4", "1.00",
     ]  # fmt: skip
-    assert [per_cent(x) for x in (0.00228, 0.034, 0.113)] == ["0.23 %", "3.4 %", "11 %"]
-    assert [change(2.0, x) for x in (1.0, 2.005, 3.0)] == [
+    assert [format_percent(x) for x in (0.00228, 0.034, 0.113)] == ["0.23 %", "3.4 %", "11 %"]
+    assert [format_change(2.0, x) for x in (1.0, 2.005, 3.0)] == [
         "\N{MINUS SIGN}50 %",
         "as before",
         "+50 %",
     ]
-    assert change(0.0, 1.0) == change(float("nan"), 1.0) == "-"
+    assert format_change(0.0, 1.0) == format_change(float("nan"), 1.0) == "-"

@@ -8,21 +8,21 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench, balance_drifts
+from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.candidate import Candidate
-from diagnosis.evidence import evidence
-from diagnosis.layers import fitting, shipped_effects
-from diagnosis.level import first_fit, recalibrated, settled, units_of
-from diagnosis.series import Series, thinned
+from diagnosis.evidence import likelihood_gain
+from diagnosis.layers import find_placements, shipped_effects
+from diagnosis.level import disturbance_units, fit_base, fit_with_noise, recalibrate
+from diagnosis.series import SampledRecording, decimate
 from language.load import automaton_of
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 from tests.language.making import ROOT
 
 PERIOD = Fraction(1, 200)
 COUNT = 500
 TRUTH = {"J_em": 0.056, "k": 6600.0, "c": 54.0, "alpha": 0.022, "J_v": 120.0}
 FRICTION = {"T_c_w_em": 2.0}
-SEEN = ("w_em", "w_s")
+OUTPUTS = ("w_em", "w_s")
 
 
 def torque(kind: int) -> np.ndarray:
@@ -34,15 +34,15 @@ def torque(kind: int) -> np.ndarray:
     return np.asarray(25.0 * np.sign(np.sin(2 * np.pi * 0.6 * time)))
 
 
-def recorded(
+def simulate_recordings(
     candidate: Candidate, values: dict[str, float], brake: float = 0.0
-) -> tuple[Series, ...]:
+) -> tuple[SampledRecording, ...]:
     """Return simulations without correction, with noise on what is seen; a `brake` [N*m] acts for
     half a second.
     """
     rng = np.random.default_rng(11)
     found = []
-    states, seen = len(candidate.predictor.states), len(SEEN)
+    states, seen = len(candidate.predictor.states), len(OUTPUTS)
     no_gain = np.zeros((len(candidate.predictor.modes), states, seen))
     for kind, speed in ((0, 60.0), (1, 120.0), (2, 5.0)):
         inputs = np.zeros((COUNT, len(candidate.predictor.inputs)))
@@ -50,67 +50,75 @@ def recorded(
         inputs[160:260, candidate.predictor.inputs.index("T_br")] = brake
         measured = np.zeros((COUNT, seen))
         measured[0] = speed, speed / 9.0
-        blank = Series(f"{kind}", PERIOD, Fraction(0), inputs, measured)
-        page = candidate.page(values, blank)
-        substeps = candidate.recipe.substeps
+        blank = SampledRecording(f"{kind}", PERIOD, Fraction(0), inputs, measured)
+        page = candidate.calibration_page(values, blank)
+        substeps = candidate.compiled.substeps
         run = candidate.predictor.predict(
-            page, inputs, measured, no_gain[:0], no_gain, substeps, linear=False
+            page, inputs, measured, no_gain[:0], no_gain, substeps, is_first_order_hold=False
         )
-        assert run.done == COUNT
-        noisy = run.seen + rng.normal(0.0, [0.05, 0.01], run.seen.shape)
+        assert run.completed == COUNT
+        noisy = run.outputs + rng.normal(0.0, [0.05, 0.01], run.outputs.shape)
         found.append(dataclasses.replace(blank, measured=np.ascontiguousarray(noisy)))
     return tuple(found)
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
+def bench() -> ModelSet:
     project = Project(ROOT)
-    document = expanded(read_document(project.path_of("blind_driveline")), project)
+    document = expand_document(read_document(project.path_of("blind_driveline")), project)
     automaton = automaton_of(document, project)
     effects = tuple(e for e in shipped_effects() if e.name in ("coulomb_friction", "sensor_lag"))
-    blank = Series("blank", PERIOD, Fraction(0), np.zeros((2, 2)), np.zeros((2, 2)))
-    drifts = balance_drifts(document, automaton)
-    return Bench(document, project, automaton, effects, (blank,), SEEN, drifts)
+    blank = SampledRecording("blank", PERIOD, Fraction(0), np.zeros((2, 2)), np.zeros((2, 2)))
+    drifts = balance_disturbances(document, automaton)
+    return ModelSet(document, project, automaton, effects, (blank,), OUTPUTS, drifts)
 
 
-def test_a_clean_recording_gives_the_parameters_that_made_it(bench: Bench) -> None:
-    candidate = bench.candidate(())
-    series = recorded(candidate, TRUTH)
-    units = units_of(candidate, series, {})
-    found = recalibrated(first_fit(candidate, series, units), series, units).values(0)
+def test_a_clean_recording_gives_the_parameters_that_made_it(bench: ModelSet) -> None:
+    candidate = bench.compile_candidate(())
+    series = simulate_recordings(candidate, TRUTH)
+    units = disturbance_units(candidate, series, {})
+    found = recalibrate(fit_base(candidate, series, units), series, units).values(0)
     for name, value in TRUTH.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
 
 
-def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: Bench) -> None:
-    base = bench.candidate(())
-    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
-    friction = bench.candidate((layers["coulomb_friction@w_em"],))
-    series = recorded(friction, {**TRUTH, **FRICTION})
-    units = units_of(base, series, {})
-    known = recalibrated(first_fit(base, series, units), series, units)
+def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: ModelSet) -> None:
+    base = bench.compile_candidate(())
+    layers = {
+        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
+    }
+    friction = bench.compile_candidate((layers["coulomb_friction@w_em"],))
+    series = simulate_recordings(friction, {**TRUTH, **FRICTION})
+    units = disturbance_units(base, series, {})
+    known = recalibrate(fit_base(base, series, units), series, units)
     start = {**known.values(0), "T_c_w_em": 0.5}
-    better = settled(friction, series, known.noises, start, units)
-    assert evidence(better, known, series).least > 100.0
+    better = fit_with_noise(friction, series, known.noise_levels, start, units)
+    assert likelihood_gain(better, known, series).smaller > 100.0
     assert better.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
-    lag = bench.candidate((layers["sensor_lag@w_s"],))
+    lag = bench.compile_candidate((layers["sensor_lag@w_s"],))
     start = {**known.values(0), "tau_w_s": 0.002}
-    worse = settled(lag, series, known.noises, start, units)
-    assert evidence(worse, known, series).least < evidence(better, known, series).least / 4
+    worse = fit_with_noise(lag, series, known.noise_levels, start, units)
+    assert (
+        likelihood_gain(worse, known, series).smaller
+        < likelihood_gain(better, known, series).smaller / 4
+    )
 
 
 def test_a_fast_recording_is_thinned_to_means_of_its_inputs() -> None:
     inputs = np.arange(20.0).reshape(20, 1)
-    fast = Series("fast", Fraction(1, 1000), Fraction(0), inputs, inputs * 2.0)
-    slow = thinned(fast)
+    fast = SampledRecording("fast", Fraction(1, 1000), Fraction(0), inputs, inputs * 2.0)
+    slow = decimate(fast)
     assert slow.period == Fraction(1, 200)
     assert list(slow.inputs[:, 0]) == [2.0, 7.0, 12.0, 17.0]
     assert list(slow.measured[:, 0]) == [0.0, 10.0, 20.0, 30.0]
-    assert np.array_equal(thinned(slow).inputs, slow.inputs)
+    assert np.array_equal(decimate(slow).inputs, slow.inputs)
 
 
 def test_an_input_that_runs_straight_is_not_shifted_by_thinning() -> None:
     ramp = np.arange(40.0).reshape(40, 1)
-    slow = thinned(Series("ramp", Fraction(1, 1000), Fraction(0), ramp, ramp), is_linear=True)
+    slow = decimate(
+        SampledRecording("ramp", Fraction(1, 1000), Fraction(0), ramp, ramp),
+        is_first_order_hold=True,
+    )
     assert list(slow.inputs[1:-1, 0]) == list(slow.measured[1:-1, 0])
-    assert slow.is_linear
+    assert slow.is_first_order_hold

@@ -9,8 +9,8 @@ import pytest
 
 import modewright as mw
 from modewright.cli import app
-from modewright.exits import exit_code
-from tests.diagnosis.spinning import B, J, bench
+from modewright.exits import run_with_exit_code
+from tests.diagnosis.spinning import B, J, write_project
 
 MORE = "b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}\n  T_0: {value: 1 N*m, range: [0.5, 2]}"
 
@@ -18,7 +18,7 @@ MORE = "b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}\n  T_0: {value: 1 N*m, ran
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A rotor without dry friction; its spec has a torque `T_0` that is as good as absent."""
-    made = bench(tmp_path_factory.mktemp("fit") / "project", T_c=0.0)
+    made = write_project(tmp_path_factory.mktemp("fit") / "project", T_c=0.0)
     path = made / "spec" / "spinner.yaml"
     text = path.read_text("utf-8").replace("b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}", MORE)
     path.write_text(text.replace("T - b * w", "T - b * w - 0.000001 * T_0"), "utf-8")
@@ -38,7 +38,7 @@ def test_values_are_found_within_their_deviation_and_what_is_not_known_is_told()
         assert abs(one.quantity.value - true) < 4.0 * one.quantity.std, one
         assert one.quantity.std < 0.02 * true
     assert found.undetermined == ("T_0",)
-    assert by_name["T_0"].left == pytest.approx(1.0, abs=0.01)
+    assert by_name["T_0"].prior_ratio == pytest.approx(1.0, abs=0.01)
     assert by_name["T_0"].quantity.value == pytest.approx(1.0, rel=0.01)
     assert found.misfits["w"].nrmse_after < 0.1 * found.misfits["w"].nrmse_before
 
@@ -48,7 +48,7 @@ def test_only_those_named_move_and_the_calibration_is_a_spec(
 ) -> None:
     words = ["fit", "spinner", "--train", "run_0.csv", "--parameters", "J"]
     words += ["--out", "rig_7.yaml", "--date", "2026-11-21"]
-    assert exit_code(lambda: app(words, standalone_mode=False)) == 0
+    assert run_with_exit_code(lambda: app(words, standalone_mode=False)) == 0
     text = (folder / "rig_7.yaml").read_text("utf-8")
     assert "calibration: rig_7\nof: spinner\n" in text
     assert 'from: "run_0.csv"\ndate: 2026-11-21\n' in text
@@ -72,7 +72,7 @@ def test_what_cannot_be_fitted_is_told(
     words: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     command = ["fit", "spinner", "--train", "run_0.csv", *words]
-    assert exit_code(lambda: app(command, standalone_mode=False)) in (1, 2)
+    assert run_with_exit_code(lambda: app(command, standalone_mode=False)) in (1, 2)
     assert told in capsys.readouterr().err
 
 
@@ -95,7 +95,7 @@ def test_a_map_of_another_spec_is_told_with_its_lines(
     files = ["run_0.csv"] if command[0] == "recording" else ["--train", "run_0.csv"]
     out = ["--out", "odd"] if command[0] == "diagnose" else []
     words = [*command, "spinner", *files, "--map", "other.yaml", *out]
-    assert exit_code(lambda: app(words, standalone_mode=False)) == 1
+    assert run_with_exit_code(lambda: app(words, standalone_mode=False)) == 1
     told = capsys.readouterr().err
     assert "other.yaml:2:6: error: map `other` gives no value for input `T` of `spinner`" in told
     assert "other.yaml:4:11: error: `torque` is not an input of `spinner` [MW115]" in told
@@ -110,10 +110,10 @@ def test_nothing_is_fitted_to_recordings_with_errors_but_anyway(
     still = "\n".join(f"{time},3,{speed}" for time, _, speed in cells)
     (folder / "still.csv").write_text(f"t_s,torque,speed\n{still}\n", "utf-8")
     command = ["fit", "spinner", "--train", "still.csv", "--parameters", "b", "--out", "still.yaml"]
-    assert exit_code(lambda: app(command, standalone_mode=False)) == 1
+    assert run_with_exit_code(lambda: app(command, standalone_mode=False)) == 1
     assert "the recordings are not usable; nothing was fitted" in capsys.readouterr().err
     assert not (folder / "still.yaml").exists()
-    assert exit_code(lambda: app([*command, "--anyway"], standalone_mode=False)) == 0
+    assert run_with_exit_code(lambda: app([*command, "--anyway"], standalone_mode=False)) == 0
     assert mw.check("still.yaml") == []
 
 
@@ -130,7 +130,7 @@ def test_a_deviation_that_is_no_number_is_not_written() -> None:
     found = mw.fit("spinner", ["run_0.csv"], ["b"])
     (one,) = found.parameters
     quantity = dataclasses.replace(one.quantity, std=float("nan"))
-    lost = dataclasses.replace(one, quantity=quantity, left=float("nan"))
+    lost = dataclasses.replace(one, quantity=quantity, prior_ratio=float("nan"))
     lost_fit = dataclasses.replace(found, parameters=(lost,))
     assert "std" in found.calibration("rig")
     assert "nan" not in lost_fit.calibration("rig")

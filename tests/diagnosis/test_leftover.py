@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from diagnosis.leftover import left_by
-from tests.diagnosis.spinning import COMMAND, bench, run
+from diagnosis.leftover import find_stale_files
+from tests.diagnosis.spinning import COMMAND, run_command, write_project
 
 VERDICT = '{"format": "modewright-verdict/1", "verdict": "effect"}'
 OURS = {
@@ -40,18 +40,18 @@ def filled(folder: Path, files: dict[str, str]) -> Path:
 
 def test_what_is_ours_is_told_from_what_is_a_users(tmp_path: Path) -> None:
     filled(tmp_path, OURS)
-    assert left_by(tmp_path) == []  # no verdict was written here
+    assert find_stale_files(tmp_path) == []  # no verdict was written here
     filled(tmp_path, {"verdict.json": VERDICT})
-    assert {path.name for path in left_by(tmp_path)} == set(OURS)
+    assert {path.name for path in find_stale_files(tmp_path)} == set(OURS)
     for name in OURS:
         (tmp_path / name).unlink()
     filled(tmp_path, THEIRS)
-    assert left_by(tmp_path) == []
+    assert find_stale_files(tmp_path) == []
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = bench(tmp_path_factory.mktemp("leftover") / "project")
+    made = write_project(tmp_path_factory.mktemp("leftover") / "project")
     still = "\n".join(f"{k / 100:.2f},3,1" for k in range(500))
     (made / "still.csv").write_text(f"t_s,torque,speed\n{still}\n", "utf-8")
     shutil.copy(made / "run_0.csv", made / "copy.csv")
@@ -62,7 +62,9 @@ def test_a_report_has_no_files_of_an_earlier_verdict_beside_it(project: Path) ->
     out = project / "again"
     out.mkdir()
     filled(out, {**OURS, "verdict.json": VERDICT, "notes.txt": "mine"})
-    assert run(project, "diagnose", "spinner", "--train", "still.csv", "--out", "again") == 0
+    assert (
+        run_command(project, "diagnose", "spinner", "--train", "still.csv", "--out", "again") == 0
+    )
     assert json.loads((out / "verdict.json").read_text())["verdict"] == "unknown"
     kept = {path.name for path in out.iterdir()}
     assert kept == {"report.html", "variant.yaml", "verdict.json", "notes.txt"}
@@ -72,7 +74,7 @@ def test_thresholds_are_beside_the_report_though_nothing_gained(project: Path) -
     text = '{"format": "modewright-thresholds/1", "usual": 45, "effects": {}, "origin": "a try"}'
     filled(project, {"none.json": text})
     words = ("--train", "still.csv", "--thresholds", "none.json", "--out", "none")
-    assert run(project, "diagnose", "spinner", *words) == 0
+    assert run_command(project, "diagnose", "spinner", *words) == 0
     assert json.loads((project / "none" / "thresholds.json").read_text())["origin"] == "a try"
 
 
@@ -105,7 +107,7 @@ def test_a_folder_that_cannot_be_used_is_told_before_any_work(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     make(tmp_path / "out")
-    assert run(project, *COMMAND, "--out", str(tmp_path / "out")) == 1
+    assert run_command(project, *COMMAND, "--out", str(tmp_path / "out")) == 1
     error = capsys.readouterr().err
     assert told in error
     assert "looked at" not in error
@@ -113,7 +115,7 @@ def test_a_folder_that_cannot_be_used_is_told_before_any_work(
 
 def test_an_empty_name_is_no_folder(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = set(os.listdir(project))
-    assert run(project, *COMMAND, "--out", "") == 2
+    assert run_command(project, *COMMAND, "--out", "") == 2
     assert "name a folder" in capsys.readouterr().err
     assert set(os.listdir(project)) == before
 
@@ -139,5 +141,5 @@ def test_thresholds_nested_too_deeply_are_told(
     project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     filled(project, {"deep.json": 100_000 * "["})
-    assert run(project, *COMMAND, "--thresholds", "deep.json", "--out", "deep") == 2
+    assert run_command(project, *COMMAND, "--thresholds", "deep.json", "--out", "deep") == 2
     assert "cannot be read as thresholds" in " ".join(capsys.readouterr().err.split())

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.library import described, library
-from diagnosis.signature import signature
-from language.project import expanded, read_document
+from diagnosis.library import describe_effect, library_effects
+from diagnosis.signature import simulate_signature
+from language.project import expand_document, read_document
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 from tests.diagnosis.spinning import MAP, SPEC
 from tests.language.making import ROOT, SHIPPED, document, project_of
 
@@ -26,7 +26,7 @@ terms: {$x: {windage: -c_w * $x * abs($x)}}
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(list(arguments), standalone_mode=False))
+    return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
 def test_every_effect_that_is_shipped_is_listed_in_a_line(
@@ -81,10 +81,10 @@ def test_an_effect_is_found_by_the_name_that_verdicts_use(
 
 def test_places_are_those_where_an_effect_can_be_laid() -> None:
     path = SHIPPED.path_of("blind_driveline")
-    base = expanded(read_document(path), SHIPPED)
+    base = expand_document(read_document(path), SHIPPED)
     wanted = ("coulomb_friction", "torque_gain", "sensor_lag", "position_dependent_stiffness")
-    effects = [one for one in library(SHIPPED) if one.name in wanted]
-    places = {one.name: described(one, base, SHIPPED).places for one in effects}
+    effects = [one for one in library_effects(SHIPPED) if one.name in wanted]
+    places = {one.name: describe_effect(one, base, SHIPPED).places for one in effects}
     assert places["coulomb_friction"] == ("w_em", "w_w")  # `w_s` is a filter: no torques there
     assert places["torque_gain"] == ("T_em", "T_br")
     assert places["sensor_lag"] == ("w_em", "w_s")
@@ -94,13 +94,13 @@ def test_places_are_those_where_an_effect_can_be_laid() -> None:
 def test_a_signature_is_what_the_equation_of_the_effect_says(tmp_path: Path) -> None:
     """J dw/dt = T - b w from rest, and dry friction of 1 N*m: w is behind by (1 - e^-bt/J) / b."""
     project = project_of(tmp_path, bench_columns=MAP)
-    base = expanded(document(SPEC), project)
-    (friction,) = (one for one in library(SHIPPED) if one.name == "coulomb_friction")
-    (layer,) = described(friction, base, project).layers
-    found = signature(base, project, layer, ("T", "10 N*m"))
+    base = expand_document(document(SPEC), project)
+    (friction,) = (one for one in library_effects(SHIPPED) if one.name == "coulomb_friction")
+    (layer,) = describe_effect(friction, base, project).placements
+    found = simulate_signature(base, project, layer, ("T", "10 N*m"))
     assert found.values == {"T_c": "1 N*m", "w_s": "0.1 rad/s"}
-    times = found.without.times
-    change = found.with_it.signals["spinner.w"] - found.without.signals["spinner.w"]
+    times = found.without_effect.times
+    change = found.with_effect.signals["spinner.w"] - found.without_effect.signals["spinner.w"]
     place = int(np.searchsorted(times, 0.95))
     behind = (1.0 - np.exp(-0.1 * times[place] / 0.5)) / 0.1
     assert change[place] == pytest.approx(-behind, abs=0.01)

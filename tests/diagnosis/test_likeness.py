@@ -7,54 +7,62 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
-from diagnosis.estimate import Estimate, looked_at, looked_like
-from diagnosis.likeness import seen_like
-from diagnosis.point import extended
-from diagnosis.series import Series
-from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
-from tests.diagnosis.test_location import based
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import Estimate, evaluate, evaluate_near
+from diagnosis.likeness import share_operating_points
+from diagnosis.point import extend_vector
+from diagnosis.series import SampledRecording
+from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
+from tests.diagnosis.test_location import fit_first_base
 
 __all__ = ["bench"]
-Pair = tuple[tuple[Series, ...], Estimate, Estimate]
+Pair = tuple[tuple[SampledRecording, ...], Estimate, Estimate]
 
 
 @pytest.fixture(scope="module")
-def pair(bench: Bench) -> Pair:
+def pair(bench: ModelSet) -> Pair:
     """Return recordings with the base fitted to them, and a candidate as it begins beside it."""
-    layers = {layer.id: layer for layer in bench.layers()}
-    truth = bench.candidate((layers["coulomb_friction@w_em"],))
-    series = recorded(truth, {**TRUTH, **FRICTION})
-    base = based(dataclasses.replace(bench, series=series))
-    candidate = bench.candidate((layers["sensor_lag@w_em"],))
-    point = extended(candidate, base.candidate, base.point, {})
-    return series, base, looked_at(candidate, series, base.noises, point)
+    layers = {layer.id: layer for layer in bench.applicable_effects()}
+    truth = bench.compile_candidate((layers["coulomb_friction@w_em"],))
+    series = simulate_recordings(truth, {**TRUTH, **FRICTION})
+    base = fit_first_base(dataclasses.replace(bench, series=series))
+    candidate = bench.compile_candidate((layers["sensor_lag@w_em"],))
+    point = extend_vector(candidate, base.candidate, base.point, {})
+    return series, base, evaluate(candidate, series, base.noise_levels, point)
 
 
 def test_states_that_both_have_are_those_of_the_known_one(pair: Pair) -> None:
     _, base, begun = pair
     names, known = begun.candidate.predictor.states, base.candidate.predictor.states
-    near = seen_like(begun.candidate, begun.outcome, base.candidate, base.outcome)
-    own, theirs = begun.outcome.runs.whole.states, base.outcome.runs.whole.states
+    near = share_operating_points(
+        begun.candidate, begun.prediction, base.candidate, base.prediction
+    )
+    own, theirs = begun.prediction.runs.stacked.states, base.prediction.runs.stacked.states
     for k, name in enumerate(names):
         expected = theirs[:, known.index(name)] if name in known else own[:, k]
-        assert np.array_equal(near.runs.whole.states[:, k], expected), name
+        assert np.array_equal(near.runs.stacked.states[:, k], expected), name
     assert set(names) - set(known), "the lag has a state of its own"
-    assert np.array_equal(near.joined, begun.outcome.joined)
+    assert np.array_equal(near.stacked, begun.prediction.stacked)
 
 
 def test_an_outcome_of_other_recordings_tells_nothing(pair: Pair) -> None:
     _, base, begun = pair
-    runs = base.outcome.runs
-    short = dataclasses.replace(runs.whole, states=runs.whole.states[:-1])
-    other = dataclasses.replace(base.outcome, runs=dataclasses.replace(runs, whole=short))
-    assert seen_like(begun.candidate, begun.outcome, base.candidate, other) is begun.outcome
-    ended = dataclasses.replace(base.outcome, is_whole=False)
-    assert seen_like(begun.candidate, begun.outcome, base.candidate, ended) is begun.outcome
+    runs = base.prediction.runs
+    short = dataclasses.replace(runs.stacked, states=runs.stacked.states[:-1])
+    other = dataclasses.replace(base.prediction, runs=dataclasses.replace(runs, stacked=short))
+    assert (
+        share_operating_points(begun.candidate, begun.prediction, base.candidate, other)
+        is begun.prediction
+    )
+    ended = dataclasses.replace(base.prediction, is_complete=False)
+    assert (
+        share_operating_points(begun.candidate, begun.prediction, base.candidate, ended)
+        is begun.prediction
+    )
 
 
 def test_a_model_near_it_never_makes_a_candidate_worse(pair: Pair) -> None:
     series, base, begun = pair
-    given = begun.candidate, series, base.noises, begun.point
-    assert looked_like(*given, base).cost <= looked_at(*given).cost
-    assert looked_like(*given, None).cost == begun.cost
+    given = begun.candidate, series, base.noise_levels, begun.point
+    assert evaluate_near(*given, base).cost <= evaluate(*given).cost
+    assert evaluate_near(*given, None).cost == begun.cost

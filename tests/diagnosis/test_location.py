@@ -6,84 +6,100 @@ import dataclasses
 
 import pytest
 
-from diagnosis.actor import acting
-from diagnosis.bench import Bench
+from diagnosis.actor import balance_of
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import inflation
-from diagnosis.freedom import freed
+from diagnosis.evidence import integrated_autocorrelation
+from diagnosis.freedom import free_disturbance
 from diagnosis.joined import BURN_IN
-from diagnosis.layers import drift, fitting
-from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.location import DISTURBED, led_by, likely, located, unexplained
-from diagnosis.locus import Locus, locus_of
-from diagnosis.place_sentence import NOTHING, place_sentence
-from diagnosis.series import Series
-from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
+from diagnosis.layers import disturbance_effect, find_placements
+from diagnosis.level import disturbance_units, fit_base, recalibrate
+from diagnosis.location import (
+    ABSORBED_FRACTION,
+    localise,
+    rank_accepted_first,
+    rank_causes_first,
+    unexplained_gain,
+)
+from diagnosis.locus import Location, location_of
+from diagnosis.place_sentence import NO_LOCATION, format_location
+from diagnosis.series import SampledRecording
+from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]
 
 
-def with_effect(bench: Bench, effect: str, own: dict[str, float]) -> Bench:
-    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
-    truth = bench.candidate((layers[effect],))
-    series: tuple[Series, ...] = recorded(truth, {**TRUTH, **own})
-    return Bench(
-        bench.document, bench.project, bench.automaton, (), series, bench.seen, bench.drifts
+def with_effect(bench: ModelSet, effect: str, own: dict[str, float]) -> ModelSet:
+    layers = {
+        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
+    }
+    truth = bench.compile_candidate((layers[effect],))
+    series: tuple[SampledRecording, ...] = simulate_recordings(truth, {**TRUTH, **own})
+    return ModelSet(
+        bench.document,
+        bench.project,
+        bench.automaton,
+        (),
+        series,
+        bench.output_names,
+        bench.disturbances,
     )
 
 
-def based(bench: Bench) -> Estimate:
-    candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, {})
-    return recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
+def fit_first_base(bench: ModelSet) -> Estimate:
+    candidate = bench.compile_candidate(())
+    units = disturbance_units(candidate, bench.series, {})
+    return recalibrate(fit_base(candidate, bench.series, units), bench.series, units)
 
 
-def test_a_sensor_is_not_taken_for_a_torque(bench: Bench) -> None:
+def test_a_sensor_is_not_taken_for_a_torque(bench: ModelSet) -> None:
     hidden = with_effect(bench, "sensor_lag@w_s", {"tau_w_s": 0.03})
-    base = based(hidden)
-    sensor = freed(hidden, base, drift("output", "w_s"))
-    assert sensor.cost < freed(hidden, base, hidden.drifts[0]).cost - 100.0
+    base = fit_first_base(hidden)
+    sensor = free_disturbance(hidden, base, disturbance_effect("output", "w_s"))
+    assert sensor.cost < free_disturbance(hidden, base, hidden.disturbances[0]).cost - 100.0
 
 
-def test_what_small_drifts_of_the_base_take_up_is_hardly_unknown(bench: Bench) -> None:
+def test_what_small_drifts_of_the_base_take_up_is_hardly_unknown(bench: ModelSet) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
-    base = based(hidden)
-    loci, quiet = located(hidden, base), freed(hidden, base).cost
-    gain = loci[0].gain / inflation(base, hidden.series)
+    base = fit_first_base(hidden)
+    loci, quiet = localise(hidden, base), free_disturbance(hidden, base).cost
+    gain = loci[0].gain / integrated_autocorrelation(base, hidden.series)
     without = dataclasses.replace(base, cost=quiet)
-    assert unexplained(hidden, without, loci) == pytest.approx(gain)
+    assert unexplained_gain(hidden, without, loci) == pytest.approx(gain)
     as_good = dataclasses.replace(base, cost=quiet - loci[0].gain)
-    assert unexplained(hidden, as_good, loci) == pytest.approx(DISTURBED * gain)
+    assert unexplained_gain(hidden, as_good, loci) == pytest.approx(ABSORBED_FRACTION * gain)
 
 
 def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(
-    bench: Bench,
+    bench: ModelSet,
 ) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
-    base, layer = based(hidden), hidden.drifts[0]
-    free = freed(hidden, base, layer)
-    assert free.cost < freed(hidden, base, drift("output", "w_s")).cost - 100.0
-    locus = locus_of(hidden, "flow", layer, free)
+    base, layer = fit_first_base(hidden), hidden.disturbances[0]
+    free = free_disturbance(hidden, base, layer)
+    assert (
+        free.cost < free_disturbance(hidden, base, disturbance_effect("output", "w_s")).cost - 100.0
+    )
+    locus = location_of(hidden, "flow", layer, free)
     assert locus.rms == pytest.approx(FRICTION["T_c_w_em"], rel=0.4)
     assert all(start >= BURN_IN for start, _, _ in locus.windows)
-    told = place_sentence(led_by([locus], ["flow.w_em"], hidden), hidden)
+    told = format_location(rank_accepted_first([locus], ["flow.w_em"], hidden), hidden)
     assert told.startswith("missing in the balance of w_em: ")
     assert "N*m rms" in told
     assert "% of what accelerates it" in told
-    assert f"along with {locus.along[0][0]} (r = " in told
+    assert f"along with {locus.correlates[0][0]} (r = " in told
 
 
-def test_the_place_of_an_accepted_effect_leads_with_what_its_balance_shows(bench: Bench) -> None:
-    loci = [Locus("elements", "half_shaft", 90.0, 8.0), Locus("flow", "w_em", 80.0, 2.0)]
-    led = led_by(loci, ["inputs.T_em"], bench)
+def test_the_place_of_an_accepted_effect_leads_with_what_its_balance_shows(bench: ModelSet) -> None:
+    loci = [Location("elements", "half_shaft", 90.0, 8.0), Location("flow", "w_em", 80.0, 2.0)]
+    led = rank_accepted_first(loci, ["inputs.T_em"], bench)
     assert [one.path for one in led] == ["inputs.T_em", "elements.half_shaft", "flow.w_em"]
-    assert (led[0].rms, led[0].gain, led[0].named) == (2.0, 80.0, True)
-    assert acting(bench, "elements", "vehicle") == "flow.w_w"
-    assert acting(bench, "elements", "half_shaft") == "elements.half_shaft"
+    assert (led[0].rms, led[0].gain, led[0].is_accepted) == (2.0, 80.0, True)
+    assert balance_of(bench, "elements", "vehicle") == "flow.w_w"
+    assert balance_of(bench, "elements", "half_shaft") == "elements.half_shaft"
 
 
-def test_nothing_is_told_where_no_place_gains(bench: Bench) -> None:
-    assert place_sentence([Locus("flow", "w_em", -3.0, 0.1)], bench) == NOTHING
+def test_nothing_is_told_where_no_place_gains(bench: ModelSet) -> None:
+    assert format_location([Location("flow", "w_em", -3.0, 0.1)], bench) == NO_LOCATION
 
 
 @pytest.mark.parametrize(
@@ -96,8 +112,8 @@ def test_nothing_is_told_where_no_place_gains(bench: Bench) -> None:
     ],
 )
 def test_what_ripples_with_an_angle_is_led_by_the_input_there(
-    bench: Bench, feature: str, correlation: float, leads: str
+    bench: ModelSet, feature: str, correlation: float, leads: str
 ) -> None:
-    first = Locus("flow", "w_em", 90.0, 2.0, along=((feature, correlation),))
-    rest = Locus("elements", "half_shaft", 10.0, 2.0)
-    assert likely((first, rest), (), bench)[0].path == leads
+    first = Location("flow", "w_em", 90.0, 2.0, correlates=((feature, correlation),))
+    rest = Location("elements", "half_shaft", 10.0, 2.0)
+    assert rank_causes_first((first, rest), (), bench)[0].path == leads

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from tests.diagnosis.machines import Figure, damper, emps, leaf
+from tests.diagnosis.machines import Figure, diagnose_damper, diagnose_emps, diagnose_leaf
 
 
 @pytest.mark.recordings
@@ -15,7 +15,7 @@ def test_friction_and_offset_of_the_servo_axis_are_named_with_their_published_va
     recordings: Path,
 ) -> None:
     """Mass, dry friction and offset are compared; the viscous friction is not."""
-    found = emps(recordings)
+    found = diagnose_emps(recordings)
     assert found["effects"] == ["coulomb_friction", "sensor_offset"]
     off = found["off"]
     assert max(off["M"], off["T_c"]) < 0.03
@@ -29,8 +29,8 @@ def test_friction_and_offset_of_the_servo_axis_are_named_with_their_published_va
 @pytest.mark.recordings
 def test_either_drive_of_the_leaf_shows_the_same_gap(recordings: Path) -> None:
     drives: list[Figure] = [
-        leaf(recordings, "drive_eco", "drive_2"),
-        leaf(recordings, "drive_2", "drive_eco"),
+        diagnose_leaf(recordings, "drive_eco", "drive_2"),
+        diagnose_leaf(recordings, "drive_2", "drive_eco"),
     ]
     for found in drives:
         assert found["first"] == "backlash@elements.half_shaft"
@@ -55,7 +55,7 @@ def test_the_gap_of_the_damper_is_named_in_both_series(
     recordings: Path, file: str, half_gap: float, most: float
 ) -> None:
     """Half of the gap is what was found; the authors have about 2.7 and 1.9 mm."""
-    found = damper(recordings, file)
+    found = diagnose_damper(recordings, file)
     assert found["effects"][0] == "backlash"
     assert found["half_gap"] == pytest.approx(half_gap, rel=0.1)
     assert found["nrmse"][1] < most

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.finding import told
-from tests.diagnosis.checking import check, seen
+from diagnosis.finding import format_findings
+from tests.diagnosis.checking import check, finding_keys
 from tests.diagnosis.driving import (
     Spoil,
     Values,
     recording_of,
-    scaled,
-    spoiled,
+    scale_channel,
+    spoil_recording,
     tip_in,
 )
-from tests.diagnosis.spinning import run
+from tests.diagnosis.spinning import run_command
 
 RPM = 30.0 / math.pi
 
@@ -35,14 +35,16 @@ def at(key: str, value: float) -> Spoil:
 @pytest.mark.parametrize("key", ["torque", "motor"])
 @pytest.mark.parametrize("value", [1e6, -1e6, 1e300, 1.7e308])
 def test_one_value_far_from_all_others_is_told_with_its_place(key: str, value: float) -> None:
-    found = check(spoiled(at(key, value)))
-    assert seen(found) == {("error", "outlier", key)}
+    found = check(spoil_recording(at(key, value)))
+    assert finding_keys(found) == {("error", "outlier", key)}
     assert " at 4.5 s" in found.findings[0].text and f"{value:.4g} " in found.findings[0].text
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_channel_of_huge_values_is_told_once() -> None:
-    assert seen(check(spoiled(scaled("motor", 1e160)))) == {("error", "outlier", "motor")}
+    assert finding_keys(check(spoil_recording(scale_channel("motor", 1e160)))) == {
+        ("error", "outlier", "motor")
+    }
 
 
 @pytest.mark.parametrize("seconds", [3600.0, 1.7e9])
@@ -52,7 +54,7 @@ def test_stamps_that_leap_are_told_and_not_simulated(seconds: float, first: int)
     times = times.copy()
     times[first:] += seconds
     found = check(recording_of("leaping", times, values))
-    assert seen(found) == {("error", "leap", "")}
+    assert finding_keys(found) == {("error", "leap", "")}
     assert f"time leaps from {(first - 1) / 100:g} s" in found.findings[0].text
 
 
@@ -64,17 +66,22 @@ def exchanged(times: Values, values: dict[str, Values]) -> None:
     ("spoil", "kind", "channel", "text"),
     [
         (exchanged, "swap", "motor", "`motor` and `wheel` are exchanged"),
-        (scaled("torque", 1e-3), "unit", "torque", "kN*m taken for N*m?"),
-        (scaled("motor", 0.5 / math.pi), "unit", "motor", "revolutions per second taken for rad/s"),
+        (scale_channel("torque", 1e-3), "unit", "torque", "kN*m taken for N*m?"),
+        (
+            scale_channel("motor", 0.5 / math.pi),
+            "unit",
+            "motor",
+            "revolutions per second taken for rad/s",
+        ),
     ],
 )
 def test_what_is_tried_tells_units_and_columns_that_are_exchanged(
     spoil: Spoil, kind: str, channel: str, text: str
 ) -> None:
-    one = check(spoiled(spoil, "bad"), spoiled(None, "good"))
+    one = check(spoil_recording(spoil, "bad"), spoil_recording(None, "good"))
     assert [(f.kind, f.recording, f.channel) for f in one.findings] == [(kind, "bad", channel)]
     assert text in one.findings[0].text
-    (every,) = check(spoiled(spoil, "a"), spoiled(spoil, "b")).findings
+    (every,) = check(spoil_recording(spoil, "a"), spoil_recording(spoil, "b")).findings
     assert (every.kind, every.recording, every.channel) == (kind, "", channel)
 
 
@@ -94,7 +101,7 @@ def test_what_is_missing_is_told_with_the_value_of_each_channel() -> None:
             0.0 * values["wheel"] + 7.0,
         )
 
-    lines = [text for _, text in told(check(spoiled(still)).findings)]
+    lines = [text for _, text in format_findings(check(spoil_recording(still)).findings)]
     assert lines == [
         "`motor` (tip_in): is 300 all the time: the signal is missing",
         "`wheel` (tip_in): is 7 all the time: the signal is missing",
@@ -105,5 +112,5 @@ def test_a_recording_that_is_named_twice_is_wrong_usage(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "run.csv").write_text("t_s,w_radps\n0,1\n1,2\n", "utf-8")
-    assert run(tmp_path, "recording", "check", "run.csv", "./run.csv") == 2
+    assert run_command(tmp_path, "recording", "check", "run.csv", "./run.csv") == 2
     assert "named twice" in capsys.readouterr().err

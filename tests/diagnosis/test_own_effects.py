@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from language.problem import SpecError
-from language.project import Project, expanded, read_document
-from modewright.own_effects import laid_nowhere, own_effects
+from language.project import Project, expand_document, read_document
+from modewright.own_effects import explain_unplaceable, load_effects
 
 EFFECT = """language: 1
 effect: {name}
@@ -26,8 +26,8 @@ def write(folder: Path, name: str, term: str, has: str = "", file: str = "") -> 
 
 def told(folder: Path) -> list[str]:
     project = Project(Path())
-    document = expanded(read_document(project.path_of("blind_driveline")), project)
-    return list(laid_nowhere(own_effects(folder), document, project))
+    document = expand_document(read_document(project.path_of("blind_driveline")), project)
+    return list(explain_unplaceable(load_effects(folder), document, project))
 
 
 def test_an_effect_that_can_be_laid_is_not_told(tmp_path: Path) -> None:
@@ -51,9 +51,9 @@ def test_two_effects_of_one_name_are_refused(tmp_path: Path) -> None:
     write(tmp_path, "rub", "-T_o * tanh($x / (1 rad/s))")
     write(tmp_path, "rub", "-T_o * tanh($x / (2 rad/s))", file="second")
     with pytest.raises(SpecError, match=r"second.yaml:2:9.*`rub` is defined twice"):
-        own_effects(tmp_path)
+        load_effects(tmp_path)
 
 
 def test_a_folder_without_an_effect_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="there is no effect in"):
-        own_effects(tmp_path)
+        load_effects(tmp_path)

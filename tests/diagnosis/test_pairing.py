@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from language.finding import document_of
+from language.finding import parse_document
 from language.map import read_map
 from language.pairing import check_pairing
 from language.problem import Problems, Source
@@ -20,10 +20,10 @@ def told(text: str) -> list[str]:
     """Return kind, line and label of what does not fit between a map and the small driveline."""
     problems = Problems()
     mapping = read_map(
-        document_of(Source("bench.yaml", tuple(text.splitlines())), text), Project(Path())
+        parse_document(Source("bench.yaml", tuple(text.splitlines())), text), Project(Path())
     )
     check_pairing(driveline(), mapping, problems)
-    return [f"{p.code} {p.kind} {p.span.line}: {p.label}" for p in problems.found]
+    return [f"{p.code} {p.kind} {p.span.line}: {p.label}" for p in problems.reported]
 
 
 def test_a_map_that_fits_has_no_problem() -> None:

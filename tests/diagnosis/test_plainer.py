@@ -6,94 +6,105 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import Evidence, evidence
-from diagnosis.form import shown_form
-from diagnosis.layers import fitting, shipped_effects
-from diagnosis.level import settled, units_of
-from diagnosis.plainer import AHEAD, led_by, may_be_plainer, plainer_ones
-from diagnosis.search import Tried
+from diagnosis.evidence import LikelihoodGain, likelihood_gain
+from diagnosis.form import choose_form
+from diagnosis.layers import find_placements, shipped_effects
+from diagnosis.level import disturbance_units, fit_with_noise
+from diagnosis.plainer import (
+    RESTRICTED_LEAD,
+    accepts_restriction,
+    promote_restricted,
+    restricted_candidates,
+)
+from diagnosis.search import CandidateFit
 from tests.diagnosis.test_estimation import bench
-from tests.diagnosis.test_location import based, with_effect
-from tests.diagnosis.test_needed import layer
+from tests.diagnosis.test_location import fit_first_base, with_effect
+from tests.diagnosis.test_needed import find_layer
 
 __all__ = ["bench"]
 RISES, PLAIN = "stribeck_friction@w_em", "coulomb_friction@w_em"
 
 
-def rubbing(bench: Bench, rise: float) -> Bench:
+def rubbing(bench: ModelSet, rise: float) -> ModelSet:
     """Return recordings with a friction at the motor that rises by a part of itself at rest."""
-    every = dataclasses.replace(bench, effects=shipped_effects(), _made={})
+    every = dataclasses.replace(bench, effects=shipped_effects(), _compiled={})
     true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
     return dataclasses.replace(with_effect(every, RISES, true), effects=every.effects)
 
 
-def tried(own: Bench, base: Estimate, effect: str) -> Tried:
+def tried(own: ModelSet, base: Estimate, effect: str) -> CandidateFit:
     """Return an effect fitted beside a base."""
-    layers = {layer.id: layer for e in own.effects for layer in fitting(own.document, e)}
-    units = units_of(base.candidate, own.series, base.values(0))
-    candidate = own.candidate((layers[effect],))
-    model = settled(candidate, own.series, base.noises, base.values(0), units)
-    known = evidence(model, base, own.series)
-    return Tried(layers[effect], known.train, model, known)
+    layers = {layer.id: layer for e in own.effects for layer in find_placements(own.document, e)}
+    units = disturbance_units(base.candidate, own.series, base.values(0))
+    candidate = own.compile_candidate((layers[effect],))
+    model = fit_with_noise(candidate, own.series, base.noise_levels, base.values(0), units)
+    known = likelihood_gain(model, base, own.series)
+    return CandidateFit(layers[effect], known.penalised, model, known)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("rise", "named"), [(0.0, PLAIN), (3.0, RISES)])
-def test_the_form_that_recordings_show_is_named(bench: Bench, rise: float, named: str) -> None:
+def test_the_form_that_recordings_show_is_named(bench: ModelSet, rise: float, named: str) -> None:
     own = rubbing(bench, rise)
-    base = based(own)
-    units = units_of(base.candidate, own.series, base.values(0))
+    base = fit_first_base(own)
+    units = disturbance_units(base.candidate, own.series, base.values(0))
     full, plain = tried(own, base, RISES), tried(own, base, PLAIN)
     assert full.estimate is not None
-    assert may_be_plainer(full.estimate, full.layer, own.series) is (named == PLAIN)
+    assert accepts_restriction(full.estimate, full.placed_effect, own.series) is (named == PLAIN)
     for best, other in ((full, plain), (plain, full)):
-        assert shown_form(own, base, units, best, [best, other]).layer.id == named
-        unfitted = Tried(other.layer, 0.0)
-        assert shown_form(own, base, units, best, [best, unfitted]).layer.id == named
-        assert shown_form(own, base, units, best, [best]) is best, "there is no other form"
+        assert choose_form(own, base, units, best, [best, other]).placed_effect.id == named
+        unfitted = CandidateFit(other.placed_effect, 0.0)
+        assert choose_form(own, base, units, best, [best, unfitted]).placed_effect.id == named
+        assert choose_form(own, base, units, best, [best]) is best, "there is no other form"
 
 
-def test_a_form_is_fitted_from_where_the_other_is(bench: Bench) -> None:
+def test_a_form_is_fitted_from_where_the_other_is(bench: ModelSet) -> None:
     """One that was left where it fits badly is not the reason why the other one is named."""
     own = rubbing(bench, 3.0)
-    base = based(own)
-    units = units_of(base.candidate, own.series, base.values(0))
+    base = fit_first_base(own)
+    units = disturbance_units(base.candidate, own.series, base.values(0))
     full, plain = tried(own, base, RISES), tried(own, base, PLAIN)
     assert full.estimate is not None
     lost = dataclasses.replace(full, estimate=dataclasses.replace(full.estimate, cost=1e9))
-    found = shown_form(own, base, units, plain, [plain, lost])
-    assert found.layer.id == RISES
+    found = choose_form(own, base, units, plain, [plain, lost])
+    assert found.placed_effect.id == RISES
     assert found.estimate is not None
     assert found.estimate.cost < full.estimate.cost + 1.0
 
 
-def test_a_plainer_one_gains_nearly_as_much_at_the_same_place(bench: Bench) -> None:
+def test_a_plainer_one_gains_nearly_as_much_at_the_same_place(bench: ModelSet) -> None:
     own = rubbing(bench, 0.0)
-    base = based(own)
+    base = fit_first_base(own)
     best, other = tried(own, base, RISES), tried(own, base, PLAIN)
-    assert best.evidence is not None
-    assert other.evidence is not None
-    assert list(plainer_ones(best, [best, other])) == [other]
-    weak = dataclasses.replace(other.evidence, train=0.5 * best.evidence.train)
-    assert not list(plainer_ones(best, [dataclasses.replace(other, evidence=weak)]))
-    away = dataclasses.replace(other.layer, place="w_w")
-    assert not list(plainer_ones(best, [dataclasses.replace(other, layer=away)]))
-    assert not list(plainer_ones(other, [best]))
+    assert best.likelihood_gain is not None
+    assert other.likelihood_gain is not None
+    assert list(restricted_candidates(best, [best, other])) == [other]
+    weak = dataclasses.replace(
+        other.likelihood_gain, penalised=0.5 * best.likelihood_gain.penalised
+    )
+    assert not list(restricted_candidates(best, [dataclasses.replace(other, likelihood_gain=weak)]))
+    away = dataclasses.replace(other.placed_effect, place="w_w")
+    assert not list(restricted_candidates(best, [dataclasses.replace(other, placed_effect=away)]))
+    assert not list(restricted_candidates(other, [best]))
 
 
 @pytest.mark.parametrize(("gain", "is_put_ahead"), [(900.0, True), (1100.0, False)])
-def test_what_others_gave_way_to_leads_them(bench: Bench, gain: float, is_put_ahead: bool) -> None:
+def test_what_others_gave_way_to_leads_them(
+    bench: ModelSet, gain: float, is_put_ahead: bool
+) -> None:
     own = rubbing(bench, 0.0)
-    both = tried(own, based(own), PLAIN)
-    known = Evidence(gain, gain, (gain,))
-    plain = dataclasses.replace(both, evidence=known)
-    rising = Tried(layer(own, RISES), 0.0, both.estimate, Evidence(1000.0, 1000.0, (1000.0,)))
-    far = dataclasses.replace(rising, layer=layer(own, "sensor_lag@w_s"))
-    lead, ranked = led_by(plain, [rising, plain, far])
-    assert {one.layer.id for one in ranked} == {PLAIN, RISES, far.layer.id}
-    assert lead.evidence is known, "what was measured stays"
+    both = tried(own, fit_first_base(own), PLAIN)
+    known = LikelihoodGain(gain, gain, (gain,))
+    plain = dataclasses.replace(both, likelihood_gain=known)
+    rising = CandidateFit(
+        find_layer(own, RISES), 0.0, both.estimate, LikelihoodGain(1000.0, 1000.0, (1000.0,))
+    )
+    far = dataclasses.replace(rising, placed_effect=find_layer(own, "sensor_lag@w_s"))
+    lead, ranked = promote_restricted(plain, [rising, plain, far])
+    assert {one.placed_effect.id for one in ranked} == {PLAIN, RISES, far.placed_effect.id}
+    assert lead.likelihood_gain is known, "what was measured stays"
     assert (lead.lead > 0.0) is is_put_ahead
-    assert lead.score == pytest.approx(max(plain.score, rising.score + AHEAD))
+    assert lead.score == pytest.approx(max(plain.score, rising.score + RESTRICTED_LEAD))
     assert ranked[0] is lead

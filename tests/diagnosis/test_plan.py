@@ -4,52 +4,52 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.bench import Bench
-from diagnosis.layers import fitting
-from diagnosis.level import settled, units_of
-from diagnosis.manoeuvre import manoeuvres_of
-from diagnosis.plan import ENOUGH, planned
-from diagnosis.plan_picture import plan_picture
+from diagnosis.bench import ModelSet
+from diagnosis.layers import find_placements
+from diagnosis.level import disturbance_units, fit_with_noise
+from diagnosis.manoeuvre import manoeuvres_for
+from diagnosis.plan import MIN_LOG_BAYES_FACTOR, plan_experiment
+from diagnosis.plan_picture import draw_experiment
 from tests.diagnosis.test_estimation import FRICTION, bench
-from tests.diagnosis.test_location import based, with_effect
+from tests.diagnosis.test_location import fit_first_base, with_effect
 
 __all__ = ["bench"]
 
 
-def test_manoeuvres_are_as_large_as_what_was_recorded(bench: Bench) -> None:
+def test_manoeuvres_are_as_large_as_what_was_recorded(bench: ModelSet) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
-    menu = manoeuvres_of(hidden)
+    menu = manoeuvres_for(hidden)
     most = max(float(np.max(np.abs(one.inputs[:, 0]))) for one in hidden.series)
     rows = np.concatenate([one.measured for one in hidden.series])
     assert len(menu) >= 10
     for one in menu:
         assert np.max(np.abs(one.series.inputs[:, 0])) <= most + 1e-9
         assert np.any(np.all(rows == one.series.measured[0], axis=1))  # a start that was seen
-    assert manoeuvres_of(bench) == []  # nothing was driven there
+    assert manoeuvres_for(bench) == []  # nothing was driven there
 
 
-def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: Bench) -> None:
+def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: ModelSet) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
-    base = based(hidden)
-    layers = {one.id: one for e in bench.effects for one in fitting(bench.document, e)}
-    candidate = hidden.candidate((layers["coulomb_friction@w_em"],))
-    units = units_of(base.candidate, hidden.series, base.values(0))
+    base = fit_first_base(hidden)
+    layers = {one.id: one for e in bench.effects for one in find_placements(bench.document, e)}
+    candidate = hidden.compile_candidate((layers["coulomb_friction@w_em"],))
+    units = disturbance_units(base.candidate, hidden.series, base.values(0))
     start = {**base.values(0), "T_c_w_em": 1.0}
-    friction = settled(candidate, hidden.series, base.noises, start, units)
-    same = planned(hidden, [("a", friction), ("b", friction)])
+    friction = fit_with_noise(candidate, hidden.series, base.noise_levels, start, units)
+    same = plan_experiment(hidden, [("a", friction), ("b", friction)])
     assert same is not None
-    assert same.options[0].nats < 1.0
-    assert not same.tells
-    assert same.sentence() == "no manoeuvre that was tried would tell a from b"
-    plan = planned(hidden, [("friction", friction), ("none", base)])
+    assert same.options[0].log_bayes_factor < 1.0
+    assert not same.is_discriminating
+    assert same.format_sentence() == "no manoeuvre that was tried would tell a from b"
+    plan = plan_experiment(hidden, [("friction", friction), ("none", base)])
     assert plan is not None
-    assert plan.tells
-    nats = [option.nats for option in plan.options]
+    assert plan.is_discriminating
+    nats = [option.log_bayes_factor for option in plan.options]
     assert nats == sorted(nats, reverse=True)
-    assert nats[0] > max(ENOUGH, 3.0 * nats[-1])
-    assert plan.sentence().startswith("to tell friction from none, record: ")
-    picture = plan_picture(
+    assert nats[0] > max(MIN_LOG_BAYES_FACTOR, 3.0 * nats[-1])
+    assert plan.format_sentence().startswith("to tell friction from none, record: ")
+    picture = draw_experiment(
         plan, {"T_em": "N*m", "T_br": "N*m"}, [("w_em", "rad/s"), ("w_s", "rad/s")]
     )
     assert b"friction" in picture.data("svg")
-    assert planned(hidden, [("friction", friction)]) is None
+    assert plan_experiment(hidden, [("friction", friction)]) is None

@@ -7,16 +7,20 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.judgement import _why_not
-from diagnosis.point import Point, bounds_of, point_of
-from diagnosis.pressed import eased, is_opposed, pressed_places
-from diagnosis.screening import Promise
-from diagnosis.search import FITS_EASED, WORTH, _Chances
-from tests.diagnosis.test_adequacy import accepting, rubbing
+from diagnosis.judgement import _rejection_reason
+from diagnosis.point import ParameterVector, bounds_of, vector_of
+from diagnosis.pressed import (
+    active_bound_locations,
+    has_opposing_active_bound,
+    release_active_bounds,
+)
+from diagnosis.screening import ScreeningResult
+from diagnosis.search import ENTRY_THRESHOLD, MAX_RELEASED_FITS, _FitBudget
+from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
-from tests.diagnosis.test_needed import FRICTION, layer
+from tests.diagnosis.test_needed import FRICTION, find_layer
 
 __all__ = ["bench", "rubbing"]
 SAMPLES = 40
@@ -28,8 +32,8 @@ def pressing(model: Estimate, ends: dict[str, int]) -> Estimate:
     for name, end in ends.items():
         k = model.candidate.names.index(name)
         shared[k] = bounds_of(model.candidate)[k, end]
-    own = np.tile(shared, (len(model.point.own), 1))
-    return dataclasses.replace(model, point=Point(shared, own))
+    own = np.tile(shared, (len(model.point.per_recording), 1))
+    return dataclasses.replace(model, point=ParameterVector(shared, own))
 
 
 @pytest.mark.parametrize(
@@ -44,20 +48,20 @@ def pressing(model: Estimate, ends: dict[str, int]) -> Estimate:
     ],
 )
 def test_a_balance_is_pressed_where_what_acts_there_alone_is_at_an_end(
-    bench: Bench, rubbing: Bench, ends: dict[str, int], places: set[str]
+    bench: ModelSet, rubbing: ModelSet, ends: dict[str, int], places: set[str]
 ) -> None:
-    model = pressing(accepting(bench, rubbing, FRICTION).model, ends)
-    assert pressed_places(model, bench.automaton) == places
+    model = pressing(select_effect(bench, rubbing, FRICTION).model, ends)
+    assert active_bound_locations(model, bench.automaton) == places
 
 
-def test_what_is_pressed_is_eased_and_nothing_else(bench: Bench, rubbing: Bench) -> None:
-    model = pressing(accepting(bench, rubbing, FRICTION).model, {"b_em": 1, "k": 1})
-    point, names = eased(model, bench.automaton), model.candidate.names
-    declared = point_of(model.candidate, len(model.point.own), {})
+def test_what_is_pressed_is_eased_and_nothing_else(bench: ModelSet, rubbing: ModelSet) -> None:
+    model = pressing(select_effect(bench, rubbing, FRICTION).model, {"b_em": 1, "k": 1})
+    point, names = release_active_bounds(model, bench.automaton), model.candidate.names
+    declared = vector_of(model.candidate, len(model.point.per_recording), {})
     for k, name in enumerate(names):
         wanted = declared if name == "b_em" else model.point
         assert point.shared[k] == wanted.shared[k]
-        assert np.array_equal(point.own[:, k], wanted.own[:, k])
+        assert np.array_equal(point.per_recording[:, k], wanted.per_recording[:, k])
     assert model.point.shared[names.index("b_em")] != declared.shared[names.index("b_em")]
 
 
@@ -73,18 +77,20 @@ def test_what_is_pressed_is_eased_and_nothing_else(bench: Bench, rubbing: Bench)
     ],
 )
 def test_what_gives_up_more_for_an_effect_than_it_can_shows_an_imitation(
-    bench: Bench, rubbing: Bench, name: str, end: int, sign: float, is_imitation: bool
+    bench: ModelSet, rubbing: ModelSet, name: str, end: int, sign: float, is_imitation: bool
 ) -> None:
-    selection = accepting(bench, rubbing, FRICTION)
+    selection = select_effect(bench, rubbing, FRICTION)
     adds = np.ones((SAMPLES, 2))
     columns = {one: np.zeros((SAMPLES, 2)) for one in selection.model.candidate.names}
     columns |= {"T_c_w_em": adds, name: sign * adds}
-    model = dataclasses.replace(pressing(selection.model, {name: end}), columns=columns)
-    friction = layer(bench, FRICTION)
-    assert is_opposed(model, friction, bench.automaton) is is_imitation
-    assert not is_opposed(model, layer(bench, "sensor_lag@w_s"), bench.automaton)
+    model = dataclasses.replace(pressing(selection.model, {name: end}), jacobian=columns)
+    friction = find_layer(bench, FRICTION)
+    assert has_opposing_active_bound(model, friction, bench.automaton) is is_imitation
+    assert not has_opposing_active_bound(
+        model, find_layer(bench, "sensor_lag@w_s"), bench.automaton
+    )
     judged = dataclasses.replace(selection, model=model)
-    assert ("its balance" in _why_not(judged, rubbing)) is is_imitation
+    assert ("its balance" in _rejection_reason(judged, rubbing)) is is_imitation
 
 
 @pytest.mark.parametrize(
@@ -92,18 +98,20 @@ def test_what_gives_up_more_for_an_effect_than_it_can_shows_an_imitation(
     [({"b_em": 1}, 5.0, True), ({"b_em": 1}, -5.0, False), ({"b_w": 1}, 5.0, False)],
 )
 def test_what_promises_little_where_the_base_is_pressed_is_fitted_all_the_same(
-    bench: Bench, rubbing: Bench, ends: dict[str, int], gain: float, is_fitted: bool
+    bench: ModelSet, rubbing: ModelSet, ends: dict[str, int], gain: float, is_fitted: bool
 ) -> None:
     """Beside what was accepted, for a few candidates; alone all that promise much are."""
-    model = pressing(accepting(bench, rubbing, FRICTION).model, ends)
-    promise = Promise(layer(bench, "quadratic_drag@w_em"), gain)
-    chances = _Chances(rubbing, model, WORTH)
-    starts = [chances.start(promise, []) for _ in range(FITS_EASED + 1)]
-    assert [start is not None for start in starts] == [is_fitted] * FITS_EASED + [False]
+    model = pressing(select_effect(bench, rubbing, FRICTION).model, ends)
+    promise = ScreeningResult(find_layer(bench, "quadratic_drag@w_em"), gain)
+    chances = _FitBudget(rubbing, model, ENTRY_THRESHOLD)
+    starts = [chances.start(promise, []) for _ in range(MAX_RELEASED_FITS + 1)]
+    assert [start is not None for start in starts] == [is_fitted] * MAX_RELEASED_FITS + [False]
     if starts[0] is not None:
         k = starts[0].candidate.names.index("b_em")
-        assert starts[0].point.shared[k] == point_of(starts[0].candidate, 1, {}).shared[k]
+        assert starts[0].point.shared[k] == vector_of(starts[0].candidate, 1, {}).shared[k]
     alone = pressing(model, ends)
-    bare = rubbing.candidate(())
-    base = dataclasses.replace(alone, candidate=bare, point=point_of(bare, len(rubbing.series), {}))
-    assert _Chances(rubbing, base, WORTH).start(promise, []) is None
+    bare = rubbing.compile_candidate(())
+    base = dataclasses.replace(
+        alone, candidate=bare, point=vector_of(bare, len(rubbing.series), {})
+    )
+    assert _FitBudget(rubbing, base, ENTRY_THRESHOLD).start(promise, []) is None

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from diagnosis.free_run import FreeRun, free_run
-from engine.recording import pieces, read_recording
+from diagnosis.free_run import FreeRun, simulate_free_run
+from engine.recording import read_recording, split_by_windows
 from language.experiment import RecordingMap
 from language.load import automaton_of, command_line_value
 from language.map import read_map
@@ -35,7 +35,7 @@ def naive(name: str, values: dict[str, str]) -> tuple[Automaton, RecordingMap]:
 def runs(name: str, path: Path, values: dict[str, str] | None = None) -> list[FreeRun]:
     automaton, mapping = naive(name, values or {})
     recording = read_recording(path, mapping, list(mapping.columns))
-    found = [free_run(automaton, piece, mapping) for piece in pieces(recording)]
+    found = [simulate_free_run(automaton, piece, mapping) for piece in split_by_windows(recording)]
     assert all(run.trajectory.stopped is None for run in found)
     return found
 
@@ -55,7 +55,7 @@ def test_the_nominal_driveline_reads_the_columns_of_a_blind_case(tmp_path: Path)
     rows = [f"{k / 100},20,0,0,0" for k in range(301)]
     path.write_text("\n".join(["t_s,T_em_Nm,T_br_Nm,w_em_radps,w_w_radps", *rows]), "utf-8")
     (run,) = runs("blind_driveline", path)
-    speed = run.compared["w_w_radps"].simulated
+    speed = run.comparisons["w_w_radps"].simulated
     assert speed[0] == 0.0
     steady = (9.0 * 20.0 - 45.0) / (135.0 + 81.0 * 0.05)
     assert speed[-1] == pytest.approx(3.0 * steady, rel=0.03)
@@ -67,14 +67,14 @@ def test_without_a_gap_the_motor_of_the_leaf_is_missed_by_some_rpm(
     recordings: Path, file: str
 ) -> None:
     found = runs("leaf_motor_side", recordings / "nissan_leaf" / file)
-    missed = [run.compared["em_speed_rpm"].rms / RPM for run in found]
+    missed = [run.comparisons["em_speed_rpm"].rms / RPM for run in found]
     assert 5.0 < max(missed) < 35.0
 
 
 @pytest.mark.recordings
 def test_without_its_brake_the_leaf_is_missed_by_a_thousand_rpm(recordings: Path) -> None:
     (run,) = runs("leaf_vehicle", recordings / "nissan_leaf" / "drive_2.csv")
-    assert run.compared["em_speed_rpm"].rms / RPM > 1000.0
+    assert run.comparisons["em_speed_rpm"].rms / RPM > 1000.0
 
 
 @pytest.mark.recordings
@@ -82,7 +82,7 @@ def test_with_viscous_friction_alone_the_force_of_emps_is_missed_by_a_fifth(
     recordings: Path,
 ) -> None:
     (run,) = runs("emps", recordings / "emps" / "emps.csv.gz")
-    assert 0.17 < run.compared["vir"].nrmse < 0.21
+    assert 0.17 < run.comparisons["vir"].nrmse < 0.21
 
 
 @pytest.mark.recordings
@@ -100,13 +100,13 @@ def test_without_its_gap_the_damper_is_missed_by_a_fifth(
     recordings: Path, file: str, values: dict[str, str]
 ) -> None:
     (run,) = runs("brfd_damper", recordings / "brfd_damper" / file, values)
-    assert 0.18 < run.compared["F_kN"].nrmse < 0.26
+    assert 0.18 < run.comparisons["F_kN"].nrmse < 0.26
 
 
 @pytest.mark.recordings
 def test_on_a_flat_road_the_i3_is_missed_by_some_km_per_h(recordings: Path) -> None:
     found = runs("bmw_i3", recordings / "bmw_i3" / "trip_a11.csv.gz")
-    missed = [run.compared["velocity_kmh"].rms * 3.6 for run in found]
+    missed = [run.comparisons["velocity_kmh"].rms * 3.6 for run in found]
     assert len(found) == 24
     assert 4.0 < np.median(missed) < 9.0
 

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 import pytest
 
-from diagnosis.alone import PROMISED
-from diagnosis.bench import Bench
-from diagnosis.evidence import Evidence
-from diagnosis.screening import Promise
-from diagnosis.search import FULL_FITS, Tried, searched
-from diagnosis.selection import HOPE, MOST_EFFECTS, selected
-from diagnosis.threshold import USUAL
-from tests.diagnosis.test_adequacy import accepting, rubbing
+from diagnosis.alone import OUTPUT_ERROR_SCREENING_FRACTION
+from diagnosis.bench import ModelSet
+from diagnosis.evidence import LikelihoodGain
+from diagnosis.screening import ScreeningResult
+from diagnosis.search import MAX_FITS, CandidateFit, search_candidates
+from diagnosis.selection import MAX_EFFECTS, SCREENING_FRACTION, select_effects
+from diagnosis.threshold import DEFAULT_THRESHOLD
+from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
-from tests.diagnosis.test_location import based
-from tests.diagnosis.test_needed import DRAG, FRICTION, layer
+from tests.diagnosis.test_location import fit_first_base
+from tests.diagnosis.test_needed import DRAG, FRICTION, find_layer
 
 __all__ = ["bench", "rubbing"]
 THIRD = "torque_offset@T_em"
@@ -25,58 +25,64 @@ WORTH = 5
 
 
 def test_what_some_recordings_alone_promise_takes_no_turn_of_a_fit(
-    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch
+    bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Candidates that were not looked at on all recordings promise most; none can be fitted."""
-    friction = accepting(bench, rubbing, FRICTION)
-    unseen = [Promise(layer(bench, DRAG), 1e6)] * FULL_FITS
-    seen = Promise(layer(bench, FRICTION), 1e3, friction.model)
+    friction = select_effect(bench, rubbing, FRICTION)
+    unseen = [ScreeningResult(find_layer(bench, DRAG), 1e6)] * MAX_FITS
+    seen = ScreeningResult(find_layer(bench, FRICTION), 1e3, friction.model)
     monkeypatch.setattr("diagnosis.search.promises", lambda *_: [*unseen, seen])
-    found = searched(rubbing, friction.base, {}, [])
-    assert [one.layer.id for one in found if one.evidence] == [FRICTION]
-    assert len(found) == FULL_FITS + 1
+    found = search_candidates(rubbing, friction.base, {}, [])
+    assert [one.placed_effect.id for one in found if one.likelihood_gain] == [FRICTION]
+    assert len(found) == MAX_FITS + 1
 
 
-@pytest.mark.parametrize("strained", [2, MOST_EFFECTS, MOST_EFFECTS + 1])
+@pytest.mark.parametrize("strained", [2, MAX_EFFECTS, MAX_EFFECTS + 1])
 def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
-    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch, strained: int
+    bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, strained: int
 ) -> None:
     """So many effects are strained together; what was strained before it is left to the verdict."""
-    model = accepting(bench, rubbing, FRICTION).model
-    gains = iter(Evidence(gain, gain, (gain / 9.0,) * 9) for gain in (9000.0, 900.0, 300.0))
+    model = select_effect(bench, rubbing, FRICTION).model
+    gains = iter(LikelihoodGain(gain, gain, (gain / 9.0,) * 9) for gain in (9000.0, 900.0, 300.0))
     names = iter((FRICTION, DRAG, THIRD))
 
-    def found(*_: object) -> list[Tried]:
-        return [Tried(layer(bench, next(names)), 9000.0, model, next(gains))]
+    def found(*_: object) -> list[CandidateFit]:
+        return [CandidateFit(find_layer(bench, next(names)), 9000.0, model, next(gains))]
 
-    def many(_: object, accepted: Sequence[Tried]) -> bool:
+    def many(_: object, accepted: Sequence[CandidateFit]) -> bool:
         return len(accepted) >= strained
 
     monkeypatch.setattr("diagnosis.selection.searched", found)
     monkeypatch.setattr(
-        "diagnosis.selection.looked_again", lambda _, m, u, tried, *__: (None, tried)
+        "diagnosis.selection.rescreen_after_refit", lambda _, m, u, tried, *__: (None, tried)
     )
     monkeypatch.setattr("diagnosis.selection.shown_form", lambda _, m, u, best, tried: best)
     monkeypatch.setattr("diagnosis.selection.swapped", lambda _, m, before, *__: (before, m))
     monkeypatch.setattr("diagnosis.selection.is_full", lambda *_: False)
     monkeypatch.setattr("diagnosis.selection.still_needed", lambda _, kept, *__: kept)
     monkeypatch.setattr("diagnosis.selection.is_strained", many)
-    accepted = selected(rubbing, based(rubbing), {}).accepted
-    assert len(accepted) == (MOST_EFFECTS - 1 if strained == MOST_EFFECTS else MOST_EFFECTS)
+    accepted = select_effects(rubbing, fit_first_base(rubbing), {}).accepted
+    assert len(accepted) == (MAX_EFFECTS - 1 if strained == MAX_EFFECTS else MAX_EFFECTS)
 
 
-@pytest.mark.parametrize(("hope", "least"), [(HOPE, 0.25 * USUAL), (PROMISED, 0.1 * USUAL)])
+@pytest.mark.parametrize(
+    ("hope", "least"),
+    [
+        (SCREENING_FRACTION, 0.25 * DEFAULT_THRESHOLD),
+        (OUTPUT_ERROR_SCREENING_FRACTION, 0.1 * DEFAULT_THRESHOLD),
+    ],
+)
 def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
-    rubbing: Bench, monkeypatch: pytest.MonkeyPatch, hope: float, least: float
+    rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, hope: float, least: float
 ) -> None:
     """A quarter, but where whole simulations are judged: a tenth (decision 0040)."""
     asked: list[object] = []
 
-    def found(*given: object) -> list[Tried]:
+    def found(*given: object) -> list[CandidateFit]:
         asked.append(given[WORTH])
         return []
 
     monkeypatch.setattr("diagnosis.selection.searched", found)
-    selection = selected(rubbing, based(rubbing), {}, hope=hope)
+    selection = select_effects(rubbing, fit_first_base(rubbing), {}, screening_fraction=hope)
     assert not selection.accepted
     assert asked == [pytest.approx(least)]

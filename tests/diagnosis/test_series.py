@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.candidate import candidate
+from diagnosis.candidate import compile_candidate
 from diagnosis.case import Case, read_series
-from diagnosis.series import shows_inputs
+from diagnosis.series import has_feedthrough
 from engine.recorded_part import overlap
 from language.load import automaton_of
 from language.map import read_map
 from language.model import Automaton
 from language.problem import SpecError
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 
 PROJECT = Project(Path())
 
@@ -26,7 +26,7 @@ def case_of(spec: str) -> tuple[Case, Automaton]:
     automaton = automaton_of(document, PROJECT)
     assert automaton.recording_map
     mapping = read_map(read_document(PROJECT.path_of(automaton.recording_map.text)), PROJECT)
-    return Case(expanded(document, PROJECT), PROJECT, mapping, ()), automaton
+    return Case(expand_document(document, PROJECT), PROJECT, mapping, ()), automaton
 
 
 def leaf_like(path: Path) -> Path:
@@ -78,21 +78,23 @@ def test_parts_of_one_file_are_apart_unless_they_have_a_time_in_common() -> None
 
 
 def test_only_outputs_that_show_an_input_at_once_keep_a_recording_from_being_thinned() -> None:
-    assert shows_inputs(case_of("emps")[1], ("F_m",))
-    assert shows_inputs(case_of("brfd_damper")[1], ("F",))
-    assert not shows_inputs(case_of("blind_driveline")[1], ("w_em", "w_s"))
-    assert not shows_inputs(case_of("leaf_motor_side")[1], ("w_em",))
+    assert has_feedthrough(case_of("emps")[1], ("F_m",))
+    assert has_feedthrough(case_of("brfd_damper")[1], ("F",))
+    assert not has_feedthrough(case_of("blind_driveline")[1], ("w_em", "w_s"))
+    assert not has_feedthrough(case_of("leaf_motor_side")[1], ("w_em",))
 
 
 def test_what_is_shown_follows_from_the_input_of_its_own_sample() -> None:
     case, _ = case_of("emps")
-    one = candidate(case.document, PROJECT, (), (), ("F_m",), Fraction(1, 1000))
+    one = compile_candidate(case.document, PROJECT, (), (), ("F_m",), Fraction(1, 1000))
     ramp = 1e-3 * np.arange(50.0).reshape(-1, 1) ** 2
     nothing = np.zeros((1, 3, 1))
-    blank, substeps = np.full((50, 1), np.nan), one.recipe.substeps
+    blank, substeps = np.full((50, 1), np.nan), one.compiled.substeps
     page = np.array(list(one.predictor.page.values()))
-    found = one.predictor.predict(page, ramp, blank, nothing[:0], nothing, substeps, linear=True)
+    found = one.predictor.predict(
+        page, ramp, blank, nothing[:0], nothing, substeps, is_first_order_hold=True
+    )
     q, v, _ = found.states.T
     force = 35.1507 * (160.18 * 243.45 * (ramp[:, 0] - q) - 243.45 * v)
-    assert found.seen[:, 0] == pytest.approx(force, rel=1e-12)
+    assert found.outputs[:, 0] == pytest.approx(force, rel=1e-12)
     assert np.all(np.abs(force[10:]) > 100.0)

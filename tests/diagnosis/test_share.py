@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.evidence import Evidence
-from diagnosis.share import AGAINST, ALONE, as_shared, counted
-from diagnosis.threshold import USUAL
+from diagnosis.evidence import LikelihoodGain
+from diagnosis.share import (
+    OPPOSED_FACTOR,
+    SINGLE_RECORDING_FACTOR,
+    discount_unsupported,
+    supported_gain,
+)
+from diagnosis.threshold import DEFAULT_THRESHOLD
 
 
 @pytest.mark.parametrize(
@@ -24,7 +29,7 @@ from diagnosis.threshold import USUAL
 def test_what_gains_in_one_recording_alone_has_to_gain_ten_times_as_much(
     train: float, each: tuple[float, ...], wanted: bool
 ) -> None:
-    assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
+    assert (supported_gain(LikelihoodGain(train, sum(each), each)) > DEFAULT_THRESHOLD) == wanted
 
 
 @pytest.mark.parametrize(
@@ -40,20 +45,23 @@ def test_what_gains_in_one_recording_alone_has_to_gain_ten_times_as_much(
 def test_one_recording_alone_does_not_deny_what_all_others_show_clearly(
     train: float, each: tuple[float, ...], wanted: bool
 ) -> None:
-    assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
+    assert (supported_gain(LikelihoodGain(train, sum(each), each)) > DEFAULT_THRESHOLD) == wanted
 
 
 def test_of_two_recordings_none_is_against_all() -> None:
     each = (300.0, 5.0)
-    assert counted(Evidence(300.0, sum(each), each)) == 300.0 / AGAINST
-    assert counted(Evidence(300.0, sum(each), each), alone=2.0) == 300.0 / 2.0
+    assert supported_gain(LikelihoodGain(300.0, sum(each), each)) == 300.0 / OPPOSED_FACTOR
+    assert (
+        supported_gain(LikelihoodGain(300.0, sum(each), each), single_recording_factor=2.0)
+        == 300.0 / 2.0
+    )
 
 
 def test_a_loss_is_not_made_less() -> None:
-    assert as_shared(-20.0, (40.0, -30.0, -30.0)) == -20.0
-    assert as_shared(20.0, (40.0, -10.0, -10.0)) == 20.0 / ALONE
+    assert discount_unsupported(-20.0, (40.0, -30.0, -30.0)) == -20.0
+    assert discount_unsupported(20.0, (40.0, -10.0, -10.0)) == 20.0 / SINGLE_RECORDING_FACTOR
 
 
 def test_an_unstable_model_counts_as_nothing() -> None:
     lost = -float("inf")
-    assert counted(Evidence(lost, lost, (lost, lost, lost))) == lost
+    assert supported_gain(LikelihoodGain(lost, lost, (lost, lost, lost))) == lost

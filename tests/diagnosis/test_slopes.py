@@ -7,53 +7,62 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
-from diagnosis.estimate import looked_at, outcome_at, with_normal
-from diagnosis.layers import automaton, fewest_steps, fitting, shipped_effects
-from diagnosis.normal import foreseen
-from diagnosis.point import Point, point_of
-from diagnosis.prediction import noises_of
-from diagnosis.slopes import carried
-from tests.diagnosis.test_estimation import TRUTH, bench, recorded
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import evaluate, predict_with_gains_of, with_normal_equations
+from diagnosis.layers import (
+    automaton_with_effects,
+    find_placements,
+    minimum_substeps,
+    shipped_effects,
+)
+from diagnosis.normal import predicted_gain
+from diagnosis.point import ParameterVector, vector_of
+from diagnosis.prediction import measured_noise_levels
+from diagnosis.slopes import broyden_update
+from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]
 
 
-def test_carried_slopes_show_what_a_step_did(bench: Bench) -> None:
-    candidate = bench.candidate(())
-    series = recorded(candidate, TRUTH)
-    here = looked_at(candidate, series, noises_of(series, {}), point_of(candidate, len(series), {}))
-    here = with_normal(here, series)
-    step = Point(
+def test_carried_slopes_show_what_a_step_did(bench: ModelSet) -> None:
+    candidate = bench.compile_candidate(())
+    series = simulate_recordings(candidate, TRUTH)
+    here = evaluate(
+        candidate, series, measured_noise_levels(series, {}), vector_of(candidate, len(series), {})
+    )
+    here = with_normal_equations(here, series)
+    step = ParameterVector(
         np.full(len(candidate.names), 0.1), np.full((len(series), len(candidate.names)), 0.1)
     )
-    there = Point(here.point.shared + step.shared, here.point.own + step.own)
-    after = outcome_at(here, series, there)
-    found = carried(candidate, here.columns, here.outcome, after, step)
+    there = ParameterVector(
+        here.point.shared + step.shared, here.point.per_recording + step.per_recording
+    )
+    after = predict_with_gains_of(here, series, there)
+    found = broyden_update(candidate, here.jacobian, here.prediction, after, step)
     moved = np.sum([0.1 * found[name] for name in candidate.names], axis=0)
-    known = np.isfinite(after.joined - here.outcome.joined)
-    assert np.allclose(moved[known], (after.joined - here.outcome.joined)[known], atol=1e-9)
-    still = here.normal
+    known = np.isfinite(after.stacked - here.prediction.stacked)
+    assert np.allclose(moved[known], (after.stacked - here.prediction.stacked)[known], atol=1e-9)
+    still = here.normal_equations
     assert still is not None
-    assert foreseen(candidate, here.point, still, here.point) == pytest.approx(0.0)
+    assert predicted_gain(candidate, here.point, still, here.point) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize(("period", "steps"), [(Fraction(1, 200), 5), (Fraction(1, 100), 10)])
 def test_a_tone_at_an_input_is_stepped_by_a_millisecond(
-    bench: Bench, period: Fraction, steps: int
+    bench: ModelSet, period: Fraction, steps: int
 ) -> None:
     effect = next(one for one in shipped_effects() if one.name == "torque_ripple")
-    layer = next(iter(fitting(bench.document, effect)))
-    made = automaton(bench.document, bench.project, [layer])
-    assert fewest_steps(made, [layer], bench.seen, period) == steps
-    assert fewest_steps(bench.automaton, [], bench.seen, period) == 1
+    layer = next(iter(find_placements(bench.document, effect)))
+    made = automaton_with_effects(bench.document, bench.project, [layer])
+    assert minimum_substeps(made, [layer], bench.output_names, period) == steps
+    assert minimum_substeps(bench.automaton, [], bench.output_names, period) == 1
 
 
-def test_a_drift_goes_with_a_delay_and_with_a_limited_rate(bench: Bench) -> None:
+def test_a_drift_goes_with_a_delay_and_with_a_limited_rate(bench: ModelSet) -> None:
     known = {one.name: one for one in shipped_effects()}
     drift, *others = (
-        next(one for one in fitting(bench.document, known[name]) if one.place == "T_em")
+        next(one for one in find_placements(bench.document, known[name]) if one.place == "T_em")
         for name in ("torque_drift", "actuator_delay", "torque_rate_limit")
     )
     for other in others:
-        assert automaton(bench.document, bench.project, [drift, other]).parameters
+        assert automaton_with_effects(bench.document, bench.project, [drift, other]).parameters

@@ -7,14 +7,14 @@ import dataclasses
 import numpy as np
 from filterpy.kalman import KalmanFilter, rts_smoother
 
-from diagnosis.bench import Bench
-from diagnosis.estimate import looked_at
-from diagnosis.joined import burnt
-from diagnosis.level import units_of
-from diagnosis.point import point_of
-from diagnosis.prediction import noises_of
-from diagnosis.smoothing import Steps, deviations, smoothed
-from tests.diagnosis.test_estimation import TRUTH, bench, recorded
+from diagnosis.bench import ModelSet
+from diagnosis.estimate import evaluate
+from diagnosis.joined import burn_in_samples
+from diagnosis.level import disturbance_units
+from diagnosis.point import vector_of
+from diagnosis.prediction import measured_noise_levels
+from diagnosis.smoothing import SmootherInput, smooth_deviations, smooth_states
+from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]
 SAMPLES, STATES, SEEN = 60, 3, 2
@@ -36,8 +36,8 @@ def test_deviations_from_any_run_are_those_of_an_independent_smoother() -> None:
         missed[k] = seen[k] - c @ before[k]
         pushed[k] = gain @ np.nan_to_num(missed[k])
     sides = [np.broadcast_to(one, (SAMPLES, 1, *one.shape)) for one in (phi, q, c)]
-    steps = Steps(missed[:, None], pushed[:, None], *sides)
-    after, spread, _ = deviations(steps, start, noise)
+    steps = SmootherInput(missed[:, None], pushed[:, None], *sides)
+    after, spread, _ = smooth_deviations(steps, start, noise)
     means, covariances = _by_filterpy(phi, c, q, noise, start, seen)
     assert np.allclose(before + after[:, 0], means, rtol=0.0, atol=1e-9)
     stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
@@ -68,39 +68,39 @@ def _by_filterpy(
     return found[0][:, :, 0], found[1]
 
 
-def test_a_drift_lies_within_its_standard_deviations_as_often_as_it_should(bench: Bench) -> None:
-    candidate = bench.candidate(())
+def test_a_drift_lies_within_its_standard_deviations_as_often_as_it_should(bench: ModelSet) -> None:
+    candidate = bench.compile_candidate(())
     place = candidate.predictor.states.index(DRIFT)
-    memory = candidate.recipe.memories[candidate.drifts.index(DRIFT)]
+    memory = candidate.compiled.memories[candidate.disturbance_states.index(DRIFT)]
     series, truths = [], []
     rng = np.random.default_rng(3)
-    for blank in recorded(candidate, TRUTH):
+    for blank in simulate_recordings(candidate, TRUTH):
         kept = np.exp(-float(blank.period) / memory)
-        pushes = np.zeros((blank.count, len(candidate.spans)))
+        pushes = np.zeros((blank.count, len(candidate.state_ranges)))
         pushes[:, place] = rng.normal(0.0, LEVEL * np.sqrt(1.0 - kept**2), blank.count)
-        nothing = np.zeros((len(candidate.predictor.modes), len(candidate.spans), 2))
+        nothing = np.zeros((len(candidate.predictor.modes), len(candidate.state_ranges), 2))
         run = candidate.predictor.predict(
-            candidate.page(TRUTH, blank),
+            candidate.calibration_page(TRUTH, blank),
             blank.inputs,
             blank.measured,
             nothing[:0],
             nothing,
-            candidate.recipe.substeps,
-            linear=False,
-            pushes=pushes,
+            candidate.compiled.substeps,
+            is_first_order_hold=False,
+            state_increments=pushes,
         )
-        measured = run.seen + rng.normal(0.0, [0.05, 0.01], run.seen.shape)
+        measured = run.outputs + rng.normal(0.0, [0.05, 0.01], run.outputs.shape)
         series.append(dataclasses.replace(blank, measured=np.ascontiguousarray(measured)))
         truths.append(run.states[:, place])
-    noises = dataclasses.replace(noises_of(series, {}), seen=np.array([0.05, 0.01]))
-    units = units_of(candidate, series, TRUTH)
-    noises = dataclasses.replace(noises, drifts=dict.fromkeys(units, 0.0) | {DRIFT: LEVEL})
-    model = looked_at(candidate, series, noises, point_of(candidate, len(series), TRUTH))
+    noises = dataclasses.replace(measured_noise_levels(series, {}), outputs=np.array([0.05, 0.01]))
+    units = disturbance_units(candidate, series, TRUTH)
+    noises = dataclasses.replace(noises, process=dict.fromkeys(units, 0.0) | {DRIFT: LEVEL})
+    model = evaluate(candidate, series, noises, vector_of(candidate, len(series), TRUTH))
     far = []
-    for one, truth, found in zip(series, truths, smoothed(model, series), strict=True):
-        rows = slice(burnt(one), None)
+    for one, truth, found in zip(series, truths, smooth_states(model, series), strict=True):
+        rows = slice(burn_in_samples(one), None)
         far.append((found.states[rows, place] - truth[rows]) / found.stds[rows, place])
-        late = model.outcome.predictions[len(far) - 1].states[rows, place] - truth[rows]
+        late = model.prediction.predictions[len(far) - 1].states[rows, place] - truth[rows]
         missed = found.states[rows, place] - truth[rows]
         assert np.sqrt(np.mean(missed**2)) < 0.8 * np.sqrt(np.mean(late**2))
     whole = np.abs(np.concatenate(far))

@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from codegen.predictor import Predictor
-from diagnosis.candidate import candidate
-from language.project import Project, expanded, read_document
+from diagnosis.candidate import compile_candidate
+from language.project import Project, expand_document, read_document
 
 RNG = np.random.default_rng(5)
 SEEN = 2
@@ -22,8 +22,8 @@ ROOT = Path(__file__).parents[2]
 def predictor() -> Predictor:
     project = Project(ROOT)
     document = read_document(ROOT / "spec" / "recorded" / "blind_driveline.yaml")
-    whole = expanded(document, project)
-    return candidate(whole, project, (), (), ("w_em", "w_s"), Fraction(1, 200)).predictor
+    whole = expand_document(document, project)
+    return compile_candidate(whole, project, (), (), ("w_em", "w_s"), Fraction(1, 200)).predictor
 
 
 def system(states: int) -> tuple[np.ndarray, ...]:
@@ -37,14 +37,14 @@ def test_the_steady_gain_is_that_of_the_riccati_equation(predictor: Predictor) -
     phi, c, q, r = system(len(predictor.states))
     p = solve_discrete_are(phi.T, c.T, q, np.diag(r))
     wanted = p @ c.T @ np.linalg.inv(c @ p @ c.T + np.diag(r))
-    found = predictor.gains(phi, c, q, r, np.eye(len(phi)), 0)
+    found = predictor.compute_gains(phi, c, q, r, np.eye(len(phi)), 0)
     assert found is not None
     assert np.allclose(found[1], wanted, rtol=1e-4, atol=1e-6)
 
 
 def test_the_first_gains_become_the_steady_one(predictor: Predictor) -> None:
     phi, c, q, r = system(len(predictor.states))
-    found = predictor.gains(phi, c, q, r, 100.0 * np.eye(len(phi)), 400)
+    found = predictor.compute_gains(phi, c, q, r, 100.0 * np.eye(len(phi)), 400)
     assert found is not None
     first, steady, _ = found
     assert first.shape == (400, len(phi), SEEN)
@@ -57,18 +57,18 @@ def test_the_first_gain_is_that_of_all_signals_at_once(predictor: Predictor) -> 
     start = np.diag(RNG.uniform(1.0, 2.0, len(phi)))
     p = phi @ start @ phi.T + q
     wanted = p @ c.T @ np.linalg.inv(c @ p @ c.T + np.diag(r))
-    found = predictor.gains(phi, c, q, r, start, 1)
+    found = predictor.compute_gains(phi, c, q, r, start, 1)
     assert found is not None
     assert np.allclose(found[0][0], wanted, rtol=1e-9)
 
 
 def test_without_noise_nothing_is_corrected(predictor: Predictor) -> None:
     phi, c, q, r = system(len(predictor.states))
-    found = predictor.gains(phi, c, 0.0 * q, r, np.eye(len(phi)), 0)
+    found = predictor.compute_gains(phi, c, 0.0 * q, r, np.eye(len(phi)), 0)
     assert found is not None
     assert np.allclose(found[1], 0.0, atol=1e-3)
 
 
 def test_a_gain_without_bounds_is_none(predictor: Predictor) -> None:
     phi, c, q, r = system(len(predictor.states))
-    assert predictor.gains(1e3 * phi, 1e-160 * c, q, r, np.eye(len(phi)), 0) is None
+    assert predictor.compute_gains(1e3 * phi, 1e-160 * c, q, r, np.eye(len(phi)), 0) is None

@@ -7,28 +7,30 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import Evidence
-from diagnosis.judgement import _why_not
-from diagnosis.point import Point, bounds_of
-from diagnosis.search import Tried
-from diagnosis.strain import is_at_limit, within_range
-from tests.diagnosis.test_adequacy import accepting, rubbing
+from diagnosis.evidence import LikelihoodGain
+from diagnosis.judgement import _rejection_reason
+from diagnosis.point import ParameterVector, bounds_of
+from diagnosis.search import CandidateFit
+from diagnosis.strain import is_at_bound, prefer_interior
+from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
-from tests.diagnosis.test_needed import FRICTION, layer
+from tests.diagnosis.test_needed import FRICTION, find_layer
 
 __all__ = ["bench", "rubbing"]
 LAG, DELAY = "sensor_lag@w_s", "sensor_delay@w_s"
 
 
-def at_end(bench: Bench, model: Estimate, effect: str, parameter: str, end: int) -> Estimate:
+def at_end(bench: ModelSet, model: Estimate, effect: str, parameter: str, end: int) -> Estimate:
     """Return a model with an effect, a parameter of which is at an end of its range (0 or 1)."""
-    candidate = bench.candidate([layer(bench, effect)])
+    candidate = bench.compile_candidate([find_layer(bench, effect)])
     shared = np.zeros(len(candidate.names))
     k = list(candidate.names).index(parameter)
     shared[k] = bounds_of(candidate)[k, end]
-    return dataclasses.replace(model, candidate=candidate, point=Point(shared, shared[None]))
+    return dataclasses.replace(
+        model, candidate=candidate, point=ParameterVector(shared, shared[None])
+    )
 
 
 @pytest.mark.parametrize(
@@ -43,12 +45,12 @@ def at_end(bench: Bench, model: Estimate, effect: str, parameter: str, end: int)
     ],
 )
 def test_a_limit_is_one_that_was_set_to_a_parameter_of_the_effect(
-    bench: Bench, rubbing: Bench, effect: str, parameter: str, end: int, is_set: bool
+    bench: ModelSet, rubbing: ModelSet, effect: str, parameter: str, end: int, is_set: bool
 ) -> None:
-    model = accepting(bench, rubbing, FRICTION).model
+    model = select_effect(bench, rubbing, FRICTION).model
     limited = at_end(bench, model, effect, parameter, end)
-    assert is_at_limit(limited, layer(bench, effect)) is is_set
-    assert not is_at_limit(None, layer(bench, effect))
+    assert is_at_bound(limited, find_layer(bench, effect)) is is_set
+    assert not is_at_bound(None, find_layer(bench, effect))
 
 
 @pytest.mark.parametrize(
@@ -61,34 +63,38 @@ def test_a_limit_is_one_that_was_set_to_a_parameter_of_the_effect(
     ],
 )
 def test_what_is_at_a_limit_gives_way_to_what_gains_nearly_as_much(
-    bench: Bench, rubbing: Bench, gain: float, end: int, beside: str, named: str
+    bench: ModelSet, rubbing: ModelSet, gain: float, end: int, beside: str, named: str
 ) -> None:
-    model = accepting(bench, rubbing, FRICTION).model
+    model = select_effect(bench, rubbing, FRICTION).model
     parameter = "tau_w_s" if end else "part_w_s"
     limited = at_end(bench, model, LAG, parameter, end)
-    best = Tried(layer(bench, LAG), 0.0, limited, Evidence(1000.0, 1000.0, (1000.0,)))
-    other = Tried(layer(bench, beside), 0.0, model, Evidence(gain, gain, (gain,)))
-    found = within_range(best, [best, other])
-    assert found.layer.id == named
+    best = CandidateFit(
+        find_layer(bench, LAG), 0.0, limited, LikelihoodGain(1000.0, 1000.0, (1000.0,))
+    )
+    other = CandidateFit(find_layer(bench, beside), 0.0, model, LikelihoodGain(gain, gain, (gain,)))
+    found = prefer_interior(best, [best, other])
+    assert found.placed_effect.id == named
     assert (found is best) is (named == LAG)
-    blind = dataclasses.replace(best, evidence=None)
-    assert within_range(blind, [other]) is blind
+    blind = dataclasses.replace(best, likelihood_gain=None)
+    assert prefer_interior(blind, [other]) is blind
 
 
 @pytest.mark.parametrize(("end", "why"), [(1, "the first is at the end of a range"), (0, "")])
 def test_a_first_name_that_ends_at_a_limit_is_none(
-    bench: Bench, rubbing: Bench, end: int, why: str
+    bench: ModelSet, rubbing: ModelSet, end: int, why: str
 ) -> None:
-    selection = accepting(bench, rubbing, FRICTION)
+    selection = select_effect(bench, rubbing, FRICTION)
     model = at_end(bench, selection.model, FRICTION, "T_c_w_em", end)
-    limited = dataclasses.replace(selection, model=dataclasses.replace(model, normal=None))
-    assert _why_not(limited, rubbing) == why
-    hidden = Tried(
-        layer(bench, "unknown_input@w_w"), 0.0, limited.model, Evidence(1.0, 1.0, (1.0,))
+    limited = dataclasses.replace(
+        selection, model=dataclasses.replace(model, normal_equations=None)
+    )
+    assert _rejection_reason(limited, rubbing) == why
+    hidden = CandidateFit(
+        find_layer(bench, "unknown_input@w_w"), 0.0, limited.model, LikelihoodGain(1.0, 1.0, (1.0,))
     )
     beside = dataclasses.replace(limited, accepted=(*limited.accepted, hidden))
-    assert beside.has_hidden
-    assert _why_not(beside, rubbing) == why
+    assert beside.has_unknown_input
+    assert _rejection_reason(beside, rubbing) == why
 
 
 @pytest.mark.parametrize(
@@ -100,11 +106,16 @@ def test_a_first_name_that_ends_at_a_limit_is_none(
     ],
 )
 def test_beside_a_hidden_input_what_is_left_does_not_count(
-    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch, rule: str, why: str
+    bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, rule: str, why: str
 ) -> None:
     """It takes up anything at all: its own form is never quite right."""
     monkeypatch.setattr(f"diagnosis.judgement.{rule}", lambda *of: True)
-    alone = accepting(bench, rubbing, FRICTION)
-    assert _why_not(alone, rubbing) == why
-    hidden = Tried(layer(bench, "unknown_input@w_w"), 0.0, alone.model, alone.accepted[0].evidence)
-    assert _why_not(dataclasses.replace(alone, accepted=(*alone.accepted, hidden)), rubbing) == ""
+    alone = select_effect(bench, rubbing, FRICTION)
+    assert _rejection_reason(alone, rubbing) == why
+    hidden = CandidateFit(
+        find_layer(bench, "unknown_input@w_w"), 0.0, alone.model, alone.accepted[0].likelihood_gain
+    )
+    assert (
+        _rejection_reason(dataclasses.replace(alone, accepted=(*alone.accepted, hidden)), rubbing)
+        == ""
+    )

@@ -10,19 +10,19 @@ import pytest
 from numpy.typing import NDArray
 
 from codegen import predictor as predictor_module
-from codegen.lean import lean
+from codegen.lean import slice_to_outputs
 from codegen.predictor import Predictor, columns_of
-from codegen.runs import Prediction, Recorded
-from codegen.tracks import tracks
+from codegen.runs import Prediction, StackedRecordings
+from codegen.tracks import simd_recordings_context
 from diagnosis import recipe
-from diagnosis.bench import Bench, balance_drifts
+from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.candidate import Candidate
-from diagnosis.layers import fitting, shipped_effects
-from diagnosis.series import Series
+from diagnosis.layers import find_placements, shipped_effects
+from diagnosis.series import SampledRecording
 from language.load import automaton_of, program_of
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 from tests.diagnosis.conftest import SOON
-from tests.diagnosis.test_estimation import PERIOD, SEEN
+from tests.diagnosis.test_estimation import OUTPUTS, PERIOD
 from tests.language.making import ROOT
 
 Reals = NDArray[np.float64]
@@ -56,21 +56,23 @@ def _predictors_are_compiled_soon() -> None:
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
+def bench() -> ModelSet:
     project = Project(ROOT)
-    document = expanded(read_document(project.path_of("blind_driveline")), project)
+    document = expand_document(read_document(project.path_of("blind_driveline")), project)
     automaton = automaton_of(document, project)
-    blank = Series("blank", PERIOD, PERIOD * 0, np.zeros((2, 2)), np.zeros((2, 2)))
-    drifts = balance_drifts(document, automaton)
-    return Bench(document, project, automaton, shipped_effects(), (blank,), SEEN, drifts)
+    blank = SampledRecording("blank", PERIOD, PERIOD * 0, np.zeros((2, 2)), np.zeros((2, 2)))
+    drifts = balance_disturbances(document, automaton)
+    return ModelSet(document, project, automaton, shipped_effects(), (blank,), OUTPUTS, drifts)
 
 
-def candidate_of(bench: Bench, name: str) -> Candidate:
-    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
-    return bench.candidate((layers[name],) if name else ())
+def candidate_of(bench: ModelSet, name: str) -> Candidate:
+    layers = {
+        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
+    }
+    return bench.compile_candidate((layers[name],) if name else ())
 
 
-def recorded(predictor: Predictor, seed: int) -> Recorded:
+def recorded(predictor: Predictor, seed: int) -> StackedRecordings:
     """Return recordings with torques that go through the gap, at rest, slowly and fast; parts of
     what is measured are not known, and the second one leaves all bounds.
     """
@@ -82,23 +84,32 @@ def recorded(predictor: Predictor, seed: int) -> Recorded:
     measured = speeds[:, np.newaxis] * [1.0, 1.0 / 9.0] + draw.normal(size=(starts[-1], 2))
     measured[draw.uniform(size=measured.shape) < UNKNOWN] = np.nan
     measured[starts[1] + 60] = 1e16
-    return Recorded(np.ascontiguousarray(inputs), measured, starts, np.full(5, 9), np.array(LINEAR))
+    return StackedRecordings(
+        np.ascontiguousarray(inputs), measured, starts, np.full(5, 9), np.array(LINEAR)
+    )
 
 
 def gains_of(predictor: Predictor, draw: np.random.Generator, count: int) -> Reals:
     """Return gains under which the states stay near what is measured."""
-    found = draw.normal(0.0, 1e-4, (count, len(predictor.states), len(SEEN)))
-    for k, name in enumerate(SEEN):
+    found = draw.normal(0.0, 1e-4, (count, len(predictor.states), len(OUTPUTS)))
+    for k, name in enumerate(OUTPUTS):
         found[:, predictor.states.index(name), k] += draw.uniform(0.1, 0.3, count)
     return found
 
 
 def alone(
-    predictor: Predictor, page: Reals, given: Recorded, r: int, gains: tuple[Reals, Reals], n: int
+    predictor: Predictor,
+    page: Reals,
+    given: StackedRecordings,
+    r: int,
+    gains: tuple[Reals, Reals],
+    n: int,
 ) -> Prediction:
     low, high = given.starts[r : r + 2]
     inputs, measured = given.inputs[low:high], given.measured[low:high]
-    return predictor.predict(page, inputs, measured, *gains, n, linear=bool(given.linear[r]))
+    return predictor.predict(
+        page, inputs, measured, *gains, n, is_first_order_hold=bool(given.is_first_order_hold[r])
+    )
 
 
 def assert_same(mine: Reals, theirs: Reals) -> None:
@@ -109,34 +120,34 @@ def assert_same(mine: Reals, theirs: Reals) -> None:
 
 
 @pytest.mark.parametrize("effect", LAID)
-def test_side_by_side_they_have_the_bits_of_one(effect: str, bench: Bench) -> None:
+def test_side_by_side_they_have_the_bits_of_one(effect: str, bench: ModelSet) -> None:
     candidate = candidate_of(bench, effect)
-    predictor, substeps = candidate.predictor, candidate.recipe.substeps
+    predictor, substeps = candidate.predictor, candidate.compiled.substeps
     given = recorded(predictor, len(effect))
     draw = np.random.default_rng(5)
     page = np.array(list(predictor.page.values()))
     pages = page * draw.uniform(0.9, 1.1, (POINTS, len(COUNTS), len(page)))
     first, steady = (gains_of(predictor, draw, n) for n in (FIRST, len(predictor.modes)))
     innovations, done = predictor.predict_points(pages, given, first, steady, substeps)
-    limits = np.full(len(SEEN), np.inf)
-    whole = predictor.predict_all(pages[0], given, first, steady, substeps, limits).each()
+    limits = np.full(len(OUTPUTS), np.inf)
+    whole = predictor.predict_recordings(pages[0], given, first, steady, substeps, limits).split()
     for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
         for p in range(POINTS):
             run = alone(predictor, pages[p, r], given, r, (first, steady), substeps)
             assert_same(innovations[p, low:high], run.innovations)
-            assert done[p, r] == run.done
+            assert done[p, r] == run.completed
         run = alone(predictor, pages[0, r], given, r, (first, steady), substeps)
-        assert whole[r].done == run.done
-        assert_same(whole[r].seen, run.seen)
-        assert_same(whole[r].states[: run.done], run.states[: run.done])
-        assert np.array_equal(whole[r].modes[: run.done], run.modes[: run.done])
+        assert whole[r].completed == run.completed
+        assert_same(whole[r].outputs, run.outputs)
+        assert_same(whole[r].states[: run.completed], run.states[: run.completed])
+        assert np.array_equal(whole[r].modes[: run.completed], run.modes[: run.completed])
     assert done[0].tolist() == [150, 60, 211, 40, 171]
     assert len({int(mode) for one in whole for mode in one.modes}) > 1
 
 
 @pytest.mark.parametrize("effect", ["", "torque_ripple@T_em", "backlash@half_shaft"])
 def test_other_tests_follow_with_the_same_bits(
-    effect: str, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    effect: str, bench: ModelSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They compile sooner: see conftest.py."""
     found: list[tuple[Reals, NDArray[np.int64]]] = []
@@ -144,8 +155,8 @@ def test_other_tests_follow_with_the_same_bits(
         monkeypatch.setattr(predictor_module, "LIBRARY_FLAGS", flags)
         folder = tmp_path / str(len(found))
         folder.mkdir()
-        monkeypatch.setattr(recipe, "_folder", lambda folder=folder: folder)
-        predictor = candidate_of(dataclasses.replace(bench, _made={}), effect).predictor
+        monkeypatch.setattr(recipe, "_cache_folder", lambda folder=folder: folder)
+        predictor = candidate_of(dataclasses.replace(bench, _compiled={}), effect).predictor
         given, draw = recorded(predictor, 3), np.random.default_rng(5)
         pages = np.tile(list(predictor.page.values()), (1, len(COUNTS), 1))
         first, steady = (gains_of(predictor, draw, n) for n in (FIRST, len(predictor.modes)))
@@ -158,9 +169,9 @@ def test_other_tests_follow_with_the_same_bits(
 
 
 @pytest.mark.parametrize("effect", LAID)
-def test_each_point_may_have_gains_of_its_own(effect: str, bench: Bench) -> None:
+def test_each_point_may_have_gains_of_its_own(effect: str, bench: ModelSet) -> None:
     candidate = candidate_of(bench, effect)
-    predictor, substeps = candidate.predictor, candidate.recipe.substeps
+    predictor, substeps = candidate.predictor, candidate.compiled.substeps
     given = recorded(predictor, len(effect))
     draw = np.random.default_rng(6)
     pages = np.tile(list(predictor.page.values()), (POINTS, len(COUNTS), 1))
@@ -177,7 +188,7 @@ def test_each_point_may_have_gains_of_its_own(effect: str, bench: Bench) -> None
 
 
 @pytest.mark.parametrize("effect", LAID)
-def test_most_effects_go_side_by_side(effect: str, bench: Bench) -> None:
+def test_most_effects_go_side_by_side(effect: str, bench: ModelSet) -> None:
     """The library tells: it holds what follows several."""
     candidate = candidate_of(bench, effect)
     library = Path(candidate.predictor._library._name).read_bytes()
@@ -185,23 +196,23 @@ def test_most_effects_go_side_by_side(effect: str, bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
-def test_between_samples_inputs_are_held_or_run_straight(substeps: int, bench: Bench) -> None:
+def test_between_samples_inputs_are_held_or_run_straight(substeps: int, bench: ModelSet) -> None:
     candidate = candidate_of(bench, "")
     predictor = candidate.predictor
     given = recorded(predictor, 77)
     pages = np.tile(list(predictor.page.values()), (1, len(COUNTS), 1))
-    gains = np.zeros((len(predictor.modes), len(predictor.states), len(SEEN)))
+    gains = np.zeros((len(predictor.modes), len(predictor.states), len(OUTPUTS)))
     innovations, _ = predictor.predict_points(pages, given, gains[:0], gains, substeps)
     for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
         run = alone(predictor, pages[0, r], given, r, (gains[:0], gains), substeps)
         assert_same(innovations[0, low:high], run.innovations)
 
 
-def test_both_sides_of_a_gap_take_a_step_at_once(bench: Bench) -> None:
+def test_both_sides_of_a_gap_take_a_step_at_once(bench: ModelSet) -> None:
     """They differ in a guard; the gap flows in another way."""
-    program = lean(program_of(bench.automaton))
-    columns = columns_of(program, SEEN)
-    found = tracks(program, columns.states, columns.seen)
+    program = slice_to_outputs(program_of(bench.automaton))
+    columns = columns_of(program, OUTPUTS)
+    found = simd_recordings_context(program, columns.states, columns.outputs)
     assert [sorted(leap.modes.values()) for leap in found["leaps"]] == [
         ["coast_contact", "drive_contact"],
         ["no_contact"],

@@ -7,17 +7,24 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, looked_at
-from diagnosis.estimation import followed
-from diagnosis.level import settled, units_of
-from diagnosis.point import Point
-from diagnosis.prediction import DRIFTS, INPUTS, SIGNAL, Noises, noises_at, noises_of
-from diagnosis.series import Series
-from diagnosis.tuning import FARTHEST, LEAST, MOST, tuned
-from diagnosis.uncertain import Uncertain
-from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
+from diagnosis.estimate import Estimate, evaluate
+from diagnosis.estimation import iterate_broyden
+from diagnosis.level import disturbance_units, fit_with_noise
+from diagnosis.point import ParameterVector
+from diagnosis.prediction import (
+    INPUT_NOISE_NAME,
+    OUTPUT_NOISE_NAME,
+    PROCESS_NOISE_NAME,
+    NoiseLevels,
+    measured_noise_levels,
+    noise_levels_at,
+)
+from diagnosis.series import SampledRecording
+from diagnosis.tuning import MAX_LEVEL, MAX_NOISE_RATIO, MIN_LEVEL, fit_noise_covariance
+from diagnosis.uncertain import FreeParameter
+from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]
 NEAR = 3.0
@@ -27,78 +34,88 @@ LEVELS, FACTORS = (0.1, 1.0), (0.6, 1.0, 1.8)
 
 
 @pytest.fixture(scope="module")
-def rubbing(bench: Bench) -> tuple[Series, ...]:
+def rubbing(bench: ModelSet) -> tuple[SampledRecording, ...]:
     """Return recordings of a driveline with a friction that the base lacks."""
-    layers = [layer for layer in bench.layers() if layer.id == "coulomb_friction@w_em"]
-    return recorded(bench.candidate(layers), {**TRUTH, **FRICTION})
+    layers = [layer for layer in bench.applicable_effects() if layer.id == "coulomb_friction@w_em"]
+    return simulate_recordings(bench.compile_candidate(layers), {**TRUTH, **FRICTION})
 
 
-def begun(base: Candidate, series: tuple[Series, ...], level: float, factor: float) -> Estimate:
+def begun(
+    base: Candidate, series: tuple[SampledRecording, ...], level: float, factor: float
+) -> Estimate:
     """Return the base fitted with levels that stay as they are given."""
-    units = units_of(base, series, {})
-    known = noises_of(series, {name: level * unit for name, unit in units.items()})
-    return followed(base, series, dataclasses.replace(known, seen=factor * known.seen), {})
+    units = disturbance_units(base, series, {})
+    known = measured_noise_levels(series, {name: level * unit for name, unit in units.items()})
+    return iterate_broyden(
+        base, series, dataclasses.replace(known, outputs=factor * known.outputs), {}
+    )
 
 
 def test_fits_that_begin_with_other_levels_end_as_good(
-    bench: Bench, rubbing: tuple[Series, ...]
+    bench: ModelSet, rubbing: tuple[SampledRecording, ...]
 ) -> None:
-    base = bench.candidate(())
-    units = units_of(base, rubbing, {})
+    base = bench.compile_candidate(())
+    units = disturbance_units(base, rubbing, {})
     starts = [begun(base, rubbing, level, factor) for level in LEVELS for factor in FACTORS]
-    ends = [settled(base, rubbing, one.noises, {}, units).cost for one in starts]
+    ends = [fit_with_noise(base, rubbing, one.noise_levels, {}, units).cost for one in starts]
     assert max(ends) - min(ends) < NEAR
     costs = [one.cost for one in starts]
     assert max(costs) - min(costs) > 10 * NEAR, "they would have been as good without"
 
 
-def test_levels_stay_near_what_is_known_of_them(bench: Bench, rubbing: tuple[Series, ...]) -> None:
-    base = bench.candidate(())
-    units, known = units_of(base, rubbing, {}), noises_of(rubbing, {})
-    found = tuned(begun(base, rubbing, 1.0, 1.0), rubbing, units)
+def test_levels_stay_near_what_is_known_of_them(
+    bench: ModelSet, rubbing: tuple[SampledRecording, ...]
+) -> None:
+    base = bench.compile_candidate(())
+    units, known = disturbance_units(base, rubbing, {}), measured_noise_levels(rubbing, {})
+    found = fit_noise_covariance(begun(base, rubbing, 1.0, 1.0), rubbing, units)
     for name, unit in units.items():
-        assert LEAST * unit <= found.noises.drifts[name] * (1 + 1e-9)
-        assert found.noises.drifts[name] <= MOST * unit * (1 + 1e-9)
-    ratios = found.noises.seen / known.seen
-    assert np.all(ratios <= FARTHEST * (1 + 1e-9))
-    assert np.all(ratios >= (1 - 1e-9) / FARTHEST)
+        assert MIN_LEVEL * unit <= found.noise_levels.process[name] * (1 + 1e-9)
+        assert found.noise_levels.process[name] <= MAX_LEVEL * unit * (1 + 1e-9)
+    ratios = found.noise_levels.outputs / known.outputs
+    assert np.all(ratios <= MAX_NOISE_RATIO * (1 + 1e-9))
+    assert np.all(ratios >= (1 - 1e-9) / MAX_NOISE_RATIO)
 
 
 def test_a_tuned_fit_is_one_of_the_same_candidate(
-    bench: Bench, rubbing: tuple[Series, ...]
+    bench: ModelSet, rubbing: tuple[SampledRecording, ...]
 ) -> None:
-    base = bench.candidate(())
-    found = tuned(begun(base, rubbing, 0.1, 1.0), rubbing, units_of(base, rubbing, {}))
+    base = bench.compile_candidate(())
+    found = fit_noise_covariance(
+        begun(base, rubbing, 0.1, 1.0), rubbing, disturbance_units(base, rubbing, {})
+    )
     assert found.candidate is base
     assert found.point.shared.shape == (len(base.names),)
-    assert found.cost == found.outcome.cost() + found.point.prior(base)
-    assert found.normal is not None
-    assert found.normal.a.shape[1:] == (len(base.names), len(base.names))
-    assert set(found.columns) == set(base.names)
-    again = looked_at(base, rubbing, found.noises, found.point, found.outcome)
+    assert found.cost == found.prediction.negative_log_likelihood() + found.point.prior_cost(base)
+    assert found.normal_equations is not None
+    assert found.normal_equations.a.shape[1:] == (len(base.names), len(base.names))
+    assert set(found.jacobian) == set(base.names)
+    again = evaluate(base, rubbing, found.noise_levels, found.point, found.prediction)
     assert again.cost == pytest.approx(found.cost, abs=NEAR)
 
 
 def test_what_feeds_nothing_back_keeps_its_noises(
-    bench: Bench, rubbing: tuple[Series, ...]
+    bench: ModelSet, rubbing: tuple[SampledRecording, ...]
 ) -> None:
-    base = bench.candidate(())
-    given = begun(base, rubbing, 0.1, 1.0).noises
-    alone = followed(base, rubbing, dataclasses.replace(given, drifts={}, is_alone=True), {})
-    assert tuned(alone, rubbing, {}).noises is alone.noises
+    base = bench.compile_candidate(())
+    given = begun(base, rubbing, 0.1, 1.0).noise_levels
+    alone = iterate_broyden(
+        base, rubbing, dataclasses.replace(given, process={}, is_output_error=True), {}
+    )
+    assert fit_noise_covariance(alone, rubbing, {}).noise_levels is alone.noise_levels
 
 
-def test_noises_follow_the_coordinates_of_their_levels(bench: Bench) -> None:
-    base = bench.candidate(())
-    drift, signal = base.drifts[0], base.predictor.seen[1]
-    names = (DRIFTS.format(drift), SIGNAL.format(signal), INPUTS)
-    levels = tuple(Uncertain(name, 2.0, 0.1, 50.0, 1.0, True) for name in names)
-    wide = dataclasses.replace(base, levels=levels)
+def test_noises_follow_the_coordinates_of_their_levels(bench: ModelSet) -> None:
+    base = bench.compile_candidate(())
+    drift, signal = base.disturbance_states[0], base.predictor.outputs[1]
+    names = (PROCESS_NOISE_NAME.format(drift), OUTPUT_NOISE_NAME.format(signal), INPUT_NOISE_NAME)
+    levels = tuple(FreeParameter(name, 2.0, 0.1, 50.0, 1.0, True) for name in names)
+    wide = dataclasses.replace(base, noise_parameters=levels)
     z = np.zeros(len(wide.names))
     z[-3:] = np.log([1.5, 2.5, 0.5])
-    blank = Noises(np.array([7.0, 8.0]), np.array([1.0, 4.0]), {drift: 9.0}, np.ones(2))
-    found = noises_at(wide, Point(z, z[None]), blank)
-    assert found.drifts == {drift: pytest.approx(3.0)}
-    assert list(found.seen) == [7.0, pytest.approx(5.0)]
+    blank = NoiseLevels(np.array([7.0, 8.0]), np.array([1.0, 4.0]), {drift: 9.0}, np.ones(2))
+    found = noise_levels_at(wide, ParameterVector(z, z[None]), blank)
+    assert found.process == {drift: pytest.approx(3.0)}
+    assert list(found.outputs) == [7.0, pytest.approx(5.0)]
     assert list(found.inputs) == [pytest.approx(0.25), pytest.approx(1.0)]
-    assert noises_at(base, Point(z[:-3], z[None, :-3]), blank) is blank
+    assert noise_levels_at(base, ParameterVector(z[:-3], z[None, :-3]), blank) is blank

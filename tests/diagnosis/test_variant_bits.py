@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.diagnosis.accepting import layers_of
-from tests.diagnosis.variant_run import variant_run
+from tests.diagnosis.variant_run import run_variant
 from tests.language.making import project_of
 
 JOINT = """language: 1
@@ -33,6 +33,6 @@ TOGETHER = (
 def test_a_variant_with_three_effects_is_the_same_in_c(
     tmp_path: Path, ids: tuple[str, ...]
 ) -> None:
-    found = variant_run(tmp_path, layers_of(project_of(tmp_path, joint=JOINT), ids))
+    found = run_variant(tmp_path, layers_of(project_of(tmp_path, joint=JOINT), ids))
     assert found.is_whole, found
     assert found.ticks >= 200

@@ -11,11 +11,11 @@ import pytest
 
 import modewright as mw
 from engine.recording import Channel, Recording
-from language.experiment import Column
-from modewright.workable import FEWEST, LARGEST, MOST, OpenedLater, unworkable
-from tests.diagnosis.driving import bench
+from language.experiment import ColumnMapping
+from modewright.workable import MAX_SAMPLES, MAX_VALUE, MIN_SAMPLES, LazyRecordings, unusable_reason
+from tests.diagnosis.driving import read_recording_map
 
-COLUMNS = bench().columns
+COLUMNS = read_recording_map().columns
 COMPARED = next(one for one in COLUMNS.values() if one.compare)
 YEARS = Fraction(10**9)
 """A time stamp [s] behind a leap."""
@@ -33,40 +33,40 @@ def every(period: Fraction, count: int = 100) -> list[Fraction]:
 
 
 def test_a_usual_recording_is_workable() -> None:
-    assert unworkable(recording(every(Fraction(1, 100)))) == ""
+    assert unusable_reason(recording(every(Fraction(1, 100)))) == ""
 
 
 def test_few_samples_are_not() -> None:
-    assert unworkable(recording(every(Fraction(1, 100), FEWEST))) == ""
-    assert "9 of the 10 samples that are needed" in unworkable(
-        recording(every(Fraction(1, 100), FEWEST - 1))
+    assert unusable_reason(recording(every(Fraction(1, 100), MIN_SAMPLES))) == ""
+    assert "9 of the 10 samples that are needed" in unusable_reason(
+        recording(every(Fraction(1, 100), MIN_SAMPLES - 1))
     )
 
 
 def test_nanoseconds_are_not() -> None:
-    assert "in another unit" in unworkable(recording(every(Fraction(1, 10**9))))
+    assert "in another unit" in unusable_reason(recording(every(Fraction(1, 10**9))))
 
 
 def test_a_leap_of_years_is_not() -> None:
     times = every(Fraction(1, 100))
-    assert unworkable(recording([*times, times[-1] + Fraction(MOST, 100) - 2])) == ""
-    assert "FILE@0..60" in unworkable(recording([*times, YEARS]))
+    assert unusable_reason(recording([*times, times[-1] + Fraction(MAX_SAMPLES, 100) - 2])) == ""
+    assert "FILE@0..60" in unusable_reason(recording([*times, YEARS]))
 
 
 @pytest.mark.parametrize("column", [COMPARED, FED])
-def test_values_at_which_a_run_is_given_up_are_not(column: Column) -> None:
+def test_values_at_which_a_run_is_given_up_are_not(column: ColumnMapping) -> None:
     usual = recording(every(Fraction(1, 100)))
     channel = dataclasses.replace(usual.channels[COMPARED.name], column=column)
-    for value, is_fine in ((LARGEST, True), (-2 * LARGEST, False)):
+    for value, is_fine in ((MAX_VALUE, True), (-2 * MAX_VALUE, False)):
         one = dataclasses.replace(channel, values=(value, *channel.values[1:]))
-        found = unworkable(dataclasses.replace(usual, channels={"x": one}))
+        found = unusable_reason(dataclasses.replace(usual, channels={"x": one}))
         assert (found == "") is is_fine
 
 
 def test_a_single_sample_of_an_input_is_enough() -> None:
     usual = recording(every(Fraction(1, 100)))
     fed = Channel(FED, (Fraction(0),), (1.0,))
-    assert unworkable(dataclasses.replace(usual, channels={**usual.channels, "u": fed})) == ""
+    assert unusable_reason(dataclasses.replace(usual, channels={**usual.channels, "u": fed})) == ""
 
 
 def test_wanted_anyway_nothing_is_concluded_from_it(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_what_is_held_out_is_read_when_it_is_asked_for_and_refused_then() -> Non
         return files[path]
 
     train, late, leaping = files
-    known = OpenedLater({train: usual}, (late, leaping), read)
+    known = LazyRecordings({train: usual}, (late, leaping), read)
     assert known[train] is usual and list(known) == [train] and asked == []
     assert known.get(late) is usual and known.get(late) is usual and asked == [late]
     with pytest.raises(ValueError, match="uses a part of it"):

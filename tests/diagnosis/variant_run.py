@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
-from diagnosis.layers import Layer
+from diagnosis.layers import PlacedEffect
 from diagnosis.naming import quantities_of
-from diagnosis.variant import variant_name, variant_text
+from diagnosis.variant import format_variant, variant_name
 from language.project import Project
-from tests.diagnosis.accepting import BASE, accepted
+from tests.diagnosis.accepting import BASE, make_dossier
 
 NAME = variant_name(BASE)
 RUN = f"""language: 1
@@ -48,14 +48,14 @@ class VariantRun:
         return not self.problems and self.is_equal and self.moves and self.off < ROUNDED
 
 
-def variant_run(folder: Path, layers: Sequence[Layer]) -> VariantRun:
+def run_variant(folder: Path, layers: Sequence[PlacedEffect]) -> VariantRun:
     """Write the variant in which layers were accepted below a folder, and run it.
 
     Raises SpecError, RunError.
     """
     (folder / "spec").mkdir(exist_ok=True)
-    dossier = accepted(Project(folder), layers)
-    (folder / "spec" / "variant.yaml").write_text(variant_text(dossier, BASE), "utf-8")
+    dossier = make_dossier(Project(folder), layers)
+    (folder / "spec" / "variant.yaml").write_text(format_variant(dossier, BASE), "utf-8")
     (folder / "spec" / "tip_out.yaml").write_text(RUN, "utf-8")
     written = mw.load(NAME, "tip_out", root=folder).system.instances[NAME].automaton.parameters
     assert dossier.diagnosis

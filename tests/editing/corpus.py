@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from language.document import Document, Items, Node, Scalar, Table
+from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.problem import SpecError
 from language.project import read_document
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent.parent
 FOLDERS = ("spec", "tests/rules", "tests/data", "tests/refused", "tests/language")
 
 
-def documents(folders: Sequence[str] = FOLDERS) -> Iterator[tuple[Path, Document]]:
+def valid_documents(folders: Sequence[str] = FOLDERS) -> Iterator[tuple[Path, Document]]:
     """Yield the specs that are said to be valid: shipped, of the rules, repaired ones."""
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*.yaml")):
@@ -27,16 +27,16 @@ def documents(folders: Sequence[str] = FOLDERS) -> Iterator[tuple[Path, Document
                 assert folder != "spec", path
 
 
-def plain(node: Node) -> Any:
+def to_plain_data(node: YamlNode) -> Any:
     """Return a tree as an editor sees it: scalars by the core schema of YAML 1.2."""
     match node:
-        case Items():
-            return [plain(part) for part in node.nodes]
-        case Table():
-            return {entry.key: plain(entry.node) for entry in node}
-        case Scalar(text, _, quoted) if not quoted:
+        case SequenceNode():
+            return [to_plain_data(part) for part in node.nodes]
+        case MappingNode():
+            return {entry.key: to_plain_data(entry.node) for entry in node}
+        case ScalarNode(text, _, quoted) if not quoted:
             return _resolved(text)
-        case Scalar():
+        case ScalarNode():
             return node.text
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from language.finding import document_of, source_of
+from language.finding import parse_document, source_of
 from language.problem import SpecError
 from modewright.cli import app
-from modewright.editing.difference import Change, difference
-from modewright.editing.show_difference import page_of
+from modewright.editing.difference import SpecChange, diff_documents
+from modewright.editing.show_difference import diff_html
 
 BASE = """\
 language: 1
@@ -29,12 +29,12 @@ modes:
 """
 
 
-def changes(text: str, before: str = BASE) -> list[Change]:
+def changes(text: str, before: str = BASE) -> list[SpecChange]:
     old, new = (
-        document_of(source_of(Path(name), each), each)
+        parse_document(source_of(Path(name), each), each)
         for name, each in (("old.yaml", before), ("new.yaml", text))
     )
-    return list(difference(old, new))
+    return list(diff_documents(old, new))
 
 
 def only(text: str, before: str = BASE) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ def only(text: str, before: str = BASE) -> tuple[str, ...]:
 
 def test_a_value_is_told_with_how_much_it_changed_and_where_both_stand() -> None:
     (found,) = changes(BASE.replace("value: 4000 N*m/rad", "value: 5000 N*m/rad"))
-    assert found == Change(
+    assert found == SpecChange(
         kind="changed",
         group="parameters",
         thing="k",
@@ -141,7 +141,7 @@ def test_specs_of_two_kinds_are_not_compared() -> None:
 
 def test_the_page_shows_what_was_written_not_what_it_would_do() -> None:
     text = BASE.replace("T: k * theta", 'T: "<script>alert(1)</script>"')
-    page = page_of(changes(text), "a", "b")
+    page = diff_html(changes(text), "a", "b")
     assert "<script>" not in page and "&lt;script&gt;alert(1)" in page
     assert "old.yaml:5" in page
 

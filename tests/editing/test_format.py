@@ -12,19 +12,19 @@ from typer.testing import CliRunner
 
 from language.finding import source_of
 from language.problem import SpecError
-from language.project import document_of
+from language.project import parse_document
 from modewright.cli import app
-from modewright.editing.format import formatted
-from modewright.editing.page import page_of
+from modewright.editing.format import format_text
+from modewright.editing.page import tokenise
 from modewright.files import OutputError
-from tests.editing.corpus import ROOT, documents, plain
+from tests.editing.corpus import ROOT, to_plain_data, valid_documents
 
 HERE = Path(__file__).parent
 UNTIDY, TIDY = (HERE / "untidy.yaml").read_text(), (HERE / "tidy.yaml").read_text()
 
 
 def test_an_untidy_spec_is_laid_out_by_the_rules() -> None:
-    assert formatted(UNTIDY) == TIDY
+    assert format_text(UNTIDY) == TIDY
 
 
 def test_a_column_stays_where_its_author_put_it() -> None:
@@ -32,18 +32,18 @@ def test_a_column_stays_where_its_author_put_it() -> None:
     kept = head + "  a:      {value: 1}\n  b_long: {value: 2}\n  c_longer: {value: 3}\n"
     wide = head + "  a:        {value: 1}\n  b_long:   {value: 2}\n"
     half = head + "  a:        {value: 1}\n  b:        {value: 2}\n  b_long: {value: 3}\n"
-    assert [formatted(kept), formatted(wide)] == [kept, wide]
-    assert formatted(half) == half.replace(":        {", ":      {")
+    assert [format_text(kept), format_text(wide)] == [kept, wide]
+    assert format_text(half) == half.replace(":        {", ":      {")
 
 
 def test_every_spec_here_says_the_same_and_a_second_pass_changes_nothing() -> None:
-    for path, document in documents(("spec", "tests/data")):
+    for path, document in valid_documents(("spec", "tests/data")):
         text = path.read_text("utf-8-sig")
-        made = formatted(text, str(path))
-        again = document_of(source_of(path, made), made)
-        assert plain(again.root) == plain(document.root), path
+        made = format_text(text, str(path))
+        again = parse_document(source_of(path, made), made)
+        assert to_plain_data(again.root) == to_plain_data(document.root), path
         assert _comments(made) == _comments(text), path
-        assert formatted(made) == made, path
+        assert format_text(made) == made, path
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -51,11 +51,11 @@ def test_a_spec_that_was_shaken_says_the_same_and_is_laid_out_once_and_for_all(s
     chance = random.Random(seed)
     path = ROOT / "spec" / "ev_driveline" / f"{('estimator', 'plant', 'hko')[seed % 3]}.yaml"
     text = shaken(path.read_text("utf-8"), chance)
-    made = formatted(text)
-    before, after = (document_of(source_of(path, each), each) for each in (text, made))
-    assert plain(after.root) == plain(before.root)
+    made = format_text(text)
+    before, after = (parse_document(source_of(path, each), each) for each in (text, made))
+    assert to_plain_data(after.root) == to_plain_data(before.root)
     assert _comments(made) == _comments(text)
-    assert formatted(made) == made
+    assert format_text(made) == made
 
 
 def shaken(text: str, chance: random.Random) -> str:
@@ -75,18 +75,18 @@ def shaken(text: str, chance: random.Random) -> str:
 
 
 def _comments(text: str) -> list[str]:
-    page = page_of(text)
-    return [page.lines[line][column:].rstrip() for line, column in page.comments.items()]
+    page = tokenise(text)
+    return [page.lines[line][column:].rstrip() for line, column in page.comment_columns.items()]
 
 
 def test_a_text_of_several_lines_is_left_as_it_is() -> None:
     text = "about: |\n     a  # no comment\n\n\n       b   \nreq: 'x\n\n\n  y'\n"
-    assert formatted(text) == text
+    assert format_text(text) == text
 
 
 def test_what_is_no_yaml_is_refused() -> None:
     with pytest.raises(SpecError):
-        formatted("a: {b: 1")
+        format_text("a: {b: 1")
 
 
 def test_check_writes_nothing_and_says_what_would_change(tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_line_ends_and_a_mark_of_utf_8_stay(tmp_path: Path, mark: str, end: str)
     path.write_bytes((mark + UNTIDY.replace("\n", end)).encode())
     assert CliRunner().invoke(app, ["format", str(path)]).exit_code == 0
     assert path.read_bytes() == (mark + TIDY.replace("\n", end)).encode()
-    assert formatted(mark + TIDY.replace("\n", end)) == mark + TIDY.replace("\n", end)
+    assert format_text(mark + TIDY.replace("\n", end)) == mark + TIDY.replace("\n", end)
 
 
 def test_a_file_with_two_names_is_told_to_part(tmp_path: Path) -> None:

@@ -13,20 +13,20 @@ import pytest
 from expectation.reader import read_test
 from language.automaton import read_automaton
 from language.calibration import read_calibration
-from language.document import Document, Node, Table
+from language.document import Document, MappingNode, YamlNode
 from language.effect import read_effect
-from language.finding import KINDS
+from language.finding import DOCUMENT_KINDS
 from language.map import read_map
 from language.problem import Problems, Span, SpecError
-from language.project import Project, expanded, read_document
+from language.project import Project, expand_document, read_document
 from language.reader import Reader
 from language.scenario import read_scenario
 from language.system import read_system
 from modewright.editing.guide import places
-from modewright.editing.schema import schema, schema_text
-from modewright.editing.shape import EVERYWHERE, Choice, Part, kinds_in, shapes
+from modewright.editing.schema import json_schema, schema_text
+from modewright.editing.shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes
 from sweep.study_reader import read_study
-from tests.editing.corpus import ROOT, documents, plain
+from tests.editing.corpus import ROOT, to_plain_data, valid_documents
 
 COMMITTED = ROOT / "spec" / "modewright.schema.json"
 TAKEN_BEFORE = {"like", "effects", "calibrations", "extends"}
@@ -45,24 +45,24 @@ def test_the_committed_schema_is_current(update: bool) -> None:
     if update:
         COMMITTED.write_text(schema_text(), "utf-8")
     assert COMMITTED.read_text("utf-8") == schema_text(), "make generate"
-    jsonschema.Draft7Validator.check_schema(schema())
+    jsonschema.Draft7Validator.check_schema(json_schema())
 
 
 def test_every_valid_spec_is_valid_for_the_schema_too() -> None:
-    everything = jsonschema.Draft7Validator(schema())
-    own = {kind: jsonschema.Draft7Validator(schema(kind)) for kind in KINDS}
+    everything = jsonschema.Draft7Validator(json_schema())
+    own = {kind: jsonschema.Draft7Validator(json_schema(kind)) for kind in DOCUMENT_KINDS}
     seen = set()
-    for path, document in documents():
+    for path, document in valid_documents():
         seen.add(document.kind)
-        error = next(own[document.kind].iter_errors(plain(document.root)), None)
+        error = next(own[document.kind].iter_errors(to_plain_data(document.root)), None)
         assert error is None, f"{path}: {list(error.absolute_path)}: {error.message}"
         if path.is_relative_to(ROOT / "spec"):
-            assert everything.is_valid(plain(document.root)), path
-    assert seen == set(KINDS)
+            assert everything.is_valid(to_plain_data(document.root)), path
+    assert seen == set(DOCUMENT_KINDS)
 
 
 def test_a_spec_with_a_wrong_key_or_word_is_not() -> None:
-    everything = jsonschema.Draft7Validator(schema())
+    everything = jsonschema.Draft7Validator(json_schema())
     found = 0
     for told in sorted((ROOT / "tests" / "refused").glob("*.txt")):
         path = told.with_suffix(".yaml")
@@ -70,19 +70,19 @@ def test_a_spec_with_a_wrong_key_or_word_is_not() -> None:
             document = _document(path)
             if document and path.stem not in BEYOND:
                 found += 1
-                assert not everything.is_valid(plain(document.root)), path
+                assert not everything.is_valid(to_plain_data(document.root)), path
     assert found >= 4
 
 
 def test_a_schema_of_another_kind_is_refused() -> None:
     with pytest.raises(ValueError, match="`machine` is not one of automaton"):
-        schema("machine")
+        json_schema("machine")
 
 
 def test_the_shapes_have_the_keys_that_the_readers_know() -> None:
     unseen = {name for name, shape in shapes().items() if shape.keys} - {"variant"}
-    common = {key.name for key in EVERYWHERE} | TAKEN_BEFORE
-    for path, document in documents():
+    common = {key.name for key in COMMON_KEYS} | TAKEN_BEFORE
+    for path, document in valid_documents():
         wanted = unseen & {"laying"} if document.kind == "variant" else unseen
         tables = [(name, table) for name, table in _tables(document.root) if name in wanted]
         if not tables:
@@ -102,34 +102,34 @@ def test_the_shapes_have_the_keys_that_the_readers_know() -> None:
 def _keys_asked(document: Document, project: Project) -> dict[tuple[str, int, int], list[set[str]]]:
     """Return, by the place of each key, what the readers allowed beside it."""
     found: dict[tuple[str, int, int], list[set[str]]] = defaultdict(list)
-    table = Reader.table
+    table = Reader.read_mapping
 
     def recording(
-        self: Reader, node: Node | None, what: str, allowed: Iterable[str] | None = None
-    ) -> Table:
+        self: Reader, node: YamlNode | None, what: str, allowed: Iterable[str] | None = None
+    ) -> MappingNode:
         known = None if allowed is None else set(allowed)
-        for entry in node if isinstance(node, Table) and known is not None else ():
+        for entry in node if isinstance(node, MappingNode) and known is not None else ():
             found[_place(entry.span)].append(known or set())
         return table(self, node, what, known)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Reader, "table", recording)
+        patched.setattr(Reader, "read_mapping", recording)
         _read(document, project)
     return found
 
 
 def test_a_choice_offers_what_the_reader_takes(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, set[str]] = defaultdict(set)
-    choice = Reader.choice
+    choice = Reader.read_choice
 
     def recording(
-        self: Reader, node: Node | None, what: str, allowed: Iterable[str], default: str
+        self: Reader, node: YamlNode | None, what: str, allowed: Iterable[str], default: str
     ) -> str:
         words = list(allowed)
         asked[what] |= {" ".join(sorted(words))}
         return choice(self, node, what, words, default)
 
-    monkeypatch.setattr(Reader, "choice", recording)
+    monkeypatch.setattr(Reader, "read_choice", recording)
     for name in ("estimator", "hko", "leaf", "tip_out", "driveline", "ev_driveline_sensed"):
         project = Project(ROOT)
         _read(read_document(project.path_of(name)), project)
@@ -137,7 +137,7 @@ def test_a_choice_offers_what_the_reader_takes(monkeypatch: pytest.MonkeyPatch) 
         (key.name, " ".join(sorted(kind.words)))
         for shape in shapes().values()
         for key in shape.keys.values()
-        for kind in kinds_in(key.kind)
+        for kind in alternatives_of(key.kind)
         if isinstance(kind, Choice) and key.name not in ("kind", "of", "neutral", "sampling", "by")
     ]
     told = [(name, words) for name, words in offered if name in asked]
@@ -146,9 +146,9 @@ def test_a_choice_offers_what_the_reader_takes(monkeypatch: pytest.MonkeyPatch) 
         assert words in asked[name], name
 
 
-def _tables(root: Table) -> Iterator[tuple[str, Table]]:
+def _tables(root: MappingNode) -> Iterator[tuple[str, MappingNode]]:
     for place in places(root):
-        if isinstance(place.node, Table) and isinstance(place.kind, Part):
+        if isinstance(place.node, MappingNode) and isinstance(place.kind, ShapeRef):
             yield place.kind.shape, place.node
 
 
@@ -169,8 +169,8 @@ def _project_of(path: Path) -> Path:
 
 def _read(document: Document, project: Project) -> None:
     problems = Problems()
-    with problems.collecting():
-        base = expanded(document, project, problems)
+    with problems.collect_errors():
+        base = expand_document(document, project, problems)
         match base.kind:
             case "automaton":
                 read_automaton(document, project, None, problems)

@@ -40,7 +40,7 @@ outputs: [x, T_s, rate]
 BASES = {"rotor": ROTOR, "shaft": SHAFT}
 
 
-def ran(
+def run_with_effects(
     folder: Path,
     base: str,
     effects: str,

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import modewright as mw
-from tests.effects.rig import ran
+from tests.effects.rig import run_with_effects
 from tests.language.making import ROOT
 
 EXACT = 1e-9
@@ -44,7 +44,7 @@ def test_an_effect_says_what_it_is_and_what_it_is_confused_with(path: Path) -> N
 def test_dry_friction_decelerates_linearly_and_dissipates_its_torque_times_the_speed(
     tmp_path: Path,
 ) -> None:
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "rotor",
         "{coulomb_friction@w: {values: {T_c: 4 N*m}}}",
@@ -105,7 +105,7 @@ RISE: list[tuple[str, str, Callable[[Array], Array]]] = [
 def test_speed_under_a_steady_torque(
     tmp_path: Path, effects: str, given: str, wanted: Callable[[Array], Array]
 ) -> None:
-    found = ran(tmp_path, "rotor", effects, {"T": given})
+    found = run_with_effects(tmp_path, "rotor", effects, {"T": given})
     assert np.max(np.abs(speed(found) - wanted(found.times))) < 2e-8
 
 
@@ -123,14 +123,16 @@ def test_a_lag_follows_a_step(
     tmp_path: Path, part: float, integral: Callable[[Array], Array]
 ) -> None:
     effect = f"{{actuator_lag@T: {{values: {{tau: 50 ms, part: {part}}}}}}}"
-    found = ran(tmp_path, "rotor", effect, {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"})
+    found = run_with_effects(
+        tmp_path, "rotor", effect, {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"}
+    )
     x = np.maximum(found.times - 0.1, 0) / 0.05
     assert np.max(np.abs(speed(found) - 6 / J * 0.05 * integral(x))) < 1e-7
 
 
 def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
     given = {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"}
-    found = ran(tmp_path, "rotor", "{actuator_delay@T: {values: {T_d: 50 ms}}}", given)
+    found = run_with_effects(tmp_path, "rotor", "{actuator_delay@T: {values: {T_d: 50 ms}}}", given)
     wanted = 6 / J * np.maximum(found.times - 0.15, 0)
     # Between major steps (1 ms) the past is interpolated: a step comes out as a ramp of one.
     assert np.max(np.abs(speed(found) - wanted)) < 6 / J * 0.001
@@ -139,7 +141,9 @@ def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
 
 def test_a_rate_limit_makes_a_ramp_of_a_step(tmp_path: Path) -> None:
     limit = "{torque_rate_limit@T: {values: {r_max: 100, tau_f: 2 ms}}}"
-    found = ran(tmp_path, "rotor", limit, {"T": "{start: 0 N*m, steps: {0.1 s: 30 N*m}}"})
+    found = run_with_effects(
+        tmp_path, "rotor", limit, {"T": "{start: 0 N*m, steps: {0.1 s: 30 N*m}}"}
+    )
     t = np.clip(found.times - 0.1, 0, 0.3)
     after = np.maximum(found.times - 0.4, 0)
     wanted = 100 / J * t**2 / 2 + 30 / J * after
@@ -150,7 +154,7 @@ def test_a_rate_limit_makes_a_ramp_of_a_step(tmp_path: Path) -> None:
 def test_the_loss_of_gears_follows_the_size_of_the_load(tmp_path: Path) -> None:
     effects = "{load_dependent_loss@w: {values: {loss: 0.1}}}"
     for sign in (1, -1):
-        found = ran(
+        found = run_with_effects(
             tmp_path, "rotor", effects, {"T": f"{6 * sign} N*m"}, initial="{plant.w: 20 rad/s}"
         )
         assert np.max(np.abs(speed(found) - (20 + (6 * sign - 0.6) / J * found.times))) < EXACT
@@ -160,7 +164,9 @@ def test_stribeck_friction_is_larger_at_low_speed(tmp_path: Path) -> None:
     effects = "{stribeck_friction@w: {values: {T_c: 4 N*m, rise: 0.5, w_k: 2}}}"
     rates = {}
     for w in (1, 40):
-        found = ran(tmp_path, "rotor", effects, {"T": "0 N*m"}, initial=f"{{plant.w: {w} rad/s}}")
+        found = run_with_effects(
+            tmp_path, "rotor", effects, {"T": "0 N*m"}, initial=f"{{plant.w: {w} rad/s}}"
+        )
         rates[w] = (speed(found)[1] - speed(found)[0]) / found.times[1]
     assert rates[40] == pytest.approx(-4 / J, rel=1e-9)
     assert rates[1] == pytest.approx(-4 / J * (1 + 0.5 * np.exp(-((1 / 2) ** 2))), rel=0.01)
@@ -168,7 +174,7 @@ def test_stribeck_friction_is_larger_at_low_speed(tmp_path: Path) -> None:
 
 def test_a_brake_that_lets_go_slowly_is_a_load_that_fades(tmp_path: Path) -> None:
     """Nothing beside the brake while it is applied; then what its pads had come to, fading."""
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "rotor",
         "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s}}}",
@@ -209,7 +215,7 @@ SENSED: list[tuple[str, Callable[[Array], Array]]] = [
 def test_a_sensor_changes_its_output_alone(
     tmp_path: Path, effects: str, wanted: Callable[[Array], Array]
 ) -> None:
-    found = ran(tmp_path, "rotor", effects, {"T": "6 N*m"})
+    found = run_with_effects(tmp_path, "rotor", effects, {"T": "6 N*m"})
     t = found.times
     off_steps = np.abs(np.mod(3 * t / 0.25 + 0.5, 1)) > 1e-6 if "quant" in effects else t >= 0
     assert np.max(np.abs(speed(found) - wanted(t))[off_steps]) < 1e-7
@@ -247,8 +253,10 @@ def test_at_their_neutral_values_all_effects_leave_every_bit(tmp_path: Path) -> 
     )
     request = {"T_em": "{start: 30 N*m, steps: {0.1 s: -20 N*m}}"}
     initial = "{plant.theta_d: 0.0740754719736 rad}"
-    plain = ran(tmp_path, "driveline", "{}", request, initial=initial, horizon="0.6 s")
-    laid = ran(tmp_path, "driveline", f"{{{effects}}}", request, initial=initial, horizon="0.6 s")
+    plain = run_with_effects(tmp_path, "driveline", "{}", request, initial=initial, horizon="0.6 s")
+    laid = run_with_effects(
+        tmp_path, "driveline", f"{{{effects}}}", request, initial=initial, horizon="0.6 s"
+    )
     assert len(plain.events) >= 3
     assert [e.time for e in laid.events] == [e.time for e in plain.events]
     for name, values in plain.signals.items():
@@ -268,8 +276,8 @@ def test_every_neutral_value_that_is_declared_is_tried(tmp_path: Path) -> None:
 
 def test_a_gap_of_no_width_is_none(tmp_path: Path) -> None:
     given = {"v": "{start: 0.1 rad/s, steps: {0.6 s: -0.1 rad/s}}"}
-    found = ran(
+    found = run_with_effects(
         tmp_path, "shaft", "{backlash@spring: {values: {alpha: 0 rad}}}", given, horizon="1.4 s"
     )
-    plain = ran(tmp_path, "shaft", "{}", given, horizon="1.4 s")
+    plain = run_with_effects(tmp_path, "shaft", "{}", given, horizon="1.4 s")
     assert np.max(np.abs(torque(found) - torque(plain))) < EXACT

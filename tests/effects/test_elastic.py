@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from tests.effects.rig import ran
+from tests.effects.rig import run_with_effects
 
 EXACT = 1e-9
 """RK4 with a step of 1 ms on polynomials and slow exponentials; absolute, SI."""
@@ -27,7 +27,7 @@ def torque(found: mw.Trajectory) -> Array:
 
 def test_a_body_on_a_spring_oscillates_at_the_frequency_of_both_parts(tmp_path: Path) -> None:
     effects = "{compliance@body: {values: {part: 0.75, k_c: 600 N*m/rad, c_c: 0.1 N*m*s/rad}}}"
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "rotor",
         effects,
@@ -48,7 +48,7 @@ def test_a_body_on_a_spring_oscillates_at_the_frequency_of_both_parts(tmp_path: 
 def test_springs_in_series_share_a_torque(tmp_path: Path) -> None:
     """A load at the far end of the spring twists it by T / k_c; the near end sees all of it."""
     effects = "{compliance@body: {values: {part: 0.5, k_c: 600 N*m/rad, c_c: 60 N*m*s/rad}}}"
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "rotor",
         effects,
@@ -63,7 +63,7 @@ def test_springs_in_series_share_a_torque(tmp_path: Path) -> None:
 
 def test_a_tyre_settles_at_the_static_slip(tmp_path: Path) -> None:
     effects = "{tyre_slip@body: {values: {J_w: 0.5 kg*m^2, C_t: 1000 N*m, l_r: 0.5 rad}}}"
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "rotor",
         effects,
@@ -81,7 +81,7 @@ def test_a_tyre_settles_at_the_static_slip(tmp_path: Path) -> None:
 
 
 def test_an_unknown_input_keeps_what_it_is(tmp_path: Path) -> None:
-    found = ran(
+    found = run_with_effects(
         tmp_path, "rotor", "{unknown_input@w: {}}", {"T": "6 N*m"}, initial="{plant.T_u_w: 2 N*m}"
     )
     assert np.max(np.abs(speed(found) - 4 / J * found.times)) < EXACT
@@ -92,7 +92,7 @@ def test_an_unknown_input_keeps_what_it_is(tmp_path: Path) -> None:
 
 def test_rubber_beside_a_spring_is_stiffer_at_first(tmp_path: Path) -> None:
     effects = "{stiffness_hysteresis@spring: {values: {k_r: 1000 N*m/rad, F_r: 25 N*m}}}"
-    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    found = run_with_effects(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
     x = 0.1 * found.times
     wanted = 400 * x + 20 * 0.1 + 25 * (1 - np.exp(-1000 * x / 25))
     assert np.max(np.abs(torque(found) - wanted)) < 1e-8
@@ -100,7 +100,7 @@ def test_rubber_beside_a_spring_is_stiffer_at_first(tmp_path: Path) -> None:
 
 def test_rubber_beside_a_spring_transmits_nothing_while_the_gap_is_open(tmp_path: Path) -> None:
     effects = "{stiffness_hysteresis@half_shaft: {values: {k_r: 1000 N*m/rad, F_r: 25 N*m}}}"
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "driveline",
         effects,
@@ -117,7 +117,7 @@ def test_rubber_beside_a_spring_transmits_nothing_while_the_gap_is_open(tmp_path
 @pytest.mark.parametrize("q", [3, -0.8])
 def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: float) -> None:
     effects = f"{{stiffness_nonlinear@spring: {{values: {{q: {q}, x_r: 0.05 rad}}}}}}"
-    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    found = run_with_effects(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
     x = 0.1 * found.times
     part = x**2 / (0.05**2 + x**2)  # half at x_r
     assert np.max(np.abs(torque(found) - (400 * x * (1 + q * part) + 2))) < EXACT
@@ -126,7 +126,7 @@ def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: float) -> None:
 
 def test_a_stiffness_that_varies_over_a_turn(tmp_path: Path) -> None:
     effects = "{position_dependent_stiffness@spring: {values: {a: 0.2, ph: 1 rad}}}"
-    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    found = run_with_effects(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
     t = found.times
     wanted = 40 * t * (1 + 0.2 * np.sin(30 * t + 1)) + 2
     assert np.max(np.abs(torque(found) - wanted)) < 1e-8
@@ -135,7 +135,7 @@ def test_a_stiffness_that_varies_over_a_turn(tmp_path: Path) -> None:
 def test_a_stiffness_that_varies_over_a_turn_in_harmonics(tmp_path: Path) -> None:
     values = "{a: 0.2, ord: 2, ph: 1 rad, s_2: 0.1, c_2: -0.05, s_3: 0.03, c_3: 0.07}"
     effects = f"{{position_dependent_stiffness@spring: {{values: {values}}}}}"
-    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    found = run_with_effects(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
     t = found.times
     angle = 20 * t + 1
     wave = 0.2 * np.sin(angle) + 0.1 * np.sin(2 * angle) - 0.05 * np.cos(2 * angle)
@@ -147,7 +147,7 @@ def test_a_mount_gives_way_as_a_spring_in_series(tmp_path: Path) -> None:
     effects = (
         "{mount_compliance@spring: {values: {J_h: 1 kg*m^2, k_m: 12 kN*m/rad, c_m: 60 N*m*s/rad}}}"
     )
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "shaft",
         effects,
@@ -161,7 +161,7 @@ def test_a_mount_gives_way_as_a_spring_in_series(tmp_path: Path) -> None:
 
 def test_a_gap_carries_no_torque_until_it_is_crossed(tmp_path: Path) -> None:
     """Nordin's gap: at a steady rate from its middle it is crossed in alpha / rate."""
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "shaft",
         "{backlash@spring: {values: {alpha: 0.02 rad}}}",
@@ -185,14 +185,14 @@ def test_a_gap_carries_no_torque_until_it_is_crossed(tmp_path: Path) -> None:
 def test_a_second_gap_in_series_is_as_one_that_is_wider(tmp_path: Path) -> None:
     request = {"T_em": "{start: 30 N*m, steps: {0.1 s: -20 N*m, 0.5 s: 40 N*m}}"}
     start = "plant.theta_d: 0.09 rad, plant.theta_b: 0.0256 rad"
-    both = ran(
+    both = run_with_effects(
         tmp_path,
         "driveline",
         "{backlash@half_shaft: {values: {alpha: 0.01 rad}}}",
         request,
         initial=f"{{{start}, plant.theta_g_half_shaft: 0.01 rad}}",
     )
-    wide = ran(
+    wide = run_with_effects(
         tmp_path,
         "driveline",
         "{}",
@@ -209,7 +209,7 @@ def test_a_second_gap_in_series_is_as_one_that_is_wider(tmp_path: Path) -> None:
 def test_a_second_gap_with_a_body_in_between_gives_way_by_all_of_its_parts(tmp_path: Path) -> None:
     """At rest the twist is that of both springs and both gaps, and both ends see one torque."""
     values = "{J_m: 0.5 kg*m^2, k_2: 20 kN*m/rad, c_2: 200 N*m*s/rad, a_2: 0.03 rad}"
-    found = ran(
+    found = run_with_effects(
         tmp_path,
         "driveline",
         f"{{second_gap@half_shaft: {{values: {values}}}}}",

@@ -8,7 +8,7 @@ import pytest
 
 from engine.recording import Recording, read_recording
 from language.problem import SpecError
-from tests.engine.reading import COLUMNS, Read, Told, made_map, rendered
+from tests.engine.reading import COLUMNS, Read, RenderProblems, render_problems, write_map
 
 
 @pytest.fixture
@@ -21,19 +21,19 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
     ) -> Recording:
         path = tmp_path / name
         path.write_bytes(data.encode() if isinstance(data, str) else data)
-        mapping = made_map(tmp_path, columns, unit)
+        mapping = write_map(tmp_path, columns, unit)
         return read_recording(path, mapping, list(mapping.columns))
 
     return reading
 
 
 @pytest.fixture
-def told(read: Read) -> Told:
+def told(read: Read) -> RenderProblems:
     """Return a function that gives the rendered problems of a bad file."""
 
     def telling(data: str | bytes, columns: str = COLUMNS, name: str = "drive.csv") -> str:
         with pytest.raises(SpecError) as caught:
             read(data, columns, name)
-        return rendered(caught.value.problems)
+        return render_problems(caught.value.problems)
 
     return telling

@@ -15,7 +15,7 @@ from language.problem import Problem, SpecError, render_all
 from language.project import Project, read_document
 
 Read = Callable[..., Recording]
-Told = Callable[..., str]
+RenderProblems = Callable[..., str]
 
 HEAD = "t_s,torque_Nm,speed_rpm\n"
 GOOD = HEAD + "0.01,92.5,2639\n0.02,91.0,\n0.03,-1.5,2640\n"
@@ -25,25 +25,25 @@ COLUMNS = """\
 """
 
 
-def made_map(folder: Path, columns: str, unit: str = "s") -> RecordingMap:
+def write_map(folder: Path, columns: str, unit: str = "s") -> RecordingMap:
     head = f"language: 1\nmap: bench\ntime: {{column: t_s, unit: {unit}}}\ncolumns:\n"
     path = folder / "map.yaml"
     path.write_text(head + columns, "utf-8")
     return read_map(read_document(path), Project(folder))
 
 
-def rendered(problems: Sequence[Problem]) -> str:
+def render_problems(problems: Sequence[Problem]) -> str:
     """Return what the user is told, without the codes of the kinds."""
     return re.sub(r" \[MW\d+\]$", "", render_all(problems), flags=re.MULTILINE)
 
 
-def told_of(path: Path, folder: Path) -> str:
-    mapping = made_map(folder, COLUMNS)
+def problems_of_file(path: Path, folder: Path) -> str:
+    mapping = write_map(folder, COLUMNS)
     with pytest.raises(SpecError) as caught:
         read_recording(path, mapping, list(mapping.columns))
-    return rendered(caught.value.problems)
+    return render_problems(caught.value.problems)
 
 
-def only(recording: Recording) -> Channel:
+def only_channel(recording: Recording) -> Channel:
     (channel,) = recording.channels.values()
     return channel

@@ -18,7 +18,7 @@ from language.map import read_map
 from language.model import Automaton
 from language.problem import Problems
 from language.program import Program
-from language.project import Project, layered, read_document
+from language.project import Project, apply_variant, read_document
 
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "tests/data/paper"
@@ -51,7 +51,7 @@ REAL_CROSSINGS = {"drive_eco.csv": 20.151, "drive_2.csv": 7.55}
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedReplay:
     """An automaton, its program, and a recording read for it."""
 
     automaton: Automaton
@@ -59,23 +59,23 @@ class Loaded:
     mapping: RecordingMap
     recording: Recording
 
-    def replayed(self, ticked: Callable[[Stepper], None] | None = None) -> Replay:
-        return replay(self.automaton, self.program, self.recording, self.mapping, ticked=ticked)
+    def replay(self, ticked: Callable[[Stepper], None] | None = None) -> Replay:
+        return replay(self.automaton, self.program, self.recording, self.mapping, on_tick=ticked)
 
 
-def loaded(
+def load_replay(
     path: Path, map_name: str, name: str, variant: str | None = None, project: Project | None = None
-) -> Loaded:
+) -> LoadedReplay:
     project = project or Project(ROOT)
     document = read_document(project.path_of(name))
     if variant:
         over = read_document(project.path_of(variant))
-        document = layered(document, over, project, Problems())
+        document = apply_variant(document, over, project, Problems())
     automaton = automaton_of(document, project)
     mapping = read_map(read_document(project.path_of(map_name)), project)
     used, _ = used_columns(automaton, mapping)
     recording = read_recording(path, mapping, used)
-    return Loaded(automaton, program_of(automaton), mapping, recording)
+    return LoadedReplay(automaton, program_of(automaton), mapping, recording)
 
 
 def reference_events(name: str) -> list[Moment]:
@@ -111,15 +111,15 @@ def assert_one_clean_tip_out(events: tuple[Event, ...], crossing: float) -> None
 
 
 @cache
-def replayed_trace(name: str) -> Replay:
-    return loaded(PAPER / f"est_paper_{name}.csv.gz", "reference_trace", "estimator").replayed()
+def replay_trace(name: str) -> Replay:
+    return load_replay(PAPER / f"est_paper_{name}.csv.gz", "reference_trace", "estimator").replay()
 
 
 @cache
-def replayed_twin(name: str) -> Replay:
-    return loaded(TWIN, "leaf_can", name, "leaf").replayed()
+def replay_twin(name: str) -> Replay:
+    return load_replay(TWIN, "leaf_can", name, "leaf").replay()
 
 
-def both(name: str) -> tuple[list[Moment], list[Moment]]:
+def transitions_of_both(name: str) -> tuple[list[Moment], list[Moment]]:
     """Return our transitions in a reference trace, and those of the reference."""
-    return own_events(replayed_trace(name)), reference_events(name)
+    return own_events(replay_trace(name)), reference_events(name)

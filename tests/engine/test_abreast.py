@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from codegen.abreast import LANES
-from codegen.run_source import run_files
-from engine.batch import Batch, InputTable, Measure
-from engine.planned_batch import PlannedBatch, planned_batch
-from engine.variants import run_variants
+from codegen.run_source import emit_simulator_files
+from engine.batch import Batch, InputTable, SignalStatistic
+from engine.planned_batch import CompiledBatch, run_compiled_batch
+from engine.variants import run_interpreted_batch
 from language.experiment import Scenario, System
 from modewright.api import load
-from tests.engine.test_planned import DRIVELINES, assert_same_batch, drive, quick
+from tests.engine.test_planned import DRIVELINES, assert_same_batch, compile_unoptimised, load_drive
 from tests.language.making import ROOT
 
 COUNT = LANES + 1
@@ -49,8 +49,8 @@ record: {every: 1.5 ms}
 
 def side_by_side(batch: Batch) -> bool:
     """Tell whether any instance of a planned batch goes side by side."""
-    (part,) = PlannedBatch(batch, quick)._parts
-    return "_Abreast(" in run_files(part.assembly)["run.h"]
+    (part,) = CompiledBatch(batch, compile_unoptimised)._parts
+    return "_Abreast(" in emit_simulator_files(part.assembly)["run.h"]
 
 
 def batch_of(system: System, scenario: Scenario, plant: str = "plant", **changes: object) -> Batch:
@@ -64,14 +64,16 @@ def batch_of(system: System, scenario: Scenario, plant: str = "plant", **changes
         and 1.2 * float(one.value) <= float(one.range[1])
     }
     signals = tuple(name for name in scenario.signals if name.startswith(f"{plant}."))
-    measures = tuple(Measure(f"peak {name}", name, "peak") for name in signals)
-    made = Batch(system, scenario, COUNT, own, measures=measures, outputs=signals, most_events=9)
+    measures = tuple(SignalStatistic(f"peak {name}", name, "peak") for name in signals)
+    made = Batch(system, scenario, COUNT, own, statistics=measures, outputs=signals, max_events=9)
     return dataclasses.replace(made, **changes)  # type: ignore[arg-type]
 
 
 def test_a_plant_with_its_estimator_has_the_bits_of_single_runs() -> None:
     """Through the gap and back, with steps of an input that differ, rows off the steps, noise."""
-    system, scenario = drive("ev_driveline_noisy", "tip_out", Fraction(12, 100), Fraction(1, 50))
+    system, scenario = load_drive(
+        "ev_driveline_noisy", "tip_out", Fraction(12, 100), Fraction(1, 50)
+    )
     steps = np.array([[30.0, -20.0], [25.0, -30.0], [30.0, 40.0], [30.0, -60.0], [10.0, -10.0]])
     starts = (Fraction(0), Fraction(21, 1000))
     batch = batch_of(
@@ -81,18 +83,20 @@ def test_a_plant_with_its_estimator_has_the_bits_of_single_runs() -> None:
         seeds=np.arange(COUNT),
     )
     assert side_by_side(batch)
-    theirs = run_variants(batch)
+    theirs = run_interpreted_batch(batch)
     assert theirs.event_counts.max() > 1
-    assert_same_batch(planned_batch(batch, quick, 1), theirs)
+    assert_same_batch(run_compiled_batch(batch, compile_unoptimised, 1), theirs)
 
 
 def test_a_lane_that_leaves_its_range_or_ends_does_not_disturb_the_others() -> None:
-    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(6, 100), Fraction(1, 50))
+    system, scenario = load_drive(
+        "ev_driveline_ideal", "tip_out", Fraction(6, 100), Fraction(1, 50)
+    )
     start = np.array([310.0, 2500.0, 311.0, 312.0, 2395.0])
     batch = batch_of(system, scenario, initial={"plant.w_em": start})
-    mine = planned_batch(batch, quick, 1)
+    mine = run_compiled_batch(batch, compile_unoptimised, 1)
     assert 1 in mine.faults and not {0, 2, 3} & set(mine.faults)
-    assert_same_batch(mine, run_variants(batch))
+    assert_same_batch(mine, run_interpreted_batch(batch))
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +118,9 @@ def test_effects_on_a_plant_have_the_same_bits(effect: str, project: Path) -> No
     loaded = load("laid", "tip", root=project)
     batch = batch_of(loaded.system, loaded.scenario, "laid")
     assert side_by_side(batch) == LAID[effect]
-    theirs = run_variants(batch)
+    theirs = run_interpreted_batch(batch)
     assert theirs.event_counts.max() > 1
-    assert_same_batch(planned_batch(batch, quick, 1), theirs)
+    assert_same_batch(run_compiled_batch(batch, compile_unoptimised, 1), theirs)
 
 
 @pytest.mark.parametrize(
@@ -124,10 +128,12 @@ def test_effects_on_a_plant_have_the_same_bits(effect: str, project: Path) -> No
     [("clutch", "launch"), ("three_inertias", "tip_out_in"), ("two_gaps", "tip_out_in")],
 )
 def test_other_drivelines_have_the_same_bits(name: str, scenario: str) -> None:
-    system, short = drive(name, scenario, Fraction(1, 5), root=DRIVELINES)
+    system, short = load_drive(name, scenario, Fraction(1, 5), root=DRIVELINES)
     (plant,) = system.instances
     batch = batch_of(system, short, plant)
-    assert_same_batch(planned_batch(batch, quick, 1), run_variants(batch))
+    assert_same_batch(
+        run_compiled_batch(batch, compile_unoptimised, 1), run_interpreted_batch(batch)
+    )
 
 
 def test_what_is_sampled_or_waits_goes_alone() -> None:

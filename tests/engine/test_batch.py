@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.adjustment import adjusted
-from engine.batch import Batch, BatchResult, InputTable, Measure
+from engine.adjustment import bind_parameters
+from engine.batch import Batch, BatchResult, InputTable, SignalStatistic
 from engine.simulate import simulate
-from engine.variants import run_variants
+from engine.variants import run_interpreted_batch
 from language.experiment import Scenario
-from language.signal import Piece
+from language.signal import StimulusPiece
 from modewright.api import load
 
 RULES = Path(__file__).parent.parent / "rules"
 HORIZON = Fraction(3, 20)
 EARLY = Fraction(1, 20)
 MEASURES = tuple(
-    Measure(kind, "plant.T_hs", kind)
+    SignalStatistic(kind, "plant.T_hs", kind)
     for kind in ("first", "final", "max", "min", "peak", "mean", "rms")
 )
 
@@ -34,7 +34,7 @@ def drive(values: dict[str, str] | None = None) -> mw.api.Loaded:
 
 
 def with_step(scenario: Scenario, first: int, second: int) -> Scenario:
-    pieces = (Piece(Fraction(0), Fraction(first)), Piece(EARLY, Fraction(second)))
+    pieces = (StimulusPiece(Fraction(0), Fraction(first)), StimulusPiece(EARLY, Fraction(second)))
     stimulus = dataclasses.replace(scenario.inputs["T_req"], pieces=pieces)
     return dataclasses.replace(scenario, inputs={"T_req": stimulus})
 
@@ -43,7 +43,7 @@ def batch_of(count: int, **changes: object) -> Batch:
     base = drive()
     scenario = with_step(base.scenario, 30, -20)
     return dataclasses.replace(
-        Batch(base.system, scenario, count, measures=MEASURES, most_events=40),
+        Batch(base.system, scenario, count, statistics=MEASURES, max_events=40),
         **changes,  # type: ignore[arg-type]
     )
 
@@ -60,7 +60,7 @@ def same(result: BatchResult, variant: int, run: mw.Trajectory) -> None:
         "mean": np.cumsum(torque)[-1] / len(torque),
         "rms": np.sqrt(np.cumsum(torque * torque)[-1] / len(torque)),
     }
-    assert {name: values[variant] for name, values in result.measures.items()} == expected
+    assert {name: values[variant] for name, values in result.statistics.items()} == expected
     count = result.event_counts[variant]
     assert count == len(run.events) > 0
     assert list(result.event_times[variant, :count]) == [event.time for event in run.events]
@@ -80,7 +80,7 @@ def test_variants_are_runs_with_their_parameters_initial_values_and_inputs() -> 
         initial={"plant.theta_d": np.array([0.0740754719736, 0.06])},
         inputs={"T_req": InputTable((Fraction(0), EARLY), np.array([[30, -20], [40, -10.0]]))},
     )
-    result = run_variants(batch)
+    result = run_interpreted_batch(batch)
     for variant, (k_hs, m, theta_d, first, second) in enumerate(
         [(4800, 1250, "0.0740754719736", 30, -20), (6000, 1500, "0.06", 40, -10)]
     ):
@@ -96,8 +96,8 @@ def test_what_solved_numbers_and_waits_follow_from_needs_a_program_per_value() -
     values = np.array([4800.0, 6000.0])
     names = {"plant.k_hs": values, "est.k_hs": values, "est.t_wait": np.array([7e-4, 2e-3])}
     batch = batch_of(2, parameters=names)
-    assert set(adjusted(batch).rebuilt) == {"est.k_hs", "est.t_wait"}
-    result = run_variants(batch)
+    assert set(bind_parameters(batch).rebuild_reasons) == {"est.k_hs", "est.t_wait"}
+    result = run_interpreted_batch(batch)
     stiff = drive({"k_hs": "6000 N*m/rad", "est.t_wait": "2 ms"})
     same(result, 1, simulate(stiff.system, with_step(stiff.scenario, 30, -20)))
 
@@ -107,9 +107,9 @@ def test_a_tunable_wait_is_swept_by_whole_ticks(waits: list[float]) -> None:
     """Also where it has one value only: the page holds ticks, no seconds."""
     loaded = load("rig", "run", root=RULES / "a_tunable_wait_is_kept_in_ticks")
     values = {"a.t_on": np.array(waits)}
-    batch = Batch(loaded.system, loaded.scenario, len(waits), parameters=values, most_events=40)
-    assert set(adjusted(batch).rebuilt) == {"a.t_on"}
-    result = run_variants(batch)
+    batch = Batch(loaded.system, loaded.scenario, len(waits), parameters=values, max_events=40)
+    assert set(bind_parameters(batch).rebuild_reasons) == {"a.t_on"}
+    result = run_interpreted_batch(batch)
     for variant, wait in enumerate(waits):
         again = load(
             "rig",
@@ -124,13 +124,13 @@ def test_a_tunable_wait_is_swept_by_whole_ticks(waits: list[float]) -> None:
 
 
 def test_a_measure_takes_the_rows_of_its_span() -> None:
-    late = Measure("late", "plant.T_hs", "max", Fraction(1, 10), Fraction(105, 1000))
-    never = Measure("never", "plant.T_hs", "max", Fraction(3), Fraction(4))
-    result = run_variants(batch_of(1, measures=(late, never), outputs=("plant.T_hs",)))
+    late = SignalStatistic("late", "plant.T_hs", "max", Fraction(1, 10), Fraction(105, 1000))
+    never = SignalStatistic("never", "plant.T_hs", "max", Fraction(3), Fraction(4))
+    result = run_interpreted_batch(batch_of(1, measures=(late, never), outputs=("plant.T_hs",)))
     inside = (result.times >= 0.1) & (result.times <= 0.105)
     assert inside.sum() == 11
-    assert result.measures["late"][0] == result.outputs["plant.T_hs"][0, inside].max()
-    assert np.isnan(result.measures["never"][0])
+    assert result.statistics["late"][0] == result.outputs["plant.T_hs"][0, inside].max()
+    assert np.isnan(result.statistics["never"][0])
 
 
 @pytest.mark.parametrize(
@@ -145,4 +145,4 @@ def test_a_measure_takes_the_rows_of_its_span() -> None:
 )
 def test_a_name_that_is_not_there_is_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        adjusted(batch_of(1, **changes))
+        bind_parameters(batch_of(1, **changes))

@@ -8,22 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen.build import optimised
-from codegen.library import library_of
-from codegen.predictor import Predictor, built, columns_of
+from codegen.build import flags_at_level
+from codegen.library import load_library
+from codegen.predictor import Predictor, build_predictor, columns_of
 from codegen.stepper import CompiledStepper
-from engine.batch import Batch, Measure
+from engine.batch import Batch, SignalStatistic
 from engine.interpreter import Interpreter
-from engine.planned import PlannedRun
-from engine.planned_batch import planned_batch
+from engine.planned import CompiledRun
+from engine.planned_batch import run_compiled_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.trajectory import Trajectory
-from engine.variants import run_variants
+from engine.variants import run_interpreted_batch
 from modewright.api import Loaded, load
 from tests.language.making import project_of
 
-QUICK = optimised("O0")
+QUICK = flags_at_level("O0")
 TUNED = """language: 1
 automaton: {name}
 {time}
@@ -96,7 +96,7 @@ def test_a_run_and_each_block_of_it_read_the_page_of_the_spec(tmp_path: Path) ->
         assert theirs.signals[f"{name}.y_rest"][-1] == pytest.approx(4.4)
         assert theirs.signals[f"{name}.mode"][-1] == 1
     programs = programs_of(system, scenario)
-    whole = PlannedRun(system, scenario, programs, partial(library_of, flags=QUICK)).trajectory()
+    whole = CompiledRun(system, scenario, programs, partial(load_library, flags=QUICK)).trajectory()
     assert whole is not None
     assert bits(whole) == bits(theirs)
     blocks = simulate(system, scenario, partial(CompiledStepper, flags=QUICK))
@@ -112,21 +112,24 @@ def test_a_batch_reads_the_page_beside_what_it_varies(tmp_path: Path) -> None:
         loaded.scenario,
         2,
         parameters={f"{name}.gain": np.array([0.7, 1.3]) for name in KINDS},
-        measures=tuple(Measure(signal, signal, "final") for signal in signals),
+        statistics=tuple(SignalStatistic(signal, signal, "final") for signal in signals),
     )
-    mine, theirs = planned_batch(batch, partial(library_of, flags=QUICK)), run_variants(batch)
+    mine, theirs = (
+        run_compiled_batch(batch, partial(load_library, flags=QUICK)),
+        run_interpreted_batch(batch),
+    )
     assert mine.note == "compiled"
-    for name, values in theirs.measures.items():
-        assert mine.measures[name].tobytes() == values.tobytes(), name
-    assert len(set(theirs.measures["flowing_float32.x"])) == 2
-    assert theirs.measures["ticking_float64.y_line"].tolist() == [pytest.approx(15.72)] * 2
+    for name, values in theirs.statistics.items():
+        assert mine.statistics[name].tobytes() == values.tobytes(), name
+    assert len(set(theirs.statistics["flowing_float32.x"])) == 2
+    assert theirs.statistics["ticking_float64.y_line"].tolist() == [pytest.approx(15.72)] * 2
 
 
 def test_a_batch_does_not_vary_a_table(tmp_path: Path) -> None:
     loaded = four(tmp_path)
     values = {"ticking_float64.line": np.array([1.0])}
     with pytest.raises(ValueError, match="line` is a table"):
-        run_variants(Batch(loaded.system, loaded.scenario, 1, parameters=values))
+        run_interpreted_batch(Batch(loaded.system, loaded.scenario, 1, parameters=values))
 
 
 @pytest.mark.parametrize("name", ["flowing_float32", "flowing_float64"])
@@ -137,10 +140,10 @@ def test_a_predictor_reads_the_tables_that_its_page_does_not_hold(
     program = programs_of(loaded.system, loaded.scenario)[name]
     columns = columns_of(program, ("x",))
     inputs, no_gain = np.tile([0.4, 0.7], (5, 1)), np.zeros((1, 1, 1))
-    with built(program, columns) as library:
+    with build_predictor(program, columns) as library:
         page = np.array(list(columns.page.values()))
         run = Predictor(columns, library).predict(
-            page, inputs, np.zeros((5, 1)), no_gain[:0], no_gain, 1, linear=False
+            page, inputs, np.zeros((5, 1)), no_gain[:0], no_gain, 1, is_first_order_hold=False
         )
     theirs, found = Interpreter(program), []
     for row in inputs:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.continuous import Begun, ContinuousRun
+from engine.continuous import ContinuousRun, PartialStep
 from engine.trajectory import Trajectory
 
 PLANT = """
@@ -51,7 +51,7 @@ def test_it_changes_no_bit_and_no_event(
     taken: list[int] = []
     cruise_to = ContinuousRun._cruise_to
 
-    def counted(flow: ContinuousRun, horizon: Fraction) -> Begun | None:
+    def counted(flow: ContinuousRun, horizon: Fraction) -> PartialStep | None:
         before = flow.time
         found = cruise_to(flow, horizon)
         taken.append(int((flow.time - before) / flow.program.major_step))

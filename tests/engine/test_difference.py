@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.difference import run_difference
-from engine.difference_picture import difference_picture
+from engine.difference import compare_runs
+from engine.difference_picture import draw_difference
 from engine.trajectory import Event, Trajectory
 
 
@@ -29,13 +29,13 @@ def run(values: list[float], modes: list[int] | None = None, step: float = 1.0) 
 
 
 def test_a_run_does_not_differ_from_itself() -> None:
-    found = run_difference(run([1.0, -0.0, math.nan]), run([1.0, -0.0, math.nan]))
+    found = compare_runs(run([1.0, -0.0, math.nan]), run([1.0, -0.0, math.nan]))
     assert found.is_within and found.first is None
     assert (found.signals[0].rms, found.signals[0].largest) == (0.0, 0.0)
 
 
 def test_rms_largest_and_first_are_those_of_the_formula() -> None:
-    found = run_difference(run([0.0, 4.0, 0.0, 0.0]), run([0.0, 1.0, -4.0, 0.0]))
+    found = compare_runs(run([0.0, 4.0, 0.0, 0.0]), run([0.0, 1.0, -4.0, 0.0]))
     (signal,) = found.signals
     assert signal.rms == math.sqrt((9 + 16) / 4)
     assert (signal.largest, signal.at, signal.first) == (4.0, 2.0, 1.0)
@@ -45,14 +45,14 @@ def test_rms_largest_and_first_are_those_of_the_formula() -> None:
 
 def test_one_last_bit_is_a_difference_and_a_tolerance_allows_it() -> None:
     a, b = run([1.0, 1.0]), run([1.0, math.nextafter(1.0, 2.0)])
-    assert not run_difference(a, b).is_within
-    assert run_difference(a, b, relative=1e-15).is_within
-    assert run_difference(a, b, tolerances={"*.T": 3e-16}).is_within
-    assert not run_difference(a, b, tolerances={"*.T": 2e-16}).is_within
+    assert not compare_runs(a, b).is_within
+    assert compare_runs(a, b, relative=1e-15).is_within
+    assert compare_runs(a, b, tolerances={"*.T": 3e-16}).is_within
+    assert not compare_runs(a, b, tolerances={"*.T": 2e-16}).is_within
 
 
 def test_a_number_against_none_is_an_infinite_difference() -> None:
-    found = run_difference(run([1.0, 1.0]), run([1.0, math.nan]), relative=10.0)
+    found = compare_runs(run([1.0, 1.0]), run([1.0, math.nan]), relative=10.0)
     assert found.signals[0].largest == math.inf
     assert not found.is_within
 
@@ -60,25 +60,23 @@ def test_a_number_against_none_is_an_infinite_difference() -> None:
 def test_another_time_base_is_read_on_straight_lines_and_modes_are_held() -> None:
     coarse = run([0.0, 2.0, 4.0], [0, 1, 1], step=2.0)
     fine = run([0.0, 1.0, 2.0, 3.0, 4.0], [0, 0, 1, 1, 1])
-    assert run_difference(fine, coarse).is_within
-    assert run_difference(coarse, fine).is_within
+    assert compare_runs(fine, coarse).is_within
+    assert compare_runs(coarse, fine).is_within
 
 
 def test_windows_say_who_was_in_which_mode() -> None:
-    found = run_difference(run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]))
+    found = compare_runs(run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]))
     (window,) = found.windows
     assert (window.start, window.end, window.a, window.b) == (1.0, 3.0, "drive", "gap")
     assert found.sequences[0].parted is None
     assert found.sequences[0].apart == 2.0
     assert not found.is_within
-    late = run_difference(
-        run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]), slack=2.0
-    )
+    late = compare_runs(run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]), slack=2.0)
     assert late.is_within
 
 
 def test_sequences_part_where_a_transition_is_missing() -> None:
-    found = run_difference(run([0.0] * 4, [0, 1, 0, 1]), run([0.0] * 4, [0, 1, 0, 0]))
+    found = compare_runs(run([0.0] * 4, [0, 1, 0, 1]), run([0.0] * 4, [0, 1, 0, 0]))
     (sequence,) = found.sequences
     assert (sequence.count_a, sequence.count_b, sequence.parted) == (3, 2, 2)
 
@@ -87,7 +85,7 @@ def test_regions_beside_each_other_are_sequences_of_their_own() -> None:
     first = Event(1.0, 0, "p", "b", "a", "b", "chart")
     second = Event(1.0, 0, "p", "d", "c", "d", "gap")
     a = replace(run([0.0] * 3), events=(first, second))
-    found = run_difference(a, replace(a, events=(second, first)))
+    found = compare_runs(a, replace(a, events=(second, first)))
     assert [(each.instance, each.parted) for each in found.sequences] == [
         ("p", None),
         ("p.gap", None),
@@ -97,20 +95,20 @@ def test_regions_beside_each_other_are_sequences_of_their_own() -> None:
 def test_samples_alone_are_compared_with_a_run_that_has_events() -> None:
     a = run([0.0] * 4, [0, 1, 0, 1])
     b = Trajectory("b", a.times, a.signals, a.units, {}, ())
-    assert run_difference(a, b).is_within
-    assert run_difference(b, a).is_within
+    assert compare_runs(a, b).is_within
+    assert compare_runs(b, a).is_within
 
 
 def test_a_shorter_run_and_a_missing_signal_are_not_within() -> None:
-    short = run_difference(run([0.0] * 5), run([0.0] * 3))
+    short = compare_runs(run([0.0] * 5), run([0.0] * 3))
     assert (short.uncovered, short.is_within) == (2.0, False)
-    assert run_difference(run([0.0] * 5), run([0.0] * 3), span=(0.0, 2.0)).is_within
+    assert compare_runs(run([0.0] * 5), run([0.0] * 3), span=(0.0, 2.0)).is_within
     a = run([0.0, 0.0])
     b = Trajectory("b", a.times, {"p.T": a.signals["p.T"]}, {"p.T": "N*m"}, {}, ())
-    assert run_difference(a, b).only_a == ("p.mode",)
-    assert run_difference(b, a).only_b == ("p.mode",)
-    assert not run_difference(a, b).is_within
-    assert run_difference(a, b, patterns=["p.T"]).is_within
+    assert compare_runs(a, b).only_a == ("p.mode",)
+    assert compare_runs(b, a).only_b == ("p.mode",)
+    assert not compare_runs(a, b).is_within
+    assert compare_runs(a, b, patterns=["p.T"]).is_within
 
 
 @pytest.mark.parametrize(
@@ -124,17 +122,17 @@ def test_a_shorter_run_and_a_missing_signal_are_not_within() -> None:
 )
 def test_what_cannot_be_compared_is_refused(b: Trajectory, told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        run_difference(run([0.0, 1.0]), b)
+        compare_runs(run([0.0, 1.0]), b)
 
 
 def test_a_tolerance_for_no_signal_is_refused() -> None:
     with pytest.raises(ValueError, match=r"no common signal matches the tolerance of `q"):
-        run_difference(run([0.0]), run([0.0]), tolerances={"q": 1.0})
+        compare_runs(run([0.0]), run([0.0]), tolerances={"q": 1.0})
 
 
 def test_the_picture_shades_where_modes_disagree_and_draws_the_difference() -> None:
     a, b = run([0.0] * 5, [0, 1, 1, 1, 0]), run([1.0] * 5, [0, 0, 0, 1, 0])
-    figure = difference_picture(a, b, run_difference(a, b), ("one", "two")).figure
+    figure = draw_difference(a, b, compare_runs(a, b), ("one", "two")).figure
     assert figure.axes[0].get_title(loc="left") == "A: one; B: two; shaded: modes disagree"
     labels = [text.get_text() for text in figure.axes[-1].get_legend().get_texts()]  # type: ignore[union-attr]
     assert labels[0] == "A - B, RMS 1"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.library_stepper import Method
-from engine.reference import by_method
+from engine.library_stepper import ScipyMethod
+from engine.reference import simulate_with_scipy
 from engine.simulate import simulate
 from language.experiment import Instance, Scenario, System
 from modewright.api import load
@@ -58,9 +58,9 @@ def ours(name: str) -> mw.Trajectory:
     return simulate(*drive(name))
 
 
-def by(name: str, method: Method, horizon: Fraction | None = None) -> mw.Trajectory:
+def by(name: str, method: ScipyMethod, horizon: Fraction | None = None) -> mw.Trajectory:
     system, scenario = drive(name, horizon)
-    return by_method(wide(system), scenario, method)
+    return simulate_with_scipy(wide(system), scenario, method)
 
 
 def assert_same(name: str, theirs: mw.Trajectory) -> None:
@@ -93,7 +93,7 @@ def test_rk4_follows_the_method_of_order_8(name: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("method", ["Radau", "LSODA"])
 @pytest.mark.parametrize("name", ["two_gaps", "clutch"])
-def test_rk4_follows_the_implicit_methods(name: str, method: Method) -> None:
+def test_rk4_follows_the_implicit_methods(name: str, method: ScipyMethod) -> None:
     horizon = {"two_gaps": Fraction(3, 10), "clutch": Fraction(7, 5)}[name]
     theirs = by(name, method, horizon)
     assert theirs.stopped is None and len(theirs.events) >= 2

@@ -19,7 +19,6 @@ from language.operation import (
     Block,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -27,16 +26,17 @@ from language.operation import (
     Item,
     Loop,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     add,
     divide,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.program import Constant, Program, Variable
 
@@ -72,7 +72,7 @@ def interpreter(**blocks: Block) -> Interpreter:
     return Interpreter(
         Program(
             name="trial",
-            number="float64",
+            number_type="float64",
             period=Fraction(1, 100),
             major_step=Fraction(1, 100),
             constants=(
@@ -91,7 +91,7 @@ def interpreter(**blocks: Block) -> Interpreter:
     )
 
 
-def after(block: Block, **inputs: Any) -> Interpreter:
+def run_block(block: Block, **inputs: Any) -> Interpreter:
     """Run a block once and return what is left."""
     stepper = interpreter(go=block)
     for name, value in inputs.items():
@@ -101,7 +101,7 @@ def after(block: Block, **inputs: Any) -> Interpreter:
 
 
 def value_of(expr: Expr, **inputs: Any) -> Any:
-    return after((Assign(RESULT, expr),), **inputs).get(RESULT)
+    return run_block((Assign(RESULT, expr),), **inputs).get(RESULT)
 
 
 def bits(value: float) -> str:
@@ -160,7 +160,7 @@ def test_and_and_or_of_truth_values(p: bool, q: bool) -> None:
 
 
 def test_a_selection_evaluates_the_chosen_side_only() -> None:
-    outside = Item("work.list", whole(99))
+    outside = Item("work.list", integer(99))
     assert value_of(Select(P, A, outside), p=True, a=2.5) == 2.5
     assert value_of(Select(P, outside, A), p=False, a=2.5) == 2.5
     with pytest.raises(IndexError):
@@ -184,9 +184,11 @@ def test_a_clipped_value_lies_within_its_limits(x: float, low: float, high: floa
 
 
 def test_a_whole_number_becomes_real_by_a_call() -> None:
-    block = (Assign("work.i", whole(7)), Assign(RESULT, Call("real", (Ref("work.i"),))))
-    assert isinstance(after(block).get(RESULT), float)
-    assert after((*block, Assign(RESULT, divide(A, Ref(RESULT)))), a=1.0).get(RESULT) == 1.0 / 7.0
+    block = (Assign("work.i", integer(7)), Assign(RESULT, Call("real", (Ref("work.i"),))))
+    assert isinstance(run_block(block).get(RESULT), float)
+    assert (
+        run_block((*block, Assign(RESULT, divide(A, Ref(RESULT)))), a=1.0).get(RESULT) == 1.0 / 7.0
+    )
 
 
 def test_constants_are_read_and_tunables_stay_tunable() -> None:
@@ -198,21 +200,21 @@ def test_constants_are_read_and_tunables_stay_tunable() -> None:
 
 
 def test_assignments_follow_each_other() -> None:
-    left = after((Assign("state.x", A), Assign("state.y", add(Ref("state.x"), A))), a=1.0)
+    left = run_block((Assign("state.x", A), Assign("state.y", add(Ref("state.x"), A))), a=1.0)
     assert (left.get("state.x"), left.get("state.y")) == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(("p", "result"), [(True, 1.0), (False, 2.0)])
 def test_a_branch_runs_one_of_two_blocks(p: bool, result: float) -> None:
     then, other = (Assign(RESULT, real(1.0)),), (Assign(RESULT, real(2.0)),)
-    assert after((Branch(P, then, other),), p=p).get(RESULT) == result
-    assert after((Branch(P, then),), p=p).get(RESULT) == (1.0 if p else 0.0)
+    assert run_block((Branch(P, then, other),), p=p).get(RESULT) == result
+    assert run_block((Branch(P, then),), p=p).get(RESULT) == (1.0 if p else 0.0)
 
 
 @pytest.mark.parametrize(("mode", "result"), [(-1, 10.0), (2, 20.0), (3, 0.0)])
 def test_a_choice_runs_the_case_of_the_number_or_nothing(mode: int, result: float) -> None:
     cases = tuple((number, (Assign(RESULT, real(x)),)) for number, x in ((-1, 10.0), (2, 20.0)))
-    stepper = interpreter(go=(Choose("memory.mode", cases),))
+    stepper = interpreter(go=(Switch("memory.mode", cases),))
     stepper.set("memory.mode", mode)
     stepper.run("go")
     assert stepper.get(RESULT) == result
@@ -220,25 +222,27 @@ def test_a_choice_runs_the_case_of_the_number_or_nothing(mode: int, result: floa
 
 def test_a_choice_reads_its_number_once() -> None:
     """As `switch` does: a case that changes the mode does not run that mode's case too."""
-    first = (Assign("memory.mode", whole(1)), Assign(RESULT, real(1.0)))
+    first = (Assign("memory.mode", integer(1)), Assign(RESULT, real(1.0)))
     second = (Assign(RESULT, real(2.0)),)
-    left = after((Choose("memory.mode", ((0, first), (1, second))),))
+    left = run_block((Switch("memory.mode", ((0, first), (1, second))),))
     assert (left.get("memory.mode"), left.get(RESULT)) == (1, 1.0)
 
 
 def test_a_loop_counts_its_index_from_zero_and_arrays_keep_what_is_stored() -> None:
     i, j = Ref("work.i"), Ref("work.j")
-    fill = Store("work.list", subtract(whole(3), i), multiply(A, Call("real", (i,))))
+    fill = Store("work.list", subtract(integer(3), i), multiply(A, Call("real", (i,))))
     inner = Assign("work.sum", add(Ref("work.sum"), Item("work.list", j)))
-    left = after((Loop(4, i.name, (fill,)), Loop(2, i.name, (Loop(3, j.name, (inner,)),))), a=1.5)
+    left = run_block(
+        (Loop(4, i.name, (fill,)), Loop(2, i.name, (Loop(3, j.name, (inner,)),))), a=1.5
+    )
     assert left.get("work.list") == [4.5, 3.0, 1.5, 0.0]
     assert left.get("work.sum") == 2 * (4.5 + 3.0 + 1.5)
 
 
 def test_arrays_of_two_interpreters_are_not_shared() -> None:
-    block: Block = (Store("work.list", whole(0), A),)
-    assert after(block, a=1.0).get("work.list")[0] == 1.0
-    assert after(block, a=2.0).get("work.list") == [2.0, 0.0, 0.0, 0.0]
+    block: Block = (Store("work.list", integer(0), A),)
+    assert run_block(block, a=1.0).get("work.list")[0] == 1.0
+    assert run_block(block, a=2.0).get("work.list") == [2.0, 0.0, 0.0, 0.0]
 
 
 def test_a_counter_saturates_at_its_limit_and_falls_to_zero_at_once() -> None:
@@ -251,13 +255,15 @@ def test_a_counter_saturates_at_its_limit_and_falls_to_zero_at_once() -> None:
 
 
 def test_fault_bits_are_latched_each_in_its_place() -> None:
-    left = after((FaultBit("third"), FaultBit("first"), FaultBit("third")))
+    left = run_block((FaultBit("third"), FaultBit("first"), FaultBit("third")))
     assert left.get("memory.faults") == 0b101
 
 
 def test_blocks_run_blocks_also_those_that_come_later() -> None:
     more = Assign(RESULT, add(Ref(RESULT), real(1.0)))
-    stepper = interpreter(go=(Run("twice"), more), twice=(Run("once"), Run("once")), once=(more,))
+    stepper = interpreter(
+        go=(RunBlock("twice"), more), twice=(RunBlock("once"), RunBlock("once")), once=(more,)
+    )
     stepper.run("go")
     assert stepper.get(RESULT) == 3.0
 
@@ -270,7 +276,7 @@ def test_init_runs_after_derive_when_it_is_made() -> None:
 
 def test_variables_start_at_zero_or_false_and_are_read_by_name() -> None:
     stepper = interpreter()
-    read = stepper.reader(("state.x", "input.p", "memory.mode", "constant.k"))
+    read = stepper.make_reader(("state.x", "input.p", "memory.mode", "constant.k"))
     assert [repr(value) for value in read()] == ["0.0", "False", "0", "3.0"]
     stepper.set("state.x", 4.0)
     assert read()[0] == 4.0

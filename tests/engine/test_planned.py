@@ -13,29 +13,29 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from codegen.build import optimised
-from codegen.library import Library, library_of
-from engine.batch import Batch, BatchResult, InputTable, Measure
-from engine.plan import why_not_planned
-from engine.planned import PlannedRun
-from engine.planned_batch import Planner, planned_batch
+from codegen.build import flags_at_level
+from codegen.library import SimulatorLibrary, load_library
+from engine.batch import Batch, BatchResult, InputTable, SignalStatistic
+from engine.plan import planning_obstacle
+from engine.planned import CompiledRun
+from engine.planned_batch import CompiledBatchCache, run_compiled_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
-from engine.variants import run_variants
-from language.assembly import Assembly
-from language.experiment import Page, Scenario, System
-from language.signal import Piece
+from engine.variants import run_interpreted_batch
+from language.assembly import SimulationAssembly
+from language.experiment import Scenario, ScheduledCalibration, System
+from language.signal import StimulusPiece
 from modewright.api import load
-from modewright.compiled import run, run_batch
+from modewright.compiled import run_batch, run_simulation
 from tests.language.making import ROOT
 
 DRIVELINES = ROOT / "tests/data/specs/drivelines"
-quick = partial(library_of, flags=optimised("O0"))
+compile_unoptimised = partial(load_library, flags=flags_at_level("O0"))
 """Bits do not depend on the level: a compiler that need not optimise is done sooner."""
 Loaded = tuple[System, Scenario]
 
 
-def drive(
+def load_drive(
     name: str, scenario: str, horizon: Fraction, early: Fraction | None = None, root: Path = ROOT
 ) -> Loaded:
     """Return a system with a short scenario; `early` is when its inputs step."""
@@ -43,15 +43,15 @@ def drive(
     inputs = dict(loaded.scenario.inputs)
     for key, stimulus in inputs.items():
         if early and len(stimulus.pieces) > 1:
-            pieces = (stimulus.pieces[0], Piece(early, stimulus.pieces[1].value))
+            pieces = (stimulus.pieces[0], StimulusPiece(early, stimulus.pieces[1].value))
             inputs[key] = dataclasses.replace(stimulus, pieces=pieces)
     return loaded.system, dataclasses.replace(loaded.scenario, horizon=horizon, inputs=inputs)
 
 
 def compiled(system: System, scenario: Scenario) -> mw.Trajectory:
     programs = programs_of(system, scenario)
-    assert why_not_planned(system, scenario, programs) is None
-    found = PlannedRun(system, scenario, programs, quick).trajectory()
+    assert planning_obstacle(system, scenario, programs) is None
+    found = CompiledRun(system, scenario, programs, compile_unoptimised).trajectory()
     assert found is not None
     return found
 
@@ -71,7 +71,7 @@ def assert_same(mine: mw.Trajectory, theirs: mw.Trajectory) -> None:
     ("name", "scenario"), [("ev_driveline", "tip_out"), ("ev_driveline_sensed", "tip_out_sensed")]
 )
 def test_a_shipped_scenario_has_the_bits_of_the_interpreter(name: str, scenario: str) -> None:
-    system, short = drive(name, scenario, Fraction(15, 100), Fraction(20, 1000))
+    system, short = load_drive(name, scenario, Fraction(15, 100), Fraction(20, 1000))
     theirs = simulate(system, short)
     assert len(theirs.events) >= 4
     assert_same(compiled(system, short), theirs)
@@ -93,21 +93,21 @@ def test_rows_at_and_inside_steps_and_events_are_those_of_the_interpreter(
     name: str, scenario: str, horizon: Fraction
 ) -> None:
     """Of the last two an input changes inside the steps: on lines, and by a formula of time."""
-    loaded = with_rows(drive(name, scenario, horizon, root=DRIVELINES), Fraction(3, 16_000))
+    loaded = with_rows(load_drive(name, scenario, horizon, root=DRIVELINES), Fraction(3, 16_000))
     theirs = simulate(*loaded)
     assert len(theirs.events) >= 1
     assert_same(compiled(*loaded), theirs)
 
 
 def test_a_ramp_that_arrives_late_has_the_bits_of_the_interpreter() -> None:
-    system, scenario = drive("ev_driveline_sensed", "tip_out_sensed", Fraction(15, 100))
+    system, scenario = load_drive("ev_driveline_sensed", "tip_out_sensed", Fraction(15, 100))
     starts = (Fraction(0), Fraction(20, 1000), Fraction(61, 1000))
     ends = (
         (Fraction(30), Fraction(0)),
         (Fraction(30), Fraction(-5000, 3)),
         (Fraction(-20), Fraction(0)),
     )
-    pieces = tuple(Piece(at, *line) for at, line in zip(starts, ends, strict=True))
+    pieces = tuple(StimulusPiece(at, *line) for at, line in zip(starts, ends, strict=True))
     stimulus = dataclasses.replace(scenario.inputs["T_req"], pieces=pieces)
     inputs = {**scenario.inputs, "T_req": stimulus}
     ramped = dataclasses.replace(
@@ -145,12 +145,12 @@ def test_rules_hold_in_c_as_well(rule: str) -> None:
 
 
 def batch_of(count: int, **changes: object) -> Batch:
-    system, scenario = drive(
+    system, scenario = load_drive(
         "ev_driveline_sensed", "tip_out_sensed", Fraction(1, 10), Fraction(20, 1000)
     )
     kinds = ("first", "final", "max", "min", "peak", "mean", "rms")
-    measures = [Measure(kind, "plant.T_hs", kind) for kind in kinds]  # type: ignore[arg-type]
-    late = Measure("late", "est.T_hs", "mean", Fraction(3, 100), Fraction(5, 100))
+    measures = [SignalStatistic(kind, "plant.T_hs", kind) for kind in kinds]  # type: ignore[arg-type]
+    late = SignalStatistic("late", "est.T_hs", "mean", Fraction(3, 100), Fraction(5, 100))
     names = {"measures": (*measures, late), "outputs": ("s_em", "est.mode"), "most_events": 3}
     made = Batch(system, scenario, count, **names)  # type: ignore[arg-type]
     return dataclasses.replace(made, **changes)  # type: ignore[arg-type]
@@ -178,10 +178,10 @@ def test_variants_of_a_batch_have_the_bits_of_the_interpreter_on_any_number_of_t
         inputs={"T_req": InputTable((Fraction(0), Fraction(21, 1000)), table)},
         seeds=np.array([1, 2, 3]),
     )
-    theirs = run_variants(batch)
-    assert theirs.event_counts.max() > batch.most_events
+    theirs = run_interpreted_batch(batch)
+    assert theirs.event_counts.max() > batch.max_events
     for threads in (1, 2):
-        mine = planned_batch(batch, quick, threads)
+        mine = run_compiled_batch(batch, compile_unoptimised, threads)
         assert mine.note == "compiled"
         assert_same_batch(mine, theirs)
 
@@ -190,11 +190,11 @@ def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
     """In other numbers, in how many, and beyond those of the first: up to the declared range."""
     made: list[object] = []
 
-    def build(assembly: Assembly) -> Library:
+    def build(assembly: SimulationAssembly) -> SimulatorLibrary:
         made.append(assembly)
-        return quick(assembly)
+        return compile_unoptimised(assembly)
 
-    planner = Planner(build)
+    planner = CompiledBatchCache(build)
     first = {"plant.k_hs": np.array([4800.0, 5000.0]), "plant.J_em": np.array([0.05, 0.05])}
     others: list[dict[str, Any]] = [
         {"count": 2, "parameters": first},
@@ -204,20 +204,20 @@ def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
     ]
     for changes, plans in zip(others, (1, 1, 2, 3), strict=True):
         batch = batch_of(**changes)
-        assert_same_batch(planner.planned(batch).carry_out(1), run_variants(batch))
+        assert_same_batch(planner.get_or_compile(batch).run(1), run_interpreted_batch(batch))
         assert len(made) == plans
     refused = {name: np.array([np.nan]) for name in first}
     with pytest.raises(ValueError, match="needs 1 finite values"):
-        planner.planned(batch_of(1, parameters=refused))
+        planner.get_or_compile(batch_of(1, parameters=refused))
 
 
 def test_steps_that_the_interpreter_took_count_until_they_are_worth_a_library() -> None:
     """Each block of a study has 500 here: with the third there are 1500."""
-    planner, notes = Planner(quick, least=1500), []
+    planner, notes = CompiledBatchCache(compile_unoptimised, min_steps=1500), []
     for k_hs in (4800.0, 5000.0, 5200.0, 5400.0):
         batch = batch_of(1, parameters={"plant.k_hs": np.array([k_hs])})
-        found = planner.planned(batch).carry_out(1)
-        assert_same_batch(found, run_variants(batch))
+        found = planner.get_or_compile(batch).run(1)
+        assert_same_batch(found, run_interpreted_batch(batch))
         notes.append(found.note.partition(":")[0])
     assert notes == ["interpreter", "interpreter", "compiled", "compiled"]
 
@@ -226,9 +226,9 @@ def test_inputs_that_step_at_times_of_their_own_share_programs_and_library() -> 
     """From batch to batch: each variant has a plan, what is lowered and built is one."""
     made: list[object] = []
 
-    def build(assembly: Assembly) -> Library:
+    def build(assembly: SimulationAssembly) -> SimulatorLibrary:
         made.append(assembly)
-        return quick(assembly)
+        return compile_unoptimised(assembly)
 
     def stepping(batch: Batch, *milliseconds: int) -> Batch:
         step, before = batch.scenario.inputs["T_req"], dict(batch.scenario.inputs)
@@ -239,15 +239,15 @@ def test_inputs_that_step_at_times_of_their_own_share_programs_and_library() -> 
                 {**before, "T_req": dataclasses.replace(step, pieces=(step.pieces[0], piece))}
             )
         scenario = dataclasses.replace(batch.scenario, inputs=courses[0])
-        return dataclasses.replace(batch, scenario=scenario, courses=tuple(courses))
+        return dataclasses.replace(batch, scenario=scenario, variant_inputs=tuple(courses))
 
-    planner, programs = Planner(build), []
+    planner, programs = CompiledBatchCache(build), []
     names = {"parameters": {"plant.k_hs": np.array([4800.0, 7000.0])}, "seeds": np.array([1, 2])}
     for times, builds in (((20, 31), 1), ((45, 12), 2)):
         batch = stepping(batch_of(2, **names), *times)
-        planned = planner.planned(batch)
-        assert_same_batch(planned.carry_out(1), run_variants(batch))
-        programs.append(planned._parts[0].group.adjustment.programs)
+        planned = planner.get_or_compile(batch)
+        assert_same_batch(planned.run(1), run_interpreted_batch(batch))
+        programs.append(planned._parts[0].group.binding.programs)
         assert len(made) == builds
     assert programs[0] is programs[1]
 
@@ -258,20 +258,20 @@ def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> 
         initial={"plant.w_em": np.array([310.0, 2500.0])},
         inputs={"T_req": InputTable((Fraction(0),), np.array([[30.0], [30.0]]))},
     )
-    mine = planned_batch(batch, quick)
+    mine = run_compiled_batch(batch, compile_unoptimised)
     assert list(mine.faults) == [1]
-    assert_same_batch(mine, run_variants(batch))
+    assert_same_batch(mine, run_interpreted_batch(batch))
 
 
 def test_what_cannot_be_planned_is_run_block_by_block_and_says_why() -> None:
-    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
-    page = Page(Fraction(1, 200), {("plant", "J_em"): Fraction(6, 100)})
-    paged = dataclasses.replace(scenario, pages=(page,))
-    trajectory, means = run(system, paged, compiled=True)
+    system, scenario = load_drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    page = ScheduledCalibration(Fraction(1, 200), {("plant", "J_em"): Fraction(6, 100)})
+    paged = dataclasses.replace(scenario, calibrations=(page,))
+    trajectory, means = run_simulation(system, paged, compiled=True)
     why = "a page of the calibration turns during the run"
     assert means == f"compiled, block by block: {why}"
     assert_same(trajectory, simulate(system, paged))
-    batch = Batch(system, paged, 1, measures=(Measure("m", "plant.w_w", "final"),))
+    batch = Batch(system, paged, 1, statistics=(SignalStatistic("m", "plant.w_w", "final"),))
     assert run_batch(batch).note == f"interpreter: {why}"
 
 
@@ -279,8 +279,8 @@ def test_without_a_compiler_the_interpreter_does_the_work_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("CC", "no_such_compiler")
-    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
-    trajectory, means = run(system, scenario, compiled=True)
+    system, scenario = load_drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    trajectory, means = run_simulation(system, scenario, compiled=True)
     assert means == (
         "interpreter: the C compiler `no_such_compiler` is missing: apt-get install gcc libc6-dev"
     )
@@ -288,5 +288,5 @@ def test_without_a_compiler_the_interpreter_does_the_work_and_says_so(
 
 
 def test_a_short_run_is_not_worth_a_compiler() -> None:
-    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
-    assert run(system, scenario)[1] == "interpreter: 50 steps are too few to compile for"
+    system, scenario = load_drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    assert run_simulation(system, scenario)[1] == "interpreter: 50 steps are too few to compile for"

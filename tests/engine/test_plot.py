@@ -11,7 +11,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from engine.band import INACTIVE_COLOUR, PALETTE
-from engine.plot import overview
+from engine.plot import draw_overview
 from engine.trajectory import Event, Trajectory
 
 
@@ -34,7 +34,7 @@ def run(scale: float = 1.0) -> Trajectory:
 
 
 def test_signals_share_an_axis_by_unit_and_size_and_every_axis_says_its_quantity() -> None:
-    axes = overview([run()]).figure.axes
+    axes = draw_overview([run()]).figure.axes
     assert [axis.get_ylabel() for axis in axes[1:]] == [
         "torque [N*m]",
         "torque [N*m]",
@@ -46,7 +46,7 @@ def test_signals_share_an_axis_by_unit_and_size_and_every_axis_says_its_quantity
 
 
 def test_mode_changes_are_marked_in_every_panel_and_named_in_its_legend() -> None:
-    for axis in overview([run()]).figure.axes[1:]:
+    for axis in draw_overview([run()]).figure.axes[1:]:
         legend = axis.get_legend()
         assert legend and "mode changes" in [text.get_text() for text in legend.get_texts()]
         dotted = [line for line in axis.lines if line.get_linestyle() == ":"]
@@ -56,7 +56,7 @@ def test_mode_changes_are_marked_in_every_panel_and_named_in_its_legend() -> Non
 def test_what_fires_and_changes_no_mode_is_not_marked() -> None:
     stays = Event(0.7, 0, "p", "count", "drive", "drive")
     ranged = Event(0.8, 0, "p", "range T", "drive", "drive", kind="range", message="too large")
-    shown = overview([dataclasses.replace(run(), events=(*run().events, stays, ranged))])
+    shown = draw_overview([dataclasses.replace(run(), events=(*run().events, stays, ranged))])
     dotted = [line for line in shown.figure.axes[1].lines if line.get_linestyle() == ":"]
     assert [list(np.ravel(line.get_xdata())) for line in dotted] == [[0.45, 0.45]]
 
@@ -65,13 +65,13 @@ def test_a_region_without_a_mode_has_no_colour_of_a_mode() -> None:
     plain = run()
     rows = {**plain.signals, "p.mode": np.repeat([-1, 0, 1], [4, 3, 4])}
     modes = {"p.mode": {-1: "inactive", 0: "gap", 1: "drive"}}
-    band = overview([dataclasses.replace(plain, signals=rows, modes=modes)]).figure.axes[0]
+    band = draw_overview([dataclasses.replace(plain, signals=rows, modes=modes)]).figure.axes[0]
     colours = [to_hex(patch.get_facecolor()) for patch in band.patches]
     assert colours == [INACTIVE_COLOUR, *PALETTE[:2]]
 
 
 def test_the_second_run_is_dashed_in_the_colours_of_the_first() -> None:
-    axis = overview([run(), run(1.1)], ["p.T"]).figure.axes[-1]
+    axis = draw_overview([run(), run(1.1)], ["p.T"]).figure.axes[-1]
     first, second = axis.lines[:2]
     assert (first.get_linestyle(), second.get_linestyle()) == ("-", "--")
     assert first.get_color() == second.get_color()
@@ -80,18 +80,18 @@ def test_the_second_run_is_dashed_in_the_colours_of_the_first() -> None:
 
 def test_an_unknown_signal_names_the_nearest() -> None:
     with pytest.raises(ValueError, match=r"did you mean `p\.T_big`"):
-        overview([run()], ["p.T_bg"])
+        draw_overview([run()], ["p.T_bg"])
 
 
 def test_the_same_run_gives_the_same_svg_and_it_is_xml() -> None:
-    first, second = overview([run()]).data("svg"), overview([run()]).data("svg")
+    first, second = draw_overview([run()]).data("svg"), draw_overview([run()]).data("svg")
     assert first == second
     assert ElementTree.fromstring(first).tag.endswith("svg")
 
 
 def test_a_run_without_samples_has_a_picture() -> None:
     empty = Trajectory("none", np.zeros(0), {"a": np.zeros(0)}, {"a": "1"}, {}, ())
-    assert overview([empty]).data().startswith(b"\x89PNG")
+    assert draw_overview([empty]).data().startswith(b"\x89PNG")
 
 
 def strip(modes: list[int], names: dict[int, str]) -> Trajectory:
@@ -103,7 +103,7 @@ def test_modes_that_follow_each_other_have_two_colours_and_a_border_however_many
     None
 ):
     names = {number: f"m{number}" for number in range(50)}
-    band = overview([strip([0, 7, 14, 21, 42, 0, 28, 49, 7, 35, 0], names)]).figure.axes[0]
+    band = draw_overview([strip([0, 7, 14, 21, 42, 0, 28, 49, 7, 35, 0], names)]).figure.axes[0]
     colours = [to_hex(patch.get_facecolor()) for patch in band.patches]
     assert all(one != other for one, other in itertools.pairwise(colours))
     assert colours[0] == colours[5] == colours[10]
@@ -114,7 +114,7 @@ def test_modes_that_follow_each_other_have_two_colours_and_a_border_however_many
 def test_a_mode_is_named_where_its_name_fits_whole_else_in_the_legend() -> None:
     names = {0: "idle", 1: "session.charging.derated", 2: "session.charging.done_and_parked"}
     long = strip([0] * 4 + [2] * 1 + [1] * 6, names)
-    picture = overview([long])
+    picture = draw_overview([long])
     picture.data()
     axis = picture.figure.axes[0]
     legend = axis.get_legend()
@@ -126,5 +126,5 @@ def test_a_mode_is_named_where_its_name_fits_whole_else_in_the_legend() -> None:
 
 
 def test_an_automaton_that_has_no_modes_has_no_band() -> None:
-    assert len(overview([strip([0] * 11, {0: "always"})]).figure.axes) == 4
-    assert len(overview([strip([0] * 11, {0: "gap"})]).figure.axes) == 5
+    assert len(draw_overview([strip([0] * 11, {0: "always"})]).figure.axes) == 4
+    assert len(draw_overview([strip([0] * 11, {0: "gap"})]).figure.axes) == 5

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.engine.reading import GOOD, HEAD, Read, Told, only, told_of
+from tests.engine.reading import GOOD, HEAD, Read, RenderProblems, only_channel, problems_of_file
 
 
 class TestAGoodFile:
@@ -29,45 +29,51 @@ class TestAGoodFile:
 
     def test_columns_that_are_not_used_are_not_looked_at(self, read: Read) -> None:
         recording = read("note,t_s,a,note\nx,1,5,\ny,2,6,z\n", "  a: {to: T_em, unit: N*m}\n")
-        assert only(recording).values == (5.0, 6.0)
+        assert only_channel(recording).values == (5.0, 6.0)
 
     def test_rpm_become_rad_per_second(self, read: Read) -> None:
         speed = read(GOOD).channels["speed_rpm"].values
         assert speed == pytest.approx((2639 * math.pi / 30, 2640 * math.pi / 30), rel=1e-15)
 
     def test_km_per_h_become_m_per_second(self, read: Read) -> None:
-        channel = only(read("t_s,v\n1,36\n", "  v: {to: v, unit: km/h}\n"))
+        channel = only_channel(read("t_s,v\n1,36\n", "  v: {to: v, unit: km/h}\n"))
         assert channel.values == pytest.approx((10.0,), rel=1e-15)
 
     def test_degrees_celsius_become_kelvin(self, read: Read) -> None:
-        channel = only(read("t_s,T\n1,-40\n", "  T: {to: T, unit: degC}\n"))
+        channel = only_channel(read("t_s,T\n1,-40\n", "  T: {to: T, unit: degC}\n"))
         assert channel.values == pytest.approx((233.15,), rel=1e-15)
 
     def test_time_stamps_in_ms_become_exact_seconds(self, read: Read) -> None:
         recording = read("t_s,a\n0.1,1\n2.5e1,2\n", "  a: {to: a, unit: A}\n", unit="ms")
-        assert only(recording).times == (Fraction(1, 10_000), Fraction(25, 1000))
+        assert only_channel(recording).times == (Fraction(1, 10_000), Fraction(25, 1000))
         assert recording.end == Fraction(25, 1000)
 
     def test_sign_minus_one_turns_a_value_round(self, read: Read) -> None:
-        assert only(read("t_s,a\n1,5\n", "  a: {to: a, unit: A, sign: -1}\n")).values == (-5.0,)
+        assert only_channel(read("t_s,a\n1,5\n", "  a: {to: a, unit: A, sign: -1}\n")).values == (
+            -5.0,
+        )
 
     def test_scale_is_a_factor_that_may_have_a_unit(self, read: Read) -> None:
         columns = "  v: {to: w, unit: km/h, scale: 1 rad / 0.25 m}\n"
-        assert only(read("t_s,v\n1,36\n", columns)).values == pytest.approx((40.0,), rel=1e-15)
+        assert only_channel(read("t_s,v\n1,36\n", columns)).values == pytest.approx(
+            (40.0,), rel=1e-15
+        )
 
     def test_delay_is_added_to_the_time_stamps_exactly(self, read: Read) -> None:
-        channel = only(read("t_s,a\n0.1,5\n0.2,6\n", "  a: {to: a, unit: A, delay: 7 ms}\n"))
+        channel = only_channel(
+            read("t_s,a\n0.1,5\n0.2,6\n", "  a: {to: a, unit: A, delay: 7 ms}\n")
+        )
         assert channel.times == (Fraction(107, 1000), Fraction(207, 1000))
 
     def test_mean_of_two_columns_has_a_value_where_both_have(self, read: Read) -> None:
         columns = "  w: {mean: [a, b], to: w, unit: rad/s, blank: skip}\n"
-        channel = only(read("t_s,a,b\n1,10,11\n2,,9\n3,8,\n4,7,8\n", columns))
+        channel = only_channel(read("t_s,a,b\n1,10,11\n2,,9\n3,8,\n4,7,8\n", columns))
         assert channel.values == (10.5, 7.5)
         assert channel.times == (Fraction(1), Fraction(4))
 
     def test_a_column_may_have_its_own_time_stamps(self, read: Read) -> None:
         columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"
-        channel = only(read("t_s,w,t_w\n0.1,,\n0.2,5,0.195\n0.3,,\n0.4,6,0.393\n", columns))
+        channel = only_channel(read("t_s,w,t_w\n0.1,,\n0.2,5,0.195\n0.3,,\n0.4,6,0.393\n", columns))
         assert channel.times == (Fraction(195, 1000), Fraction(393, 1000))
         assert channel.values == (5.0, 6.0)
 
@@ -97,46 +103,46 @@ class TestAGoodFile:
 class TestAFileThatCannotBeRead:
     def test_missing(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
-        assert told_of(tmp_path / "drive.csv", tmp_path) == (
+        assert problems_of_file(tmp_path / "drive.csv", tmp_path) == (
             "drive.csv:1:1: error: the recording cannot be read: No such file or directory"
         )
 
     def test_directory(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "drives").mkdir()
-        assert told_of(tmp_path / "drives", tmp_path) == (
+        assert problems_of_file(tmp_path / "drives", tmp_path) == (
             "drives:1:1: error: the recording cannot be read: Is a directory"
         )
 
     @pytest.mark.parametrize("data", [b"", b"\n", b"  \r\n\n", b"\xef\xbb\xbf"])
-    def test_empty(self, told: Told, data: bytes) -> None:
+    def test_empty(self, told: RenderProblems, data: bytes) -> None:
         assert told(data) == "drive.csv:1:1: error: the recording is empty"
 
-    def test_empty_and_packed(self, told: Told) -> None:
+    def test_empty_and_packed(self, told: RenderProblems) -> None:
         text = told(gzip.compress(b"", mtime=0), name="drive.csv.gz")
         assert text == "drive.csv.gz:1:1: error: the recording is empty"
 
     @pytest.mark.parametrize(
         "data", [b"\x89PNG\r\n\x1a\n\0\0", b"t_s,a\n1,\0\n", GOOD.encode("utf-16"), b"\xb0C,1\n"]
     )
-    def test_binary(self, told: Told, data: bytes) -> None:
+    def test_binary(self, told: RenderProblems, data: bytes) -> None:
         assert told(data) == (
             "drive.csv:1:1: error: this is not a text file\nhelp: a recording is CSV, or CSV.gz"
         )
 
-    def test_named_gz_and_not_packed(self, told: Told) -> None:
+    def test_named_gz_and_not_packed(self, told: RenderProblems) -> None:
         assert told(GOOD, name="drive.csv.gz").startswith(
             "drive.csv.gz:1:1: error: the recording cannot be read: Not a gzipped file"
         )
 
-    def test_packed_and_cut_off(self, told: Told) -> None:
+    def test_packed_and_cut_off(self, told: RenderProblems) -> None:
         packed = gzip.compress(GOOD.encode(), mtime=0)
         for length in range(1, len(packed)):
             text = told(packed[:length], name="drive.csv.gz")
             assert text.startswith("drive.csv.gz:1:1: error: the recording cannot be "), length
             assert "\n" not in text
 
-    def test_packed_and_damaged(self, told: Told) -> None:
+    def test_packed_and_damaged(self, told: RenderProblems) -> None:
         packed = bytearray(gzip.compress(GOOD.encode(), mtime=0))
         packed[len(packed) // 2] ^= 0xFF
         text = told(bytes(packed), name="drive.csv.gz")
@@ -144,14 +150,14 @@ class TestAFileThatCannotBeRead:
 
 
 class TestAHeadLine:
-    def test_alone(self, told: Told) -> None:
+    def test_alone(self, told: RenderProblems) -> None:
         assert told(HEAD) == (
             "drive.csv:1:1: error: the recording has a head line and no values\n"
             "  t_s,torque_Nm,speed_rpm\n"
             "  ^^^^^^^^^^^^^^^^^^^^^^^"
         )
 
-    def test_with_a_column_missing_proposes_the_nearest(self, told: Told) -> None:
+    def test_with_a_column_missing_proposes_the_nearest(self, told: RenderProblems) -> None:
         assert told(GOOD.replace("torque_Nm", "torqe_Nm")) == (
             "drive.csv:1:1: error: there is no column `torque_Nm`, which map `bench` reads\n"
             "  t_s,torqe_Nm,speed_rpm\n"
@@ -159,18 +165,18 @@ class TestAHeadLine:
             "help: did you mean `torqe_Nm`?"
         )
 
-    def test_with_several_columns_missing_tells_all_of_them(self, told: Told) -> None:
+    def test_with_several_columns_missing_tells_all_of_them(self, told: RenderProblems) -> None:
         text = told("when,what\n1,2\n")
         for name in ("t_s", "torque_Nm", "speed_rpm"):
             assert f"error: there is no column `{name}`, which map `bench` reads" in text
 
-    def test_with_the_time_column_of_a_channel_missing(self, told: Told) -> None:
+    def test_with_the_time_column_of_a_channel_missing(self, told: RenderProblems) -> None:
         text = told("t_s,w\n1,2\n", "  w: {to: w, unit: rad/s, time: t_w}\n")
         assert text.splitlines()[0] == (
             "drive.csv:1:1: error: there is no column `t_w`, which map `bench` reads"
         )
 
-    def test_with_a_column_twice(self, told: Told) -> None:
+    def test_with_a_column_twice(self, told: RenderProblems) -> None:
         assert told("t_s,torque_Nm,speed_rpm,torque_Nm\n1,2,3,4\n") == (
             "drive.csv:1:1: error: there are two columns `torque_Nm`\n"
             "  t_s,torque_Nm,speed_rpm,torque_Nm\n"

@@ -14,10 +14,10 @@ import pytest
 
 from engine.recording import Recording, read_recording
 from language.map import read_map
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from language.problem import SpecError
 from language.project import Project, read_document
-from tests.engine.reading import rendered
+from tests.engine.reading import render_problems
 
 DBC = """\
 VERSION ""
@@ -52,7 +52,7 @@ def read(path: Path, text: str, *names: str) -> Recording:
 def told(path: Path, text: str, *names: str) -> str:
     with pytest.raises(SpecError) as caught:
         read(path, text, *names)
-    return rendered(caught.value.problems)
+    return render_problems(caught.value.problems)
 
 
 def write_parquet(path: Path, **columns: list[Any]) -> None:
@@ -258,5 +258,5 @@ def test_a_format_whose_package_is_absent_says_how_to_get_it(
         return plain(wanted, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ToolMissing, match=line.replace("[", r"\[")):
+    with pytest.raises(MissingToolError, match=line.replace("[", r"\[")):
         read(tmp_path / name, COLUMNS)

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from engine import starting
-from engine.continuous import Stopped
-from engine.library_stepper import OWN_MOTION, LibraryStepper, without_motion
-from engine.reference import library_numbers, reference, with_library_numbers
+from engine.continuous import SimulationStopped
+from engine.library_stepper import INTEGRATION_BLOCKS, ScipyStepper, without_integration
+from engine.reference import reference_numbers, simulate_reference, with_reference_numbers
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.trajectory import Event, Trajectory
@@ -104,7 +104,7 @@ def ours(tip_out: tuple[System, Scenario]) -> Trajectory:
 
 @pytest.fixture(scope="module")
 def theirs(tip_out: tuple[System, Scenario]) -> Trajectory:
-    return reference(*tip_out)
+    return simulate_reference(*tip_out)
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def blank_motion(automaton: Automaton, varying: Collection[str] = ()) -> Program
     program = program_of(automaton, varying)
     if program.period is not None:
         return program
-    blocks = {n: () if n.startswith(OWN_MOTION) else b for n, b in program.blocks.items()}
+    blocks = {n: () if n.startswith(INTEGRATION_BLOCKS) else b for n, b in program.blocks.items()}
     return dataclasses.replace(program, blocks=blocks)
 
 
@@ -188,7 +188,7 @@ def test_our_engine_comes_nearer_with_the_fourth_power_of_its_step(
 
 
 def test_a_bouncing_ball_bounces_when_the_formula_says(alone: Alone) -> None:
-    run = reference(*alone(BALL, "3 s"))
+    run = simulate_reference(*alone(BALL, "3 s"))
     fall = math.sqrt(2 * 1.3 / 9.81)
     flights = [fall, *(2 * fall * 0.8**k for k in range(1, 8))]
     expected = [time for time in itertools.accumulate(flights) if time <= 3]
@@ -198,7 +198,7 @@ def test_a_bouncing_ball_bounces_when_the_formula_says(alone: Alone) -> None:
 
 
 def test_a_decay_faster_than_its_step_switches_when_the_formula_says(alone: Alone) -> None:
-    run = reference(*alone(DECAY, "20 ms"))
+    run = simulate_reference(*alone(DECAY, "20 ms"))
     expected = 0.37e-3 * math.log(5 / 0.2) + 12.3e-3
     assert [event.time for event in run.events] == pytest.approx([expected], abs=EXACT_TOLERANCE)
     exact = 5 * np.exp(-run.times / 0.37e-3)
@@ -206,25 +206,25 @@ def test_a_decay_faster_than_its_step_switches_when_the_formula_says(alone: Alon
 
 
 def test_a_pulse_inside_a_step_is_seen(alone: Alone) -> None:
-    run = reference(*alone(PULSE, "20 ms"))
+    run = simulate_reference(*alone(PULSE, "20 ms"))
     expected = (0.04 - math.sqrt(0.04**2 - 2 * 16 * 4.9e-5)) / 16
     assert [event.time for event in run.events] == pytest.approx([expected], abs=EXACT_TOLERANCE)
 
 
 def test_a_state_that_grows_without_bound_stops_the_run_with_its_place(alone: Alone) -> None:
-    run = reference(*alone(RUNAWAY, "1 s"))
+    run = simulate_reference(*alone(RUNAWAY, "1 s"))
     assert run.stopped is not None
     assert "`runaway` in mode `only`" in run.stopped
     assert run.times[-1] == pytest.approx(0.1, abs=2e-3)
 
 
 def test_a_start_that_is_not_finite_is_refused_by_name(alone: Alone) -> None:
-    stepper = LibraryStepper(programs_of(*alone(BALL, "1 s"))["one"])
+    stepper = ScipyStepper(programs_of(*alone(BALL, "1 s"))["one"])
     stepper.run("start")
     stepper.set("state.v", math.nan)
     stepper.set("work.h", 1e-3)
     with pytest.raises(
-        Stopped, match=r"t = 0 s, `ball` in mode `flight`: state `z` is 1\.3, its r"
+        SimulationStopped, match=r"t = 0 s, `ball` in mode `flight`: state `z` is 1\.3, its r"
     ):
         stepper.run("flow")
 
@@ -233,7 +233,7 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
     tip_out: tuple[System, Scenario],
 ) -> None:
     program = programs_of(*tip_out)["plant"]
-    kept = without_motion(program).blocks
+    kept = without_integration(program).blocks
     verbs = {name.partition("_")[0] for name in program.blocks if name not in kept}
     assert verbs == {
         "flow",
@@ -256,7 +256,7 @@ def test_the_result_is_the_same_without_our_motion(
     tip_out: tuple[System, Scenario], theirs: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(starting, "program_of", blank_motion)
-    again = reference(*tip_out)
+    again = simulate_reference(*tip_out)
     assert again.events == theirs.events
     assert again.csv() == theirs.csv()
     assert simulate(*tip_out).events != theirs.events
@@ -267,7 +267,7 @@ def test_solved_numbers_agree_with_the_libraries(tip_out: tuple[System, Scenario
     mine = {constant.name: constant.value for constant in program.constants}
     assert [info.mode for info in program.observers] == ["drive", "coast"]
     for info in program.observers:
-        other = library_numbers(info)
+        other = reference_numbers(info)
         for letter in ("Phi", "Gamma", "G", "L"):
             names = [name for name in other if name.startswith(f"solved.{info.mode}_{letter}.")]
             largest = max(abs(other[name]) for name in names)
@@ -282,8 +282,8 @@ def test_solved_numbers_of_ours_are_not_used(tip_out: tuple[System, Scenario]) -
         dataclasses.replace(c, value=math.nan) if c.name in solved else c for c in program.constants
     )
     assert any(c.name in solved for c in program.constants)
-    again = with_library_numbers(dataclasses.replace(program, constants=spoiled))
-    assert again.constants == with_library_numbers(program).constants
+    again = with_reference_numbers(dataclasses.replace(program, constants=spoiled))
+    assert again.constants == with_reference_numbers(program).constants
 
 
 def test_a_number_taken_as_zero_that_is_not_is_refused(tip_out: tuple[System, Scenario]) -> None:
@@ -291,4 +291,4 @@ def test_a_number_taken_as_zero_that_is_not_is_refused(tip_out: tuple[System, Sc
     missing = "solved.drive_L.w_em.y_em"
     solved = {name: value for name, value in info.solved.items() if name != missing}
     with pytest.raises(ValueError, match=f"{missing} is 0 in the Program, 0\\.22"):
-        library_numbers(dataclasses.replace(info, solved=solved))
+        reference_numbers(dataclasses.replace(info, solved=solved))

@@ -10,10 +10,10 @@ import pytest
 
 from language.problem import SpecError
 from language.project import Project
-from tests.engine.reading import rendered
+from tests.engine.reading import render_problems
 from tests.engine.replaying import (
-    Loaded,
-    loaded,
+    LoadedReplay,
+    load_replay,
 )
 
 ECHO = """language: 1
@@ -33,50 +33,56 @@ HEAD = "language: 1\nmap: bench\ntime: {column: t, unit: s}\ncolumns:\n"
 
 class TestAMap:
     @pytest.fixture
-    def echoed(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Loaded]:
+    def echoed(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> Callable[..., LoadedReplay]:
         """Return a function that replays CSV text through `echo` with the columns of a map."""
         monkeypatch.chdir(tmp_path)
         folder = tmp_path / "spec"
         folder.mkdir()
 
-        def loading(columns: str, text: str) -> Loaded:
+        def loading(columns: str, text: str) -> LoadedReplay:
             (folder / "echo.yaml").write_text(ECHO, "utf-8")
             (folder / "bench.yaml").write_text(HEAD + columns, "utf-8")
             path = tmp_path / "x.csv"
             path.write_text(text, "utf-8")
-            return loaded(path, "bench", "echo", project=Project(tmp_path))
+            return load_replay(path, "bench", "echo", project=Project(tmp_path))
 
         return loading
 
-    def test_feeds_the_default_where_no_column_does(self, echoed: Callable[..., Loaded]) -> None:
-        result = echoed("  a: {to: a, unit: A}\n", "t,a\n0,1\n0.01,2\n").replayed()
+    def test_feeds_the_default_where_no_column_does(
+        self, echoed: Callable[..., LoadedReplay]
+    ) -> None:
+        result = echoed("  a: {to: a, unit: A}\n", "t,a\n0,1\n0.01,2\n").replay()
         assert result.trajectory.signals["total"].tolist() == [8.0, 9.0]
 
-    def test_may_feed_a_constant(self, echoed: Callable[..., Loaded]) -> None:
+    def test_may_feed_a_constant(self, echoed: Callable[..., LoadedReplay]) -> None:
         columns = "  a: {to: a, unit: A}\nconstants: {b: 500 mA}\n"
-        result = echoed(columns, "t,a\n0,1\n0.01,2\n").replayed()
+        result = echoed(columns, "t,a\n0,1\n0.01,2\n").replay()
         assert result.trajectory.signals["total"].tolist() == [1.5, 2.5]
 
     def test_takes_the_latest_value_up_to_and_at_the_tick(
-        self, echoed: Callable[..., Loaded]
+        self, echoed: Callable[..., LoadedReplay]
     ) -> None:
         text = "t,a\n0,1\n0.001,2\n0.0099,3\n0.01,4\n0.011,5\n0.035,6\n0.04,7\n"
-        result = echoed("  a: {to: a, unit: A}\n", text).replayed()
+        result = echoed("  a: {to: a, unit: A}\n", text).replay()
         assert result.trajectory.signals["in.a"].tolist() == [1.0, 4.0, 5.0, 5.0, 7.0]
 
-    def test_delays_a_column_by_exactly_its_delay(self, echoed: Callable[..., Loaded]) -> None:
+    def test_delays_a_column_by_exactly_its_delay(
+        self, echoed: Callable[..., LoadedReplay]
+    ) -> None:
         columns = "  a: {to: a, unit: A, delay: 10 ms}\n  b: {to: b, unit: A}\n"
         rows = "".join(f"{tick / 100},{tick},{tick}\n" for tick in range(5))
-        trajectory = echoed(columns, "t,a,b\n" + rows).replayed().trajectory
+        trajectory = echoed(columns, "t,a,b\n" + rows).replay().trajectory
         assert trajectory.times.tolist() == [0.01, 0.02, 0.03, 0.04]
         assert trajectory.signals["in.a"].tolist() == [0.0, 1.0, 2.0, 3.0]
         assert trajectory.signals["in.b"].tolist() == [1.0, 2.0, 3.0, 4.0]
 
     def test_compares_an_output_at_the_ticks_with_a_new_value(
-        self, echoed: Callable[..., Loaded]
+        self, echoed: Callable[..., LoadedReplay]
     ) -> None:
         columns = "  a: {to: a, unit: A}\n  y: {compare: total, unit: A, blank: skip}\n"
-        result = echoed(columns, "t,a,y\n0,1,8\n0.01,2,\n0.02,3,13\n").replayed()
+        result = echoed(columns, "t,a,y\n0,1,8\n0.01,2,\n0.02,3,13\n").replay()
         (comparison,) = result.comparisons
         assert comparison.largest == 3.0
         assert comparison.rms == pytest.approx(3 / np.sqrt(2), rel=1e-15)
@@ -115,22 +121,26 @@ class TestAMap:
         ids=["input without value", "dimension", "fed twice", "unknown output"],
     )
     def test_that_does_not_fit_is_told_with_its_place(
-        self, echoed: Callable[..., Loaded], columns: str, told: str
+        self, echoed: Callable[..., LoadedReplay], columns: str, told: str
     ) -> None:
         with pytest.raises(SpecError) as caught:
             echoed(columns, "t,a,b,c\n0,1,1,1\n")
-        assert rendered(caught.value.problems) == told
+        assert render_problems(caught.value.problems) == told
 
-    def test_that_leaves_no_tick_is_told(self, echoed: Callable[..., Loaded]) -> None:
+    def test_that_leaves_no_tick_is_told(self, echoed: Callable[..., LoadedReplay]) -> None:
         ready = echoed("  a: {to: a, unit: A, delay: 1 s}\n", "t,a\n0,1\n0.5,2\n")
         with pytest.raises(SpecError, match="ticks"):
-            ready.replayed()
+            ready.replay()
 
-    def test_that_compares_another_dimension_is_told(self, echoed: Callable[..., Loaded]) -> None:
+    def test_that_compares_another_dimension_is_told(
+        self, echoed: Callable[..., LoadedReplay]
+    ) -> None:
         columns = "  a: {to: a, unit: A}\n  b: {compare: total, unit: rpm}\n"
         with pytest.raises(SpecError):
             echoed(columns, "t,a,b\n0,1,1\n")
 
-    def test_with_a_constant_that_does_not_fit_is_told(self, echoed: Callable[..., Loaded]) -> None:
+    def test_with_a_constant_that_does_not_fit_is_told(
+        self, echoed: Callable[..., LoadedReplay]
+    ) -> None:
         with pytest.raises(SpecError, match="constant `b` is in"):
             echoed("  a: {to: a, unit: A}\nconstants: {b: 5 V}\n", "t,a\n0,1\n")

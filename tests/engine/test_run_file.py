@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.run_file import read_run, run_files, side_path
+from engine.run_file import encode_run, read_run, side_path
 from engine.trajectory import Event, Trajectory
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from language.problem import SpecError
 
 HARD = [0.1 + 0.2, -0.0, 5e-324, 2.2250738585072014e-308, np.inf, -np.inf, np.nan, 1e300, 1 / 3]
@@ -41,7 +41,7 @@ def run(count: int = len(HARD)) -> Trajectory:
 
 
 def save(trajectory: Trajectory, path: Path) -> Path:
-    for name, data in run_files(trajectory, path).items():
+    for name, data in encode_run(trajectory, path).items():
         name.write_bytes(data)
     return path
 
@@ -125,9 +125,9 @@ def test_without_pyarrow_the_user_is_told_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ToolMissing, match=r"pip install 'modewright\[parquet\]'"):
-        run_files(run(), tmp_path / "run.parquet")
-    assert run_files(run(), tmp_path / "run.csv")
+    with pytest.raises(MissingToolError, match=r"pip install 'modewright\[parquet\]'"):
+        encode_run(run(), tmp_path / "run.parquet")
+    assert encode_run(run(), tmp_path / "run.csv")
 
 
 def test_a_frame_has_time_as_index_and_modes_by_name() -> None:
@@ -139,5 +139,5 @@ def test_a_frame_has_time_as_index_and_modes_by_name() -> None:
 
 def test_a_frame_without_pandas_tells_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ToolMissing, match="pandas"):
+    with pytest.raises(MissingToolError, match="pandas"):
         run().frame()

@@ -23,15 +23,15 @@ from language.operation import (
     Unary,
     Value,
     add,
+    integer,
     multiply,
     real,
-    whole,
 )
-from tests.engine.test_interpreter import RESULT, A, B, C, after, interpreter
+from tests.engine.test_interpreter import RESULT, A, B, C, interpreter, run_block
 
 NUMBERS = {"input.a": 0.1, "input.b": -0.3, "input.c": 7e-17}
 TRUTHS = {"input.p": True, "input.q": False}
-OPERATORS = tuple(shapes.READS)
+OPERATORS = tuple(shapes.EXPRESSION_EXPRESSION)
 
 
 def bits(value: Any) -> bytes:
@@ -42,7 +42,9 @@ def calculated(expr: Expr) -> tuple[bytes, bytes]:
     """Return the bits of the interpreter and of the plain evaluation of a tree."""
     values: dict[str, float | bool] = {**NUMBERS, **TRUTHS}
     short = {name.partition(".")[2]: value for name, value in values.items()}
-    return bits(after((Assign(RESULT, expr),), **short).get(RESULT)), bits(evaluate(expr, values))
+    return bits(run_block((Assign(RESULT, expr),), **short).get(RESULT)), bits(
+        evaluate(expr, values)
+    )
 
 
 def pair(operator: Any, left: Expr, right: Expr) -> Expr:
@@ -67,11 +69,11 @@ def test_a_quotient_by_a_zero_is_no_exception_in_any_shape(zero: float) -> None:
     sides: list[tuple[Expr, Expr]] = [(A, B), (Unary("-", A), Unary("-", B))]
     for (left, _), (_, right) in itertools.product(sides, sides):
         expr = Binary("/", left, right)
-        ours = after((Assign(RESULT, expr),), a=1.0, b=zero).get(RESULT)
+        ours = run_block((Assign(RESULT, expr),), a=1.0, b=zero).get(RESULT)
         assert bits(ours) == bits(evaluate(expr, {"input.a": 1.0, "input.b": zero}))
 
 
-@pytest.mark.parametrize(("outer", "inner"), list(shapes.LEFT))
+@pytest.mark.parametrize(("outer", "inner"), list(shapes.FUSED_LEFT))
 def test_operations_on_three_or_four_places_keep_their_order(outer: Any, inner: Any) -> None:
     for a, b, c in itertools.permutations((A, B, C)):
         left, right = pair(inner, a, b), pair(inner, b, c)
@@ -83,7 +85,7 @@ def test_operations_on_three_or_four_places_keep_their_order(outer: Any, inner: 
 @pytest.mark.parametrize("x", [-1.1, -1.0, 0.5, 1.0, 1.1, math.nan])
 def test_a_range_holds_both_bounds_and_no_nan(x: float) -> None:
     inside = Binary("and", Compare(">=", A, real(-1.0)), Compare("<=", A, real(1.0)))
-    left = after((Assign("equation.truth", inside),), a=x)
+    left = run_block((Assign("equation.truth", inside),), a=x)
     assert left.get("equation.truth") is (abs(x) <= 1.0)
 
 
@@ -91,10 +93,10 @@ def test_literals_of_one_value_and_other_types_or_signs_stay_apart() -> None:
     block = (
         Assign("state.x", real(0.0)),
         Assign("state.y", real(-0.0)),
-        Assign("work.i", whole(0)),
+        Assign("work.i", integer(0)),
         Assign("equation.truth", Value(False)),
     )
-    left = after(block)
+    left = run_block(block)
     found = [left.get(op.target) for op in block]
     assert [repr(value) for value in found] == ["0.0", "-0.0", "0", "False"]
 
@@ -103,22 +105,22 @@ def test_literals_of_one_value_and_other_types_or_signs_stay_apart() -> None:
 def test_assignments_in_a_row_read_what_the_ones_before_them_set(count: int) -> None:
     chain = [Assign("state.x", A), Assign("state.y", Ref("state.x"))]
     chain += [Assign("state.x", add(Ref("state.y"), A)), Assign("state.y", Ref("state.x"))] * count
-    assert after(tuple(chain), a=1.0).get("state.y") == 1.0 + count
+    assert run_block(tuple(chain), a=1.0).get("state.y") == 1.0 + count
 
 
 @pytest.mark.parametrize("turns", [3, 20])
 def test_a_loop_over_elements_leaves_its_index_at_the_last_turn(turns: int) -> None:
     i, total = Ref("work.i"), Ref("work.sum")
-    element = Item("work.list", i if turns == 3 else whole(1))
+    element = Item("work.list", i if turns == 3 else integer(1))
     body = (Assign(total.name, add(total, multiply(element, A))),)
-    fill = tuple(Store("work.list", whole(k), real(10.0**k)) for k in range(3))
-    left = after((*fill, Loop(turns, i.name, body)), a=2.0)
+    fill = tuple(Store("work.list", integer(k), real(10.0**k)) for k in range(3))
+    left = run_block((*fill, Loop(turns, i.name, body)), a=2.0)
     assert left.get("work.i") == turns - 1
     assert left.get("work.sum") == (222.0 if turns == 3 else 400.0)
 
 
 def test_interpreters_of_one_program_have_values_of_their_own() -> None:
-    first = interpreter(go=(Store("work.list", whole(0), A), Assign(RESULT, A)))
+    first = interpreter(go=(Store("work.list", integer(0), A), Assign(RESULT, A)))
     second = type(first)(first.program)
     first.set("input.a", 1.0)
     first.run("go")

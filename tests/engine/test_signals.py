@@ -10,7 +10,7 @@ import pytest
 
 import modewright as mw
 from engine.interpreter import Stepper
-from engine.sensing import Lag, noise_numbers
+from engine.sensing import FirstOrderLag, noise_stream
 from engine.simulate import simulate
 from language.program import Program
 from language.project import Project, read_document
@@ -95,13 +95,13 @@ def test_noise_is_the_same_for_the_same_seed_and_another_for_another(folder: Pat
 
 
 def test_the_noise_of_a_sensor_does_not_depend_on_the_others() -> None:
-    stream, other = noise_numbers(1, "s_em"), noise_numbers(1, "s_w")
+    stream, other = noise_stream(1, "s_em"), noise_stream(1, "s_w")
     numbers = np.array([next(stream) for _ in range(20_000)])
     others = np.array([next(other) for _ in range(20_000)])
     assert abs(numbers.mean()) < 5 / np.sqrt(20_000)
     assert abs(numbers.std() - 1.0) < 5 / np.sqrt(2 * 20_000)
     assert abs(np.mean(numbers * others)) < 5 / np.sqrt(20_000)
-    again = noise_numbers(1, "s_em")
+    again = noise_stream(1, "s_em")
     assert [next(again) for _ in range(5)] == numbers[:5].tolist()
 
 
@@ -115,7 +115,7 @@ def test_a_measured_input_is_new_at_the_ticks_that_a_sample_precedes(folder: Pat
         for name, found in flags.items():
             found.append(stepper.get(f"is_new.{name}"))
 
-    simulate(system, scenario, ticked=ticked)
+    simulate(system, scenario, on_tick=ticked)
     assert all(flags["y_em"])
     assert [k for k, new in enumerate(flags["y_w"][:40]) if new] == [3, 13, 23, 33]
 
@@ -130,11 +130,11 @@ def test_engine_and_c_are_equal_behind_sensors_and_delays(folder: Path) -> None:
 def test_a_lag_is_exact_for_a_ramp_however_it_is_cut() -> None:
     """y = t - L (1 - e^(-t / L)) for the input t, from rest."""
     for cuts in (1, 7, 100):
-        lag = Lag(Fraction(1, 5))
+        lag = FirstOrderLag(Fraction(1, 5))
         for k in range(cuts + 1):
-            lag.move(Fraction(k, cuts), k / cuts)
+            lag.advance(Fraction(k, cuts), k / cuts)
         exact = 1.0 - 0.2 * (1.0 - np.exp(-5.0))
-        assert abs(lag.look(Fraction(1), 1.0) - exact) < 1e-14
+        assert abs(lag.evaluate(Fraction(1), 1.0) - exact) < 1e-14
 
 
 def test_a_scenario_of_an_automaton_needs_no_system(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from tests.language.making import project_of, told
+from tests.language.making import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart
@@ -66,10 +66,10 @@ def test_after_the_end_of_a_recording_its_last_value_is_held(tmp_path: Path) -> 
 
 def test_what_is_wrong_with_a_recording_is_told_with_its_place(tmp_path: Path) -> None:
     broken = DRIVE.replace("10.8,6", "fast,6")
-    (line,) = told(lambda: run(tmp_path, "linear", drive=broken))
+    (line,) = problem_lines(lambda: run(tmp_path, "linear", drive=broken))
     assert line == "3:6 `fast` in column `speed` is not a finite number"
     (tmp_path / "spec" / "drive.csv").unlink()
-    (line,) = told(lambda: mw.simulate("cart", "run", root=tmp_path))
+    (line,) = problem_lines(lambda: mw.simulate("cart", "run", root=tmp_path))
     assert "the recording cannot be read" in line
 
 

@@ -11,7 +11,7 @@ import pytest
 from codegen.exchange.page_text import MAX_BYTES
 from language.problem import SpecError
 from modewright.calibrations import export_calibration, import_calibration
-from tests.exchange.tuned import project, run
+from tests.exchange.tuned import run_command, write_project
 
 DAMAGED = 100
 """Damaged files of each format."""
@@ -131,7 +131,7 @@ CASES: dict[str, tuple[bytes, str]] = {
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return project(tmp_path_factory.mktemp("project"))
+    return write_project(tmp_path_factory.mktemp("project"))
 
 
 @pytest.fixture(autouse=True)
@@ -143,7 +143,7 @@ def refused(name: str, capsys: pytest.CaptureFixture[str]) -> str:
     """Return what is told of a file that is refused at once, with nothing written."""
     before = sorted(Path().rglob("*"))
     start = time.process_time()
-    assert run("import", name, "--of", "kinds_float64", "--out", "taken.yaml") == 1
+    assert run_command("import", name, "--of", "kinds_float64", "--out", "taken.yaml") == 1
     assert time.process_time() - start < SECONDS
     assert sorted(Path().rglob("*")) == before
     return capsys.readouterr().err
@@ -166,7 +166,7 @@ def test_nothing_is_solved_for_a_page_with_mistakes(
 ) -> None:
     data, message = CASES[name]
     Path(name).write_bytes(data)
-    assert run("resolve", "kinds_float64", "--page", name, "--out", "resolved.dcm") == 1
+    assert run_command("resolve", "kinds_float64", "--page", name, "--out", "resolved.dcm") == 1
     assert message in capsys.readouterr().err and not Path("resolved.dcm").exists()
 
 
@@ -190,7 +190,7 @@ def test_what_could_grow_does_not(capsys: pytest.CaptureFixture[str]) -> None:
     Path("grid.csv").write_text("name,value,x,y\n" + rows)
     assert "are no whole table over x and y" in refused("grid.csv", capsys)
     Path("words.dcm").write_bytes(block(*(f"W{k} 1" for k in range(100_000)), "WERT 1"))
-    assert run("import", "words.dcm", "--of", "kinds_float64", "--out", "words.yaml") == 0
+    assert run_command("import", "words.dcm", "--of", "kinds_float64", "--out", "words.yaml") == 0
     assert capsys.readouterr().out.count("is not known in `FESTWERT`") == 12
 
 
@@ -202,11 +202,14 @@ def test_many_names_that_are_not_known_are_told_in_time(capsys: pytest.CaptureFi
 
 
 def test_a_page_with_bom_and_crlf_is_a_page(root: Path) -> None:
-    assert run("export", "kinds_float64", "--out", "page.dcm") == 0
+    assert run_command("export", "kinds_float64", "--out", "page.dcm") == 0
     text = Path("page.dcm").read_text()
     Path("crlf.dcm").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
     for name in ("page", "crlf"):
-        assert run("import", f"{name}.dcm", "--of", "kinds_float64", "--out", f"{name}.yaml") == 0
+        assert (
+            run_command("import", f"{name}.dcm", "--of", "kinds_float64", "--out", f"{name}.yaml")
+            == 0
+        )
     plain, other = (Path(f"{name}.yaml").read_text() for name in ("page", "crlf"))
     assert plain.splitlines()[3:] == other.replace("crlf", "page").splitlines()[3:]
 
@@ -223,14 +226,14 @@ def test_a_calibration_replaces_nothing_else(
     out: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("ok.dcm").write_bytes(block("WERT 1"))
-    assert run("import", "ok.dcm", "--of", "kinds_float64", "--out", out) == 1
+    assert run_command("import", "ok.dcm", "--of", "kinds_float64", "--out", out) == 1
     assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("out", ["page.txt", "spec/kinds_float64.yaml", "spec"])
 def test_a_page_is_written_where_it_can_be(out: str) -> None:
-    assert run("export", "kinds_float64", "--out", out) == 1
-    assert run("export", "kinds_float64", "--out", "page", "--format", "xls") == 2
+    assert run_command("export", "kinds_float64", "--out", out) == 1
+    assert run_command("export", "kinds_float64", "--out", "page", "--format", "xls") == 2
 
 
 @pytest.mark.parametrize("form", ["dcm", "cdfx", "csv"])

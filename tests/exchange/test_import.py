@@ -9,12 +9,12 @@ import pytest
 
 import modewright as mw
 from modewright.calibrations import import_calibration
-from tests.exchange.tuned import project, replaced, run
+from tests.exchange.tuned import replace_line, run_command, write_project
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return project(tmp_path_factory.mktemp("project"))
+    return write_project(tmp_path_factory.mktemp("project"))
 
 
 @pytest.fixture(autouse=True)
@@ -85,7 +85,7 @@ def test_all_mistakes_of_a_page_are_told_at_once_and_nothing_is_written(
     name = "kinds_float64"
     file = page(f"{name}.gian,1,1", f"{name}.gain,10,1", f"{name}.whole,901,1", f"{name}.hot,1,kg")
     words = ("import", file, "--of", name, "--out", "taken.yaml")
-    assert run(*words) == 1
+    assert run_command(*words) == 1
     told = capsys.readouterr().err
     assert [line for line in told.splitlines() if ": error: " in line] == [
         "page.csv:2:1: error: `kinds_float64` has no tunable parameter or solved number "
@@ -97,20 +97,20 @@ def test_all_mistakes_of_a_page_are_told_at_once_and_nothing_is_written(
     ]
     assert "help: did you mean `kinds_float64.gain`?" in told
     assert not Path("taken.yaml").exists()
-    assert run(*words, "--json") == 1
+    assert run_command(*words, "--json") == 1
     problems = json.loads(capsys.readouterr().out)["problems"]
     told_of = [(each["line"], each["code"]) for each in problems]
     assert told_of == [(2, "MW115"), (3, "MW310"), (4, "MW310"), (5, "MW305")]
 
 
 def test_stale_solved_numbers_are_told_and_never_taken(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("export", "estimator_simple", "--out", "old.dcm") == 0
+    assert run_command("export", "estimator_simple", "--out", "old.dcm") == 0
     name = "estimator_simple.J_em"
-    text = replaced(Path("old.dcm").read_text(), name, "WERT 0.05", "WERT 0.06")
+    text = replace_line(Path("old.dcm").read_text(), name, "WERT 0.05", "WERT 0.06")
     Path("old.dcm").write_text(text)
     capsys.readouterr()
     words = ("import", "old.dcm", "--of", "estimator_simple", "--out", "rig_7.yaml")
-    assert run(*words, "--date", "2026-11-21") == 0
+    assert run_command(*words, "--date", "2026-11-21") == 0
     told = capsys.readouterr().out
     assert "J_em = 0.06 kg*m^2" in told and "stale: " in told
     assert "of 57 solved numbers of the file were solved for other values" in told
@@ -118,7 +118,7 @@ def test_stale_solved_numbers_are_told_and_never_taken(capsys: pytest.CaptureFix
         'language: 1\ncalibration: rig_7\nof: estimator_simple\nfrom: "old.dcm"\n'
         "date: 2026-11-21\nparameters:\n  J_em: 0.06 kg*m^2\n"
     )
-    assert run(*words, "--json") == 0
+    assert run_command(*words, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["values"] == {"J_em": "0.06 kg*m^2"} and found["problems"] == []
     stamp = {"name": "estimator_simple.solved.stamp_J_em", "before": 0.05, "after": 0.06}
@@ -248,7 +248,7 @@ def test_unknown_words_of_a_dcm_file_are_warnings(capsys: pytest.CaptureFixture[
     Path("odd.dcm").write_text(
         "KONSERVIERUNG_FORMAT 2.0\nFESTWERT kinds_float64.gain\n  FARBE rot\n  WERT 1\nEND\n"
     )
-    assert run("import", "odd.dcm", "--of", "kinds_float64", "--out", "odd.yaml") == 0
+    assert run_command("import", "odd.dcm", "--of", "kinds_float64", "--out", "odd.yaml") == 0
     told = capsys.readouterr().out
     assert "odd.dcm:3:3: warning: `FARBE` is not known in `FESTWERT`: it is passed over" in told
 
@@ -264,7 +264,7 @@ def test_the_public_api_has_pages() -> None:
 
 
 def test_the_json_of_an_export_has_values_in_si(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("export", "kinds_float64", "--out", "page.cdfx", "--json") == 0
+    assert run_command("export", "kinds_float64", "--out", "page.cdfx", "--json") == 0
     told = json.loads(capsys.readouterr().out)["tunable"]
     assert told["kinds_float64.hot"] == {"value": 363.15, "unit": "K"}
     assert told["kinds_float64.gear"]["value"] == "drive"

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import compile_program, optimised
+from codegen.build import compile_program, flags_at_level
 from codegen.exchange.formats import read_page
-from codegen.expression import literal
-from codegen.source import c_files
-from language.number import rounded
+from codegen.expression import format_literal
+from codegen.source import emit_c_files
+from language.number import round_to_type
 from language.problem import Problems
 from modewright.api import program
 from modewright.calibrations import export_calibration, import_calibration, resolve_calibration
-from tests.exchange.tuned import project, replaced, run
+from tests.exchange.tuned import replace_line, run_command, write_project
 
 MAIN = """#include "{name}.h"
 
@@ -44,21 +44,24 @@ def stores(file: Path) -> str:
     """Return a page as C: every name of the file is a member of the page."""
     found = read_page(file, Problems()).characteristics
     name = found[0].name.text.partition(".")[0]
-    number = program(name).number
+    number = program(name).number_type
     return "\n".join(
         f"    cal{one.name.text.removeprefix(name)} = "
-        f"{literal(rounded(float(cell.text), number), number)};"
+        f"{format_literal(round_to_type(float(cell.text), number), number)};"
         for one in found
         for cell in one.values
     )
 
 
 def ends(folder: Path, name: str, first: str, second: str) -> int:
-    files = {**c_files(program(name)), "main.c": MAIN.format(name=name, first=first, second=second)}
+    files = {
+        **emit_c_files(program(name)),
+        "main.c": MAIN.format(name=name, first=first, second=second),
+    }
     for file, text in files.items():
         (folder / file).write_text(text)
     sources = [folder / file for file in files if file.endswith(".c")]
-    compile_program(sources, folder / "run", optimised("O0"))
+    compile_program(sources, folder / "run", flags_at_level("O0"))
     return subprocess.run([folder / "run"], timeout=60, check=False).returncode
 
 
@@ -67,10 +70,10 @@ def test_a_resolved_page_raises_no_fault_and_a_turned_parameter_alone_does(
     name: str, tmp_path: Path
 ) -> None:
     first, turned, resolved = (tmp_path / f"{each}.dcm" for each in ("first", "turned", "resolved"))
-    assert run("export", name, "--out", first) == 0
-    text = replaced(first.read_text(), f"{name}.J_em", "WERT 0.05", f"WERT {TURNED[name]}")
+    assert run_command("export", name, "--out", first) == 0
+    text = replace_line(first.read_text(), f"{name}.J_em", "WERT 0.05", f"WERT {TURNED[name]}")
     turned.write_text(text)
-    assert run("resolve", name, "--page", turned, "--out", resolved) == 0
+    assert run_command("resolve", name, "--page", turned, "--out", resolved) == 0
     assert ends(tmp_path, name, stores(first), stores(resolved)) == 0
     assert ends(tmp_path, name, stores(first), stores(turned)) == 2
     assert ends(tmp_path, name, "", f"    cal.J_em = {TURNED[name]};") == 2
@@ -83,7 +86,7 @@ def test_the_page_has_the_members_of_the_c_and_no_others(name: str, tmp_path: Pa
     file = tmp_path / "page.csv"
     file.write_text(page.text("csv"))
     found = read_page(file, Problems()).characteristics
-    header = c_files(page.program)[f"{name}.h"]
+    header = emit_c_files(page.program)[f"{name}.h"]
     body = header.partition("The calibration page")[2].partition(f"}} {name}_Cal;")[0]
     inside = re.findall(r"^ {4}\w+ (\w+)[;\[]", body, re.MULTILINE)
     solved = re.findall(r"^ {8}\w+ (\w+);", body, re.MULTILINE)
@@ -96,13 +99,13 @@ def test_what_changed_is_told_with_the_largest_relative(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page, resolved = tmp_path / "page.cdfx", tmp_path / "resolved.csv"
-    assert run("export", "estimator_simple", "--out", page) == 0
+    assert run_command("export", "estimator_simple", "--out", page) == 0
     capsys.readouterr()
     text = page.read_text()
     head, mark, tail = text.partition("estimator_simple.J_em<")
     page.write_text(head + mark + tail.replace("<V>0.05<", "<V>0.1<", 1))
     words = ("resolve", "estimator_simple", "--page", page, "--out", resolved, "--json")
-    assert run(*words) == 0
+    assert run_command(*words) == 0
     told = json.loads(capsys.readouterr().out)
     stamp = {"name": "estimator_simple.solved.stamp_J_em", "before": 0.05, "after": 0.1}
     assert {**stamp, "relative": 0.5} in told["changed"]["numbers"]
@@ -113,7 +116,7 @@ def test_what_changed_is_told_with_the_largest_relative(
 
 
 def test_a_calibration_is_resolved_to_the_page_that_its_import_would_be(tmp_path: Path) -> None:
-    root = project(tmp_path)
+    root = write_project(tmp_path)
     (root / "spec" / "rig.yaml").write_text(
         "language: 1\ncalibration: rig\nof: solved_float32\n"
         "parameters: {J_em: 0.07 kg*m^2, sd_em: 5 rpm}\n"
@@ -139,4 +142,4 @@ def test_solved_numbers_that_a_page_lacks_are_added(tmp_path: Path) -> None:
 
 
 def test_resolve_asks_for_what(tmp_path: Path) -> None:
-    assert run("resolve", "estimator_simple", "--out", tmp_path / "page.dcm") == 2
+    assert run_command("resolve", "estimator_simple", "--out", tmp_path / "page.dcm") == 2

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from codegen.exchange.formats import FORMATS
-from language.number import NumberType, decimal, rounded
-from language.program import short
+from language.number import NumberType, round_to_type, shortest_decimal
+from language.program import unqualified_name
 from modewright.calibrations import CalibrationPage, export_calibration, import_calibration
-from tests.exchange.tuned import NUMBERS, bits, project
+from tests.exchange.tuned import NUMBERS, constant_bits, write_project
 
 FORMS = st.sampled_from(sorted(FORMATS))
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return project(tmp_path_factory.mktemp("project"))
+    return write_project(tmp_path_factory.mktemp("project"))
 
 
 def goes_round(root: Path, name: str, values: dict[str, str], form: str) -> None:
@@ -37,7 +37,7 @@ def comes_back(root: Path, page: CalibrationPage, name: str, form: str) -> None:
     calibration.write_text(found.calibration("taken"), "utf-8")
     again = export_calibration(name, root=root, calibrations=["taken"])
     assert again.text(form) == first
-    assert bits(again) == bits(page)
+    assert constant_bits(again) == constant_bits(page)
 
 
 def reals(low: float, high: float) -> st.SearchStrategy[float]:
@@ -124,9 +124,9 @@ def test_the_values_of_tables_go_round(
     text += f"  area: {json.dumps({'points': points})}\n".replace('"', "")
     (root / "spec" / "given.yaml").write_text(text, "utf-8")
     page = export_calibration(f"kinds_{number}", root=root, calibrations=["given"])
-    tables = {short(c.name): c.items for c in page.tunable if c.items}
-    assert tables["line"] == tuple(rounded(Fraction(value), number) for value in line)
-    assert tables["area"] == tuple(rounded(Fraction(value), number) for value in area)
+    tables = {unqualified_name(c.name): c.items for c in page.tunable if c.items}
+    assert tables["line"] == tuple(round_to_type(Fraction(value), number) for value in line)
+    assert tables["area"] == tuple(round_to_type(Fraction(value), number) for value in area)
     comes_back(root, page, f"kinds_{number}", form)
 
 
@@ -138,6 +138,6 @@ def test_a_value_finer_than_its_type_is_solved_for_as_the_page_holds_it(root: Pa
 
 def literal(value: float, number: NumberType) -> str:
     """Return a value of a type as the language writes it."""
-    text = decimal(rounded(value, number), number)
+    text = shortest_decimal(round_to_type(value, number), number)
     mantissa, exponent, power = text.partition("e")
     return f"{mantissa}.0{exponent}{power}" if exponent and "." not in mantissa else text

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from modewright.calibrations import ImportedPage, import_calibration
-from tests.exchange.tuned import project
+from tests.exchange.tuned import write_project
 
 TOOLS = Path(__file__).parent / "tools"
 TABLES = {
@@ -19,7 +19,7 @@ TABLES = {
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return project(tmp_path_factory.mktemp("project"))
+    return write_project(tmp_path_factory.mktemp("project"))
 
 
 def told(found: ImportedPage, kind: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ from language.number import NumberType
 from language.program import Constant
 from modewright.calibrations import CalibrationPage
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 KINDS = """language: 1
 automaton: kinds_{number}
@@ -60,7 +60,7 @@ parameters:
 """
 
 
-def project(folder: Path) -> Path:
+def write_project(folder: Path) -> Path:
     """Write the specs of a project into a folder and return it."""
     spec = folder / "spec"
     spec.mkdir(exist_ok=True)
@@ -70,7 +70,7 @@ def project(folder: Path) -> Path:
     return folder
 
 
-def bits(page: CalibrationPage) -> dict[str, bytes]:
+def constant_bits(page: CalibrationPage) -> dict[str, bytes]:
     """Return all constants of a page's Program with the bits of their values."""
     return {constant.name: _bits(constant) for constant in page.program.constants}
 
@@ -79,13 +79,13 @@ def _bits(constant: Constant) -> bytes:
     return struct.pack(f"<{1 + len(constant.items)}d", constant.value, *constant.items)
 
 
-def run(*words: object) -> int:
+def run_command(*words: object) -> int:
     """Run a command of the command line and return its exit code."""
     command = ["calibration", *map(str, words)]
-    return exit_code(partial(app, command, standalone_mode=False))
+    return run_with_exit_code(partial(app, command, standalone_mode=False))
 
 
-def replaced(text: str, name: str, old: str, new: str) -> str:
+def replace_line(text: str, name: str, old: str, new: str) -> str:
     """Return a DCM file with a line of one characteristic replaced."""
     head, mark, tail = text.partition(f" {name}\n")
     assert mark and old in tail.partition("END")[0]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from engine.simulate import simulate
 from expectation.expected import Test
-from expectation.judging import Outcome, judged
+from expectation.judging import Outcome, evaluate_test
 from modewright.tests import load_test
 
 AUTOMATON = """\
@@ -38,7 +38,7 @@ expect:
 """
 
 
-def project(folder: Path, *lines: str, head: str = HEAD) -> Path:
+def write_project(folder: Path, *lines: str, head: str = HEAD) -> Path:
     """Write the automaton and a test with these expectations; return the file of the test."""
     (folder / "spec").mkdir(exist_ok=True)
     (folder / "spec" / "latch.yaml").write_text(AUTOMATON)
@@ -50,9 +50,9 @@ def project(folder: Path, *lines: str, head: str = HEAD) -> Path:
 def outcomes(folder: Path, *lines: str) -> list[Outcome]:
     """Return what becomes of expectations on the engine."""
     test = loaded(folder, *lines)
-    return list(judged(test, simulate(test.system, test.scenario)))
+    return list(evaluate_test(test, simulate(test.system, test.scenario)))
 
 
 def loaded(folder: Path, *lines: str) -> Test:
     """Return a test with these expectations."""
-    return load_test(str(project(folder, *lines)), folder)
+    return load_test(str(write_project(folder, *lines)), folder)

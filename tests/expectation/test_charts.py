@@ -10,13 +10,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from engine.simulate import simulate
-from expectation.coverage import coverage, probed_programs
+from expectation.coverage import instrument_programs, measure_coverage
 from expectation.expected import Test
-from expectation.judging import judged
+from expectation.judging import evaluate_test
 from language.operation import Store
-from language.traversal import walk
+from language.traversal import walk_ops
 from modewright import tests
-from modewright.covered import covered_graph
+from modewright.covered import coverage_diagram
 from modewright.diagram import ModeBox
 
 CHART = """\
@@ -117,15 +117,15 @@ def test_what_is_wrong_is_told(tmp_path: Path) -> None:
 
 def test_coverage_knows_superstates_events_and_completion(tmp_path: Path) -> None:
     test = tests.load_test(written(tmp_path), tmp_path)
-    (found,) = coverage(test)
+    (found,) = measure_coverage(test)
     assert found.count()["modes"] == (11, 11)  # some are left in the tick of their entry
     assert found.count()["transitions"] == (9, 10)
     tripped = next(d for d in found.decisions if d.key.endswith("tripped"))
     assert tripped.conditions == ("event trip", "event warn", "go")
-    assert found.shown(tripped) == ("unique cause", "always false", "not shown")
+    assert found.condition_coverage(tripped) == ("unique cause", "always false", "not shown")
     over = next(d for d in found.decisions if d.key.endswith("over"))
-    assert (over.conditions, found.shown(over)) == (("completion",), ("unique cause",))
-    (chart,) = covered_graph(found, tmp_path).regions
+    assert (over.conditions, found.condition_coverage(over)) == (("completion",), ("unique cause",))
+    (chart,) = coverage_diagram(found, tmp_path).regions
     boxes = {box.name: box for box in chart.modes}
     assert boxes["operation"].shade == "covered" and isinstance(boxes["ended"], ModeBox)
 
@@ -134,8 +134,8 @@ def test_each_guard_of_a_chart_has_a_probe(tmp_path: Path) -> None:
     automaton = (
         tests.load_test(written(tmp_path), tmp_path).system.instances["supervisor"].automaton
     )
-    decisions, programs, arrays = probed_programs({"one": (automaton, [])})
-    ops = [op for block in programs["one"].blocks.values() for op in walk(block)]
+    decisions, programs, arrays = instrument_programs({"one": (automaton, [])})
+    ops = [op for block in programs["one"].blocks.values() for op in walk_ops(block)]
     stored = {op.array for op in ops if isinstance(op, Store) and op.array.startswith("probe.")}
     assert stored == set(arrays["one"].values()) and len(stored) == len(decisions["one"]) == 10
 
@@ -186,8 +186,8 @@ def briefly(folder: Path, more: str = "", spec: str = BRIEF) -> Test:
 
 def test_a_mode_left_in_the_tick_of_its_entry_was_entered(tmp_path: Path) -> None:
     """`waits` is the default of a neighbouring region; `idle` is left at tick 0."""
-    (found,) = coverage(briefly(tmp_path))
-    assert found.missed() == ["mode `op.left.none` was not entered"]
+    (found,) = measure_coverage(briefly(tmp_path))
+    assert found.list_missed() == ["mode `op.left.none` was not entered"]
 
 
 def test_a_transition_to_nothing_enters_nothing(tmp_path: Path) -> None:
@@ -212,4 +212,6 @@ def test_a_transition_with_several_targets_enters_each_of_them(tmp_path: Path) -
     test = briefly(
         tmp_path, more, BRIEF.replace("op.left.first,", "[op.left.first, op.right.waits],")
     )
-    assert [each.message for each in judged(test, simulate(test.system, test.scenario))] == [""] * 3
+    assert [each.message for each in evaluate_test(test, simulate(test.system, test.scenario))] == [
+        ""
+    ] * 3

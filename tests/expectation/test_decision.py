@@ -46,7 +46,7 @@ def decision(tmp_path: Path, guard: str) -> Decision:
 def test_a_condition_counts_if_a_pair_shows_it(
     tmp_path: Path, guard: str, seen: list[int], shown: list[str]
 ) -> None:
-    assert list(decision(tmp_path, guard).shown(seen)) == shown
+    assert list(decision(tmp_path, guard).condition_coverage(seen)) == shown
 
 
 def test_conditions_are_told_as_they_are_written(tmp_path: Path) -> None:
@@ -63,6 +63,6 @@ def test_unique_cause_is_what_a_search_over_all_pairs_finds(tmp_path: Path) -> N
     for _ in range(200):
         seen = chance.sample(range(16), chance.randint(0, 8))
         pairs = list(itertools.combinations(seen, 2))
-        for k, shown in enumerate(found.shown(seen)):
+        for k, shown in enumerate(found.condition_coverage(seen)):
             alone = any(v ^ w == 1 << k and found.outcome(v) != found.outcome(w) for v, w in pairs)
             assert (shown == "unique cause") == alone

@@ -9,39 +9,39 @@ from pathlib import Path
 import pytest
 
 from modewright.cli import app
-from modewright.exits import exit_code
-from modewright.traces import TracedKeys, trace_keys
+from modewright.exits import run_with_exit_code
+from modewright.traces import KeyTraceReport, trace_keys
 from tests.language.making import ROOT
 
 
 @pytest.fixture(scope="module")
-def estimator() -> TracedKeys:
+def estimator() -> KeyTraceReport:
     return trace_keys(["estimator"], ROOT)
 
 
 @pytest.mark.parametrize("name", ["supervisor", "contactor", "driveline", "ev_driveline"])
 def test_c_cites_nothing_that_no_spec_has(name: str) -> None:
     traced = trace_keys([name], ROOT)
-    assert traced.found.strays == ()
-    assert len(traced.found.keys) > len(traced.found.silent) > 0
+    assert traced.traces.unmatched_citations == ()
+    assert len(traced.traces.keys) > len(traced.traces.uncited) > 0
 
 
-def test_every_line_of_a_key_says_so(estimator: TracedKeys) -> None:
-    for key in estimator.found.keys:
+def test_every_line_of_a_key_says_so(estimator: KeyTraceReport) -> None:
+    for key in estimator.traces.keys:
         for file, number in key.code:
             line = estimator.code[file].splitlines()[number - 1]
             inner = key.path.split(".", 2)[-1] if key.path.startswith("templates.") else key.path
             assert re.search(rf"\b{re.escape(inner)}\b", line), (key.path, line)
 
 
-def test_a_key_stands_where_it_is_said_to(estimator: TracedKeys) -> None:
-    for key in estimator.found.keys:
+def test_a_key_stands_where_it_is_said_to(estimator: KeyTraceReport) -> None:
+    for key in estimator.traces.keys:
         line = estimator.specs[key.place.source.name].splitlines()[key.place.line - 1]
         assert key.path.rpartition(".")[2] in line
 
 
-def test_a_mode_that_is_like_a_template_leads_to_the_template(estimator: TracedKeys) -> None:
-    found = {f"{key.spec} {key.path}": key for key in estimator.found.keys}
+def test_a_mode_that_is_like_a_template_leads_to_the_template(estimator: KeyTraceReport) -> None:
+    found = {f"{key.spec} {key.path}": key for key in estimator.traces.keys}
     shared = found["estimator templates.contact.equations.w_b"]
     assert len(shared.code) >= 2, "drive and coast"
     assert found["estimator modes.gap.transitions.drive"].code
@@ -54,7 +54,7 @@ def test_the_command_writes_page_and_data(
     monkeypatch.chdir(ROOT)
 
     def run(*arguments: str) -> int:
-        return exit_code(lambda: app(list(arguments), standalone_mode=False))
+        return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
     page, data = tmp_path / "keys.html", tmp_path / "keys.json"
     assert run("trace", "contactor", "--keys", "--out", str(page)) == 0

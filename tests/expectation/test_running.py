@@ -15,17 +15,17 @@ import modewright as mw
 from engine.simulate import simulate
 from modewright import show_tests, tests
 from modewright.cli import app
-from tests.expectation.latching import project
+from tests.expectation.latching import write_project
 
 SHIPPED = Path(__file__).parent.parent.parent
 
 
-@pytest.mark.parametrize("path", tests.tests_of(SHIPPED), ids=lambda path: Path(path).stem)
+@pytest.mark.parametrize("path", tests.find_tests(SHIPPED), ids=lambda path: Path(path).stem)
 def test_the_tests_that_are_shipped_pass(path: str) -> None:
     """One in C, too: `make check` runs all of them there."""
     in_c = "tip_in" in path
     (run,) = tests.run_tests([path], SHIPPED, compiled=in_c)
-    assert run.passed, list(show_tests.lines_of(run))
+    assert run.passed, list(show_tests.spec_test_lines(run))
     assert run.means.startswith("compiled") == in_c
 
 
@@ -42,7 +42,7 @@ def test_a_changed_spec_fails_the_test_that_is_shipped(tmp_path: Path) -> None:
 
 
 def test_another_verdict_in_c_fails_a_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = project(tmp_path, "low: {that: level < 3 V, at: 29 ms}", "ok: {event: high}")
+    path = write_project(tmp_path, "low: {that: level < 3 V, at: 29 ms}", "ok: {event: high}")
 
     def wrong(system: object, scenario: object) -> object:
         run = simulate(system, scenario)  # type: ignore[arg-type]
@@ -58,7 +58,7 @@ def test_another_verdict_in_c_fails_a_test(tmp_path: Path, monkeypatch: pytest.M
 def test_the_command_tells_what_failed_in_every_form(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    project(tmp_path, "met: {event: high, req: L-1}", "late: {event: high, at: 6 ms}")
+    write_project(tmp_path, "met: {event: high, req: L-1}", "late: {event: high, at: 6 ms}")
     monkeypatch.chdir(tmp_path)
     told = CliRunner().invoke(app, ["test", "--interpreted", "--junit", "out.xml"])
     assert told.exit_code == 1
@@ -76,13 +76,13 @@ def test_the_command_tells_what_failed_in_every_form(
 
 
 def test_a_test_that_passes_leaves_with_0(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    project(tmp_path, "met: {event: high}")
+    write_project(tmp_path, "met: {event: high}")
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, ["test", "--interpreted"]).exit_code == 0
 
 
 def test_parameters_are_set_and_rows_are_closer(tmp_path: Path) -> None:
-    head = project(tmp_path).read_text().replace("expect:\n", "every: 0.5 ms\nexpect:\n")
-    path = project(tmp_path, "between: {that: level > 1 V, at: 5.5 ms}", head=head)
+    head = write_project(tmp_path).read_text().replace("expect:\n", "every: 0.5 ms\nexpect:\n")
+    path = write_project(tmp_path, "between: {that: level > 1 V, at: 5.5 ms}", head=head)
     (run,) = tests.run_tests([str(path)], tmp_path, compiled=False)
     assert run.passed

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from expectation.trace import Trace
+from expectation.trace import RequirementTrace
 from modewright import show_trace, traces
 from modewright.cli import app
 from modewright.tests import load_test
-from tests.expectation.latching import AUTOMATON, HEAD, project
+from tests.expectation.latching import AUTOMATON, HEAD, write_project
 
 REQUIRED = (
     AUTOMATON.replace("wait: 2 ms}", "wait: 2 ms, req: [L-1, L-2]}")
@@ -24,10 +24,10 @@ REQUIRED = (
 
 
 @pytest.fixture
-def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trace:
+def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RequirementTrace:
     """A trace in which one requirement is untested, one unimplemented, one only listed."""
     head = HEAD.replace("expect:", "req: L-1\nexpect:")
-    project(
+    write_project(
         tmp_path, "met: {event: high, req: [L-3, L-4]}", "late: {event: high, at: 6 ms}", head=head
     )
     (tmp_path / "spec" / "latch.yaml").write_text(REQUIRED)
@@ -36,21 +36,21 @@ def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trace:
     return traces.trace(["latch"], Path("needs.csv"))
 
 
-def test_what_is_missing_is_told(found: Trace) -> None:
+def test_what_is_missing_is_told(found: RequirementTrace) -> None:
     assert [each.name for each in found.requirements] == ["L-5", "L-1", "L-3", "L-2", "L-4"]
-    assert found.of_state("traced") == ["L-1", "L-3"]
-    assert found.of_state("untested") == ["L-2"]
-    assert found.of_state("unimplemented") == ["L-5", "L-4"]
-    assert show_trace.summary(found) == (
+    assert found.with_state("traced") == ["L-1", "L-3"]
+    assert found.with_state("untested") == ["L-2"]
+    assert found.with_state("unimplemented") == ["L-5", "L-4"]
+    assert show_trace.trace_summary(found) == (
         "5 requirements; 1 untested: L-2; 2 unimplemented: L-5, L-4"
     )
 
 
-def test_the_lines_of_c_are_those_that_cite_the_place(found: Trace) -> None:
+def test_the_lines_of_c_are_those_that_cite_the_place(found: RequirementTrace) -> None:
     code = Path("latch.c")
     assert CliRunner().invoke(app, ["generate", "latch", "--out", "."]).exit_code == 0
     lines = code.read_text().splitlines()
-    claims = {each.name: each.claims for each in found.requirements}
+    claims = {each.name: each.implementations for each in found.requirements}
     (guard,) = claims["L-1"]
     assert guard.path == "modes.low.transitions.high" and guard.place == "spec/latch.yaml:11"
     cited = [k for k, line in enumerate(lines, 1) if "modes.low.transitions.high" in line]
@@ -61,7 +61,7 @@ def test_the_lines_of_c_are_those_that_cite_the_place(found: Trace) -> None:
     assert template.code == tuple(("latch.c", k) for k in own) and own
 
 
-def test_a_trace_is_written_in_every_form(found: Trace) -> None:
+def test_a_trace_is_written_in_every_form(found: RequirementTrace) -> None:
     rows = list(csv.DictReader(io.StringIO(show_trace.trace_csv(found))))
     assert [(row["requirement"], row["test"], row["verdict"]) for row in rows] == [
         ("L-5", "", ""), ("L-1", "latched", "not run"), ("L-3", "latched.met", "not run"),
@@ -73,7 +73,7 @@ def test_a_trace_is_written_in_every_form(found: Trace) -> None:
     assert data["untested"] == ["L-2"] and data["requirements"][1]["text"] == "goes high"
 
 
-def test_the_command_runs_tests_and_is_strict(found: Trace) -> None:
+def test_the_command_runs_tests_and_is_strict(found: RequirementTrace) -> None:
     command = ["trace", "latch", "--run", "--strict", "--out", "trace.json"]
     told = CliRunner().invoke(app, command)
     assert told.exit_code == 1
@@ -100,7 +100,7 @@ def test_requirements_of_instances_are_those_of_what_has_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Everywhere in what they are of: a file, an input, a template, a transition."""
-    project(tmp_path, "met: {event: high, req: L-3}")
+    write_project(tmp_path, "met: {event: high, req: L-3}")
     spec = REQUIRED.replace("automaton: latch\n", "automaton: latch\nreq: L-6\n").replace(
         "level: {unit: V,", "level: {unit: V, req: L-7,"
     )
@@ -109,7 +109,8 @@ def test_requirements_of_instances_are_those_of_what_has_them(
     monkeypatch.chdir(tmp_path)
     found = traces.trace(["pair"])
     claims = {
-        each.name: {claim.path: claim for claim in each.claims} for each in found.requirements
+        each.name: {claim.path: claim for claim in each.implementations}
+        for each in found.requirements
     }
     assert {name: list(paths) for name, paths in claims.items()} == {
         "L-3": ["templates.main_upper", "templates.spare_upper"],
@@ -121,14 +122,14 @@ def test_requirements_of_instances_are_those_of_what_has_them(
     }  # fmt: skip
     assert all(claim.code for paths in claims.values() for claim in paths.values())
     assert claims["L-1"]["regions.main.modes.low.transitions.high"].place == "spec/latch.yaml:12"
-    assert found.of_state("traced") == ["L-3"]
+    assert found.with_state("traced") == ["L-3"]
     assert CliRunner().invoke(app, ["trace", "pair", "--strict"]).exit_code == 1
 
 
 @pytest.mark.parametrize("is_apart", [False, True])
 def test_a_scenario_names_requirements_of_its_test(tmp_path: Path, is_apart: bool) -> None:
     head = HEAD.replace("  horizon", "  req: L-1\n  horizon")
-    path = project(tmp_path, "met: {event: high}", head=head)
+    path = write_project(tmp_path, "met: {event: high}", head=head)
     if is_apart:
         inner = head.partition("scenario:\n")[2].partition("expect:")[0].replace("  ", "", 1)
         text = f"language: 1\nscenario: steps\n{inner}".replace("\n  ", "\n")
@@ -141,6 +142,6 @@ def test_a_scenario_names_requirements_of_its_test(tmp_path: Path, is_apart: boo
 def test_the_heading_of_a_list_is_no_requirement(tmp_path: Path, heading: str) -> None:
     path = tmp_path / "needs.csv"
     path.write_text(f"{heading}\nL-5,nobody did it\nname,stays\n")
-    assert traces.requirements(path) == {"L-5": "nobody did it", "name": "stays"}
+    assert traces.read_requirements(path) == {"L-5": "nobody did it", "name": "stays"}
     path.write_text("L-5,nobody did it\n")
-    assert traces.requirements(path) == {"L-5": "nobody did it"}
+    assert traces.read_requirements(path) == {"L-5": "nobody did it"}

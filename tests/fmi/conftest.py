@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from codegen.fmi.archive import fmu
+from codegen.fmi.archive import build_fmu
 from codegen.fmi.variable import VERSIONS, Version
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from modewright.api import program
-from tests.fmi.importer import Importer, Unpacked, unpacked
-from tests.target.closed_loop import driveline, supervisor
+from tests.fmi.importer import Importer, UnpackedFmu, unpack_fmu
+from tests.target.closed_loop import record_driveline, record_supervisor
 
-Ready = Callable[[str, Version], Unpacked]
+Ready = Callable[[str, Version], UnpackedFmu]
 
 
 @pytest.fixture(params=VERSIONS, ids=lambda version: f"fmi{version}")
@@ -27,29 +27,29 @@ def version(request: pytest.FixtureRequest) -> Version:
 
 
 @pytest.fixture(scope="session")
-def ready(tapes: dict[str, Tape], tmp_path_factory: pytest.TempPathFactory) -> Ready:
+def ready(tapes: dict[str, TickLog], tmp_path_factory: pytest.TempPathFactory) -> Ready:
     """Return the FMU of an automaton, compiled and unpacked; of a tape's Program if it has one."""
     folder = tmp_path_factory.mktemp("fmi")
 
     @cache
-    def made(name: str, version: Version) -> Unpacked:
+    def made(name: str, version: Version) -> UnpackedFmu:
         place: Path = folder / f"{name}_{version}"
         used = tapes[name].program if name in tapes else program(name)
-        return unpacked(fmu(used, version), place, version)
+        return unpack_fmu(build_fmu(used, version), place, version)
 
     return made
 
 
 @pytest.fixture(scope="session")
-def tapes() -> dict[str, Tape]:
+def tapes() -> dict[str, TickLog]:
     """What the engine read and carried: the driveline and its estimators, the supervisor."""
-    found = driveline("float64", Fraction(21, 10), ["plant", "est"])
-    single = driveline("float32", Fraction(1), ["est"])
+    found = record_driveline("float64", Fraction(21, 10), ["plant", "est"])
+    single = record_driveline("float32", Fraction(1), ["est"])
     return {
         "estimator": found["est"],
         "driveline": found["plant"],
         "estimator_float32": single["est"],
-        "supervisor": supervisor("float32", Fraction(21))["sup"],
+        "supervisor": record_supervisor("float32", Fraction(21))["sup"],
     }
 
 

@@ -14,16 +14,16 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
 from codegen.fmi.variable import Version
-from codegen.harness import fed, tunable
-from language.program import Program, short
-from lockstep.compare import Tape
+from codegen.harness import tick_inputs, tunable_constants
+from language.program import Program, unqualified_name
+from lockstep.compare import TickLog
 
 Values = Mapping[str, float]
 """Truths are 0 and 1; what is read back is float, int or bool."""
 
 
 @dataclass(frozen=True)
-class Unpacked:
+class UnpackedFmu:
     """An FMU in a folder, and what its description says."""
 
     version: Version
@@ -36,20 +36,20 @@ class Unpacked:
         return {variable.name: variable for variable in self.description.modelVariables}
 
 
-def unpacked(packed: bytes, folder: Path, version: Version) -> Unpacked:
+def unpack_fmu(packed: bytes, folder: Path, version: Version) -> UnpackedFmu:
     """Return an FMU in a new folder."""
     folder.mkdir()
     (folder / "packed.fmu").write_bytes(packed)
     extract(str(folder / "packed.fmu"), str(folder / "unpacked"))
     description = read_model_description(str(folder / "unpacked"))
-    return Unpacked(version, folder / "unpacked", description)
+    return UnpackedFmu(version, folder / "unpacked", description)
 
 
 @dataclass
 class Importer:
     """One instance of an FMU: variables by name, messages as they came."""
 
-    fmu: Unpacked
+    fmu: UnpackedFmu
     name: str = "one"
     messages: list[str] = field(default_factory=list)
 
@@ -66,12 +66,14 @@ class Importer:
         self.variables = self.fmu.variables
         if self.fmu.version == 2:
             self.callbacks = fmi2CallbackFunctions()
-            self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda *words: self._hear(words[4]))
+            self.callbacks.logger = fmi2CallbackLoggerTYPE(
+                lambda *words: self._log_message(words[4])
+            )
             self.slave.instantiate(callbacks=self.callbacks)
         else:
-            self.slave.instantiate(logMessage=lambda *words: self._hear(words[3]))
+            self.slave.instantiate(logMessage=lambda *words: self._log_message(words[3]))
 
-    def _hear(self, message: bytes) -> None:
+    def _log_message(self, message: bytes) -> None:
         self.messages.append(message.decode())
 
     def call(self, name: str, *arguments: Any) -> Any:
@@ -99,7 +101,7 @@ class Importer:
     def set(self, values: Values) -> None:
         """Set variables by name."""
         for access, names in self._grouped(values):
-            given = [self._given(access, values[name]) for name in names]
+            given = [self._to_c_value(access, values[name]) for name in names]
             getattr(self.slave, f"set{access}")(self._references(names), given)
 
     def get(self, names: Iterable[str]) -> dict[str, float]:
@@ -114,7 +116,7 @@ class Importer:
         """Free the instance; its library stays, others may use it."""
         self.call("FreeInstance")
 
-    def saved(self) -> c_void_p:
+    def save_state(self) -> c_void_p:
         """Return a state that was saved."""
         state = c_void_p()
         self.call(self._state("GetFMUState"), byref(state))
@@ -124,7 +126,7 @@ class Importer:
         """Go back to a state."""
         self.call(self._state("SetFMUState"), state)
 
-    def serialised(self, state: c_void_p) -> bytes:
+    def serialise_state(self, state: c_void_p) -> bytes:
         """Return a state as bytes."""
         size = c_size_t()
         self.call(self._state("SerializedFMUStateSize"), state, byref(size))
@@ -132,7 +134,7 @@ class Importer:
         self.call(self._state("SerializeFMUState"), state, room, size)
         return bytes(room)
 
-    def deserialised(self, data: bytes) -> c_void_p:
+    def deserialise_state(self, data: bytes) -> c_void_p:
         """Return a state from bytes."""
         state = c_void_p()
         name = "DeSerializeFMUstate" if self.fmu.version == 2 else "DeserializeFMUState"
@@ -161,7 +163,7 @@ class Importer:
         return kind
 
     @staticmethod
-    def _given(access: str, value: float) -> float:
+    def _to_c_value(access: str, value: float) -> float:
         if access == "Boolean":
             return bool(value)
         return value if access in ("Real", "Float32", "Float64") else int(value)
@@ -172,10 +174,10 @@ def bits(value: float) -> bytes:
     return struct.pack("<d", value)
 
 
-def inputs_of(tape: Tape) -> Iterator[tuple[dict[str, float], dict[str, float]]]:
+def inputs_of(tape: TickLog) -> Iterator[tuple[dict[str, float], dict[str, float]]]:
     """Yield what each tick of a tape read: its inputs, and a page where it changed."""
-    names = [_shown(variable.name) for variable in fed(tape.program)]
-    page = [short(constant.name) for constant in tunable(tape.program)]
+    names = [_shown(variable.name) for variable in tick_inputs(tape.program)]
+    page = [unqualified_name(constant.name) for constant in tunable_constants(tape.program)]
     for record in tape.inputs:
         numbers = struct.unpack(f"<{len(record) // 8}d", record)
         rest = numbers[len(names) + 1 :]
@@ -183,7 +185,7 @@ def inputs_of(tape: Tape) -> Iterator[tuple[dict[str, float], dict[str, float]]]
         yield inputs, dict(zip(page, rest, strict=True)) if rest else {}
 
 
-def compared(program: Program, fmu: Unpacked) -> dict[str, str]:
+def compared(program: Program, fmu: UnpackedFmu) -> dict[str, str]:
     """Return the variables of an FMU that a tape has, too: its name there by name here."""
     sources = {wire.name: wire.source for wire in program.outputs}
     found = {}
@@ -195,7 +197,7 @@ def compared(program: Program, fmu: Unpacked) -> dict[str, str]:
     return found
 
 
-def differences(importer: Importer, tape: Tape, every: int = 1) -> tuple[int, list[str]]:
+def count_differences(importer: Importer, tape: TickLog, every: int = 1) -> tuple[int, list[str]]:
     """Drive an FMU as a tape was; return how many values were compared, and which differ.
 
     `every` ticks are done by one step: the tape then holds its inputs over them.

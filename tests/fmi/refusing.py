@@ -15,7 +15,7 @@ PERIOD = 0.001
 REAL = {2: "Real", 3: "Float64"}
 
 
-def refused(importer: Importer, call: Callable[[], object], *words: str) -> None:
+def assert_refused(importer: Importer, call: Callable[[], object], *words: str) -> None:
     """Check that a call returns an error, tells why in one message, and leaves time alone."""
     before = len(importer.messages)
     with pytest.raises(FMICallException):
@@ -24,6 +24,6 @@ def refused(importer: Importer, call: Callable[[], object], *words: str) -> None
     assert all(word in message for word in words), message
 
 
-def raw(importer: Importer, name: str) -> Any:
+def library_function(importer: Importer, name: str) -> Any:
     """Return a function of the library, without what FMPy says of its arguments."""
     return getattr(ctypes.CDLL(importer.slave.dll._name), name)

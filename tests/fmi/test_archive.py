@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS, WARNINGS, BuildError
-from codegen.fmi.archive import fmu
-from codegen.fmi.binary import binary_file
-from codegen.fmi.content import HEADERS, fmu_files, headers
+from codegen.fmi.archive import build_fmu
+from codegen.fmi.binary import binary_path
+from codegen.fmi.content import HEADERS, emit_fmu_files, read_headers
 from codegen.fmi.variable import Version
 from modewright.api import program
 from tests.fmi.conftest import Ready
@@ -40,19 +40,19 @@ int main(void)
 def test_the_same_program_gives_the_same_bytes(
     version: Version, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = fmu(program("contactor"), version)
+    first = build_fmu(program("contactor"), version)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TZ", "Asia/Tokyo")
-    assert fmu(program("contactor"), version) == first
+    assert build_fmu(program("contactor"), version) == first
 
 
 def test_entries_are_sorted_and_have_no_time(version: Version) -> None:
-    entries = zipfile.ZipFile(io.BytesIO(fmu(program("contactor"), version))).infolist()
+    entries = zipfile.ZipFile(io.BytesIO(build_fmu(program("contactor"), version))).infolist()
     names = [entry.filename for entry in entries]
     assert names == sorted(names)
     assert {entry.date_time for entry in entries} == {(1980, 1, 1, 0, 0, 0)}
-    assert binary_file("contactor", version) in names
+    assert binary_path("contactor", version) in names
     assert "sources/contactor_fmu.c" in names
 
 
@@ -60,10 +60,10 @@ def test_sources_alone_have_no_binary_and_need_no_compiler(
     version: Version, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
-    packed = fmu(program("contactor"), version, is_source_only=True)
+    packed = build_fmu(program("contactor"), version, is_source_only=True)
     names = zipfile.ZipFile(io.BytesIO(packed)).namelist()
     assert not [name for name in names if name.startswith("binaries/")]
-    assert sorted(names) == sorted(fmu_files(program("contactor"), version))
+    assert sorted(names) == sorted(emit_fmu_files(program("contactor"), version))
 
 
 def test_a_machine_without_a_name_in_fmi_is_told(
@@ -71,7 +71,7 @@ def test_a_machine_without_a_name_in_fmi_is_told(
 ) -> None:
     monkeypatch.setattr(platform, "machine", lambda: "z80")
     with pytest.raises(BuildError, match=r"no name for this machine .* z80"):
-        fmu(program("contactor"), version)
+        build_fmu(program("contactor"), version)
 
 
 def test_all_that_the_standard_names_is_seen_and_nothing_else(
@@ -80,7 +80,7 @@ def test_all_that_the_standard_names_is_seen_and_nothing_else(
     (library,) = (ready("contactor", version).folder / "binaries").rglob("contactor.*")
     told = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True)
     seen = {line.split()[-1] for line in told.stdout.splitlines()}
-    text = headers(version)[f"fmi{version}Functions.h"].decode()
+    text = read_headers(version)[f"fmi{version}Functions.h"].decode()
     wanted = set(
         re.findall(rf"FMI{version}_Export\s+fmi{version}\w+TYPE\s+(fmi{version}\w+);", text)
     )
@@ -96,7 +96,7 @@ def test_the_c_has_no_warning(compiler: str, name: str, version: Version, tmp_pa
     ours, standard = tmp_path / "sources", tmp_path / "standard"
     ours.mkdir()
     standard.mkdir()
-    for path, data in fmu_files(program(name), version).items():
+    for path, data in emit_fmu_files(program(name), version).items():
         folder = standard if Path(path).name in HEADERS[version] else ours
         (folder / Path(path).name).write_bytes(data)
     words = [*FLAGS, *WARNINGS, "-Werror", "-fsyntax-only", "-isystem", str(standard)]
@@ -109,7 +109,7 @@ def test_the_c_has_no_warning(compiler: str, name: str, version: Version, tmp_pa
 
 def test_a_binary_that_was_compiled_with_contraction_makes_no_instance(tmp_path: Path) -> None:
     """`-mfma -ffp-contract=fast` changes bits; the FMU sees it when it is asked for an instance."""
-    for path, data in fmu_files(program("contactor"), 3).items():
+    for path, data in emit_fmu_files(program("contactor"), 3).items():
         (tmp_path / Path(path).name).write_bytes(data)
     main = MAIN.replace("TOKEN", token_in(tmp_path / "contactor_fmu.c"))
     (tmp_path / "main.c").write_text(main)

@@ -12,16 +12,16 @@ import pytest
 from fmpy import read_model_description
 from fmpy.build import build_platform_binary
 
-from codegen.fmi.archive import fmu
+from codegen.fmi.archive import build_fmu
 from codegen.fmi.variable import Version
 from engine.interpreter import Interpreter
 from engine.page import calibrate
 from language.program import Program
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from modewright.api import program
-from tests.codegen.waiting import waiting
+from tests.codegen.waiting import waiting_automaton
 from tests.fmi.conftest import Ready
-from tests.fmi.importer import Importer, Unpacked, differences, inputs_of, unpacked
+from tests.fmi.importer import Importer, UnpackedFmu, count_differences, inputs_of, unpack_fmu
 from tests.language.making import program as made
 
 TICKS = {"estimator": 2101, "supervisor": 2001, "estimator_float32": 1000, "driveline": 1000}
@@ -30,29 +30,29 @@ EVERY = 5
 """Periods in a communication step of several."""
 
 
-def held(tape: Tape, every: int) -> Tape:
+def held(tape: TickLog, every: int) -> TickLog:
     """Return what the interpreter does where inputs change only every so many ticks."""
-    stepper, made = Interpreter(tape.program), Tape(tape.program, tape.name)
+    stepper, made = Interpreter(tape.program), TickLog(tape.program, tape.name)
     ticks = [inputs for inputs, _ in inputs_of(tape)]
     for tick in range(len(ticks) // every * every + 1):
         until = -(-tick // every) * every
         for name, value in ticks[min(until, len(ticks) - 1)].items():
             _set(stepper, tape.program, name, value)
         stepper.run("step")
-        made.record(stepper)
+        made.record_tick(stepper)
     return made
 
 
-def turned(tape: Tape, pages: dict[int, Fraction]) -> Tape:
+def turned(tape: TickLog, pages: dict[int, Fraction]) -> TickLog:
     """Return what the interpreter does where J_em changes at some ticks."""
-    stepper, made = Interpreter(tape.program), Tape(tape.program, tape.name)
+    stepper, made = Interpreter(tape.program), TickLog(tape.program, tape.name)
     for tick, (inputs, _) in enumerate(inputs_of(tape)):
         if tick in pages:
             assert calibrate(stepper, tape.program, {"J_em": pages[tick]})
         for name, value in inputs.items():
             _set(stepper, tape.program, name, value)
         stepper.run("step")
-        made.record(stepper)
+        made.record_tick(stepper)
     return made
 
 
@@ -68,10 +68,10 @@ def _set(stepper: Interpreter, program: Program, name: str, value: float) -> Non
 @pytest.mark.long
 @pytest.mark.parametrize("name", TICKS)
 def test_an_fmu_gives_the_bits_of_the_engine(
-    name: str, version: Version, ready: Ready, tapes: dict[str, Tape]
+    name: str, version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     tape = shortened(tapes[name], TICKS[name])
-    values, different = differences(Importer(ready(name, version)), tape)
+    values, different = count_differences(Importer(ready(name, version)), tape)
     assert different == []
     assert len(tape.values) == TICKS[name]
     assert values > 12 * TICKS[name]
@@ -79,20 +79,20 @@ def test_an_fmu_gives_the_bits_of_the_engine(
 
 
 def test_a_step_of_several_periods_is_as_many_ticks_with_the_inputs_held(
-    version: Version, ready: Ready, tapes: dict[str, Tape]
+    version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     tape = held(tapes["estimator"], EVERY)
-    values, different = differences(Importer(ready("estimator", version)), tape, EVERY)
+    values, different = count_differences(Importer(ready("estimator", version)), tape, EVERY)
     assert different == []
     assert values > 12 * 2000 / EVERY
 
 
 def test_a_parameter_that_is_set_counts_from_the_next_tick(
-    version: Version, ready: Ready, tapes: dict[str, Tape]
+    version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     tape = turned(tapes["estimator"], {700: Fraction("0.06"), 1400: Fraction("0.05")})
     importer = Importer(ready("estimator", version))
-    _, different = differences(importer, tape)
+    _, different = count_differences(importer, tape)
     assert different == []
     assert importer.messages == ["fault `stale_calibration` is set at 0.69999999999999996 s"]
     assert importer.get(["J_em", "fault.stale_calibration"]) == {
@@ -116,8 +116,8 @@ def test_a_parameter_that_comes_with_its_solved_numbers_is_not_stale(
 def test_a_tunable_wait_is_set_in_ticks(
     version: Version, asked: int | None, enters: int, tmp_path: Path
 ) -> None:
-    text = waiting(f"waiting_{version}", "1 ms", "float64", "5 ms", "[0, 50]")
-    importer = Importer(unpacked(fmu(made(text), version), tmp_path / "fmu", version))
+    text = waiting_automaton(f"waiting_{version}", "1 ms", "float64", "5 ms", "[0, 50]")
+    importer = Importer(unpack_fmu(build_fmu(made(text), version), tmp_path / "fmu", version))
     importer.start({"u": 1.0, **({} if asked is None else {"t_on": asked})})
     modes = []
     for tick in range(12):
@@ -136,7 +136,7 @@ def test_initialization_mode_shows_tick_0_with_what_is_set(version: Version, rea
 
 
 def test_two_instances_know_nothing_of_each_other(
-    version: Version, ready: Ready, tapes: dict[str, Tape]
+    version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     tape, ready_one = tapes["estimator"], ready("estimator", version)
     ticks = [inputs for inputs, _ in inputs_of(tape)][:400]
@@ -152,57 +152,59 @@ def test_two_instances_know_nothing_of_each_other(
 
 @pytest.mark.parametrize("name", ["estimator", "supervisor"])
 def test_a_state_that_is_restored_goes_on_with_the_same_bits(
-    name: str, version: Version, ready: Ready, tapes: dict[str, Tape]
+    name: str, version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     ticks = [inputs for inputs, _ in inputs_of(tapes[name])][:600]
     importer = Importer(ready(name, version))
     first = [_stepped(importer, tick, ticks[tick], name) for tick in range(300)]
-    state = importer.saved()
-    data = importer.serialised(state)
+    state = importer.save_state()
+    data = importer.serialise_state(state)
     rest = [_stepped(importer, tick, ticks[tick], name) for tick in range(300, 600)]
     importer.restore(state)
     assert [_stepped(importer, tick, ticks[tick], name) for tick in range(300, 600)] == rest
     other = Importer(ready(name, version), "other")
-    other.restore(other.deserialised(data))
+    other.restore(other.deserialise_state(data))
     assert [_stepped(other, tick, ticks[tick], name) for tick in range(300, 600)] == rest
     assert first[-1] != rest[-1]
 
 
 def test_what_is_built_from_the_sources_of_the_archive_gives_the_same_bits(
-    version: Version, tmp_path: Path, tapes: dict[str, Tape]
+    version: Version, tmp_path: Path, tapes: dict[str, TickLog]
 ) -> None:
     if shutil.which("cmake") is None:
         pytest.skip("no cmake: make system-packages")
-    (tmp_path / "packed.fmu").write_bytes(fmu(program("estimator"), version, is_source_only=True))
+    (tmp_path / "packed.fmu").write_bytes(
+        build_fmu(program("estimator"), version, is_source_only=True)
+    )
     with zipfile.ZipFile(tmp_path / "packed.fmu") as archive:
         archive.extractall(tmp_path / "unpacked")
     build_platform_binary(tmp_path / "unpacked", configuration="Release")
     description = read_model_description(str(tmp_path / "unpacked"))
-    rebuilt = Importer(Unpacked(version, tmp_path / "unpacked", description))
-    _, different = differences(rebuilt, shortened(tapes["estimator"], 1000))
+    rebuilt = Importer(UnpackedFmu(version, tmp_path / "unpacked", description))
+    _, different = count_differences(rebuilt, shortened(tapes["estimator"], 1000))
     assert different == []
 
 
-def shortened(tape: Tape, ticks: int) -> Tape:
+def shortened(tape: TickLog, ticks: int) -> TickLog:
     """Return the first ticks of a tape."""
-    made = Tape(tape.program, tape.name)
+    made = TickLog(tape.program, tape.name)
     made.inputs, made.values = tape.inputs[:ticks], tape.values[:ticks]
     made.transitions = tape.transitions
     return made
 
 
 def test_a_value_that_differs_is_seen(
-    version: Version, ready: Ready, tapes: dict[str, Tape]
+    version: Version, ready: Ready, tapes: dict[str, TickLog]
 ) -> None:
     """The comparison can fail: one number of the tape is another."""
     tape = shortened(tapes["estimator"], 10)
     wrong = replace(tape, inputs=tape.inputs, values=[*tape.values[:9], tape.values[8]])
-    _, different = differences(Importer(ready("estimator", version)), wrong)
+    _, different = count_differences(Importer(ready("estimator", version)), wrong)
     assert different
     assert all(line.startswith("tick 9: ") for line in different)
 
 
-def _outputs(ready_one: Unpacked, ticks: list[dict[str, float]]) -> list[dict[str, float]]:
+def _outputs(ready_one: UnpackedFmu, ticks: list[dict[str, float]]) -> list[dict[str, float]]:
     importer = Importer(ready_one, "alone")
     return [_stepped(importer, tick, inputs) for tick, inputs in enumerate(ticks)]
 

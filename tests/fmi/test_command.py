@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.fmi.binary import binary_file
+from codegen.fmi.binary import binary_path
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
     """Return exit code, output and messages of a command."""
-    code = exit_code(partial(app, list(words), standalone_mode=False))
+    code = run_with_exit_code(partial(app, list(words), standalone_mode=False))
     heard = capsys.readouterr()
     return code, heard.out, heard.err
 
@@ -27,7 +27,7 @@ def test_the_command_writes_an_fmu_and_tells_where(
     monkeypatch.chdir(tmp_path)
     assert told(capsys, "fmu", "contactor")[:2] == (0, "wrote contactor.fmu\n")
     names = zipfile.ZipFile("contactor.fmu").namelist()
-    assert binary_file("contactor", 3) in names
+    assert binary_path("contactor", 3) in names
     words = ("fmu", "contactor", "--version", "2", "--source-only", "--out", "c2.fmu")
     assert told(capsys, *words)[:2] == (0, "wrote c2.fmu\n")
     assert (tmp_path / "c2.fmu").read_bytes() == mw.fmu("contactor", 2, is_source_only=True)

@@ -15,12 +15,12 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from lark import Lark
 
-from codegen.fmi.archive import fmu
-from codegen.fmi.content import HEADERS, fmu_files
+from codegen.fmi.archive import build_fmu
+from codegen.fmi.content import HEADERS, emit_fmu_files
 from codegen.fmi.unit import unit_definitions, unit_name
 from codegen.fmi.variable import Version
 from modewright.api import program
-from tests.fmi.importer import Importer, unpacked
+from tests.fmi.importer import Importer, unpack_fmu
 
 SHIPPED = ("estimator", "estimator_float32", "supervisor", "contactor", "driveline")
 ODD = """
@@ -82,7 +82,7 @@ def altered(packed: bytes, path: str, change: Callable[[bytes], bytes]) -> bytes
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_fmpy_finds_no_problem(name: str, version: Version, tmp_path: Path) -> None:
-    assert validated(fmu(program(name), version, is_source_only=True), tmp_path) == []
+    assert validated(build_fmu(program(name), version, is_source_only=True), tmp_path) == []
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_wrong_description_is_found(
     old: tuple[bytes, bytes], new: bytes, told: str, version: Version, tmp_path: Path
 ) -> None:
     """The validator can fail: a wrong reference of an output, a unit and a name."""
-    packed = fmu(program("supervisor"), version, is_source_only=True)
+    packed = build_fmu(program("supervisor"), version, is_source_only=True)
     before = old[version - 2]
     after = before + new if new == b"9" else new
     wrong = altered(packed, "modelDescription.xml", lambda data: data.replace(before, after, 1))
@@ -108,7 +108,7 @@ def test_a_wrong_description_is_found(
 
 
 def test_a_name_that_is_not_legal_is_found_each_time(version: Version, tmp_path: Path) -> None:
-    packed = fmu(program("contactor"), version, is_source_only=True)
+    packed = build_fmu(program("contactor"), version, is_source_only=True)
     old, new = b'name="command"', b'name="7 commands"'
     wrong = altered(packed, "modelDescription.xml", lambda data: data.replace(old, new))
     for _ in range(2):
@@ -116,7 +116,7 @@ def test_a_name_that_is_not_legal_is_found_each_time(version: Version, tmp_path:
 
 
 def test_modes_and_words_are_enumerations_with_their_numbers(version: Version) -> None:
-    found = described(fmu(program("supervisor"), version, is_source_only=True))
+    found = described(build_fmu(program("supervisor"), version, is_source_only=True))
     torque, key = found["operation_drive_torque"], found["key"]
     items = [(item.name, int(item.value)) for item in torque.declaredType.items]
     assert items == [("creep", 0), ("pull", 1), ("regen", 2), ("inactive", -1)]
@@ -124,7 +124,7 @@ def test_modes_and_words_are_enumerations_with_their_numbers(version: Version) -
 
 
 def test_variables_have_types_units_ranges_and_start_values(version: Version) -> None:
-    found = described(fmu(program("supervisor"), version, is_source_only=True))
+    found = described(build_fmu(program("supervisor"), version, is_source_only=True))
 
     def told(name: str) -> tuple[object, ...]:
         v = found[name]
@@ -144,13 +144,13 @@ def test_variables_have_types_units_ranges_and_start_values(version: Version) ->
 
 
 def test_measurements_are_new_where_an_importer_does_not_say(version: Version) -> None:
-    found = described(fmu(program("estimator"), version, is_source_only=True))
+    found = described(build_fmu(program("estimator"), version, is_source_only=True))
     assert found["is_new.y_em"].start == "true"
     assert found["solved.stamp_J_em"].start == "0.05"
 
 
 def test_the_states_of_a_continuous_automaton_are_continuous(version: Version) -> None:
-    found = described(fmu(program("driveline"), version, is_source_only=True))
+    found = described(build_fmu(program("driveline"), version, is_source_only=True))
     kinds = {name: v.variability for name, v in found.items()}
     assert kinds["w_em"] == kinds["T_em"] == "continuous"
     assert kinds["mode"] == "discrete"
@@ -172,7 +172,7 @@ def test_units_are_exponents_of_base_units() -> None:
 def test_parameters_of_all_types_and_odd_texts_are_told(version: Version, tmp_path: Path) -> None:
     spec = tmp_path / "mapped.yaml"
     spec.write_text(ODD)
-    packed = fmu(program(str(spec)), version, is_source_only=True)
+    packed = build_fmu(program(str(spec)), version, is_source_only=True)
     assert validated(packed, tmp_path) == []
     found = described(packed)
     starts = {name: v.start for name, v in found.items() if v.causality == "parameter"}
@@ -193,7 +193,9 @@ def test_parameters_of_all_types_and_odd_texts_are_told(version: Version, tmp_pa
 def test_points_of_a_table_and_whole_parameters_are_tuned(version: Version, tmp_path: Path) -> None:
     spec = tmp_path / "mapped.yaml"
     spec.write_text(ODD)
-    importer = Importer(unpacked(fmu(program(str(spec)), version), tmp_path / "made", version))
+    importer = Importer(
+        unpack_fmu(build_fmu(program(str(spec)), version), tmp_path / "made", version)
+    )
     importer.start({"temp": 290.0, "count": 2})
     assert importer.get(["torque", "mode"]) == {"torque": 0.75, "mode": 7}
     importer.set({"limit[2]": 0.25, "gears": 5, "count": 5})
@@ -213,7 +215,9 @@ def test_names_of_a_spec_may_be_words_of_the_c_around_it(version: Version, tmp_p
     spec.write_text(
         f"{text}equations: {{total: {total}}}\nmodes: {{a: {{}}}}\ninitial: a\noutputs: [total]\n"
     )
-    importer = Importer(unpacked(fmu(program(str(spec)), version), tmp_path / "made", version))
+    importer = Importer(
+        unpack_fmu(build_fmu(program(str(spec)), version), tmp_path / "made", version)
+    )
     importer.start({"EOF": 3.0})
     assert importer.get(["total"]) == {"total": len(NAMES) + 2.0}
     importer.close()
@@ -221,9 +225,9 @@ def test_names_of_a_spec_may_be_words_of_the_c_around_it(version: Version, tmp_p
 
 def test_the_token_is_that_of_program_and_version() -> None:
     def tokens(values: dict[str, str]) -> list[str]:
-        from codegen.fmi.content import token
+        from codegen.fmi.content import instantiation_token
 
-        return [token(program("estimator", values), version) for version in (2, 3)]
+        return [instantiation_token(program("estimator", values), version) for version in (2, 3)]
 
     base = tokens({})
     assert base == tokens({})
@@ -231,7 +235,7 @@ def test_the_token_is_that_of_program_and_version() -> None:
 
 
 def test_sources_and_headers_of_the_standard_are_in_it_with_their_licence(version: Version) -> None:
-    files = fmu_files(program("estimator"), version)
+    files = emit_fmu_files(program("estimator"), version)
     for header in HEADERS[version]:
         assert b"2-Clause BSD License" in files[f"sources/{header}"]
     assert (
@@ -242,4 +246,4 @@ def test_sources_and_headers_of_the_standard_are_in_it_with_their_licence(versio
 
 def test_another_version_is_refused() -> None:
     with pytest.raises(ValueError, match="there is no FMI 1: versions are 2 and 3"):
-        fmu_files(program("contactor"), 1)  # type: ignore[arg-type]
+        emit_fmu_files(program("contactor"), 1)  # type: ignore[arg-type]

@@ -14,35 +14,35 @@ from codegen.fmi.standard import refusals
 from codegen.fmi.variable import Version
 from tests.fmi.conftest import Ready
 from tests.fmi.importer import Importer
-from tests.fmi.refusing import PERIOD, REAL, raw, refused
+from tests.fmi.refusing import PERIOD, REAL, assert_refused, library_function
 
 
 def test_states_of_others_are_refused(version: Version, ready: Ready, stepping: Importer) -> None:
     other = Importer(ready("contactor", version))
-    refused(stepping, lambda: stepping.restore(other.saved()), "another FMU")
-    refused(stepping, lambda: stepping.restore(c_void_p()), "there is no state")
-    refused(stepping, lambda: stepping.serialised(c_void_p()), "there is no state")
-    data = stepping.serialised(stepping.saved())
+    assert_refused(stepping, lambda: stepping.restore(other.save_state()), "another FMU")
+    assert_refused(stepping, lambda: stepping.restore(c_void_p()), "there is no state")
+    assert_refused(stepping, lambda: stepping.serialise_state(c_void_p()), "there is no state")
+    data = stepping.serialise_state(stepping.save_state())
     for wrong in (
         data[:-1],
         data + b"\0",
         b"",
-        other.serialised(other.saved()),
+        other.serialise_state(other.save_state()),
         b"x" + data[1:],
         data[:200] + bytes([data[200] ^ 1]) + data[201:],
     ):
-        refused(stepping, lambda wrong=wrong: stepping.deserialised(wrong), "bytes")  # type: ignore[misc]
+        assert_refused(stepping, lambda wrong=wrong: stepping.deserialise_state(wrong), "bytes")  # type: ignore[misc]
     name = "GetFMUstate" if version == 2 else "GetFMUState"
-    refused(stepping, lambda: stepping.call(name, None), "no place")
-    refused(stepping, lambda: stepping.call(name.replace("Get", "Free"), None), "no place")
-    state = stepping.saved()
+    assert_refused(stepping, lambda: stepping.call(name, None), "no place")
+    assert_refused(stepping, lambda: stepping.call(name.replace("Get", "Free"), None), "no place")
+    state = stepping.save_state()
     stepping.call(name.replace("Get", "Free"), byref(state))
     assert state.value is None
     stepping.call(name.replace("Get", "Free"), byref(state))
 
 
 def test_a_state_is_saved_again_in_its_place(version: Version, stepping: Importer) -> None:
-    state = stepping.saved()
+    state = stepping.save_state()
     place = state.value
     stepping.step(0.0, PERIOD)
     stepping.call("GetFMUstate" if version == 2 else "GetFMUState", byref(state))
@@ -58,7 +58,7 @@ def test_every_function_that_is_not_supported_returns_an_error_and_tells_why(
     listed = list(refusals(version))
     assert len(listed) == {2: 19, 3: 36}[version]
     for refusal in listed:
-        function = raw(stepping, refusal.name)
+        function = library_function(stepping, refusal.name)
         before = len(stepping.messages)
         arguments = [c_double(0.0) if "64 " in p and "*" not in p and "[" not in p else c_void_p()
                      for p in refusal.parameters[1:]]  # fmt: skip
@@ -75,8 +75,8 @@ def test_without_an_instance_every_call_is_an_error(version: Version, stepping: 
              f"Set{REAL[version]}", f"Get{state}", f"Set{state}", f"Free{state}"]  # fmt: skip
     for name in names:
         nothing = [c_void_p() for _ in range(6)]
-        assert raw(stepping, prefix + name)(*nothing) == 3, name
-    raw(stepping, f"{prefix}FreeInstance")(c_void_p())
+        assert library_function(stepping, prefix + name)(*nothing) == 3, name
+    library_function(stepping, f"{prefix}FreeInstance")(c_void_p())
 
 
 def test_an_instance_is_not_made_of_nothing(version: Version, importer: Importer) -> None:
@@ -114,17 +114,19 @@ def test_an_instance_is_not_made_of_nothing(version: Version, importer: Importer
 
 def test_nothing_is_returned_where_there_is_no_place(version: Version, stepping: Importer) -> None:
     if version == 2:
-        refused(stepping, lambda: stepping.call("GetRealStatus", 2, None), "last successful time")
+        assert_refused(
+            stepping, lambda: stepping.call("GetRealStatus", 2, None), "last successful time"
+        )
         value = c_double()
         stepping.call("GetRealStatus", 2, byref(value))
         assert value.value == 0.0
-        refused(stepping, lambda: stepping.call("GetBooleanStatus", 0, None), "terminated")
+        assert_refused(stepping, lambda: stepping.call("GetBooleanStatus", 0, None), "terminated")
     else:
         step = (0.0, PERIOD, c_bool(True), None, None, None, None)
-        refused(stepping, lambda: stepping.call("DoStep", *step), "null pointer")
-    state = stepping.saved()
+        assert_refused(stepping, lambda: stepping.call("DoStep", *step), "null pointer")
+    state = stepping.save_state()
     name = "SerializedFMUstateSize" if version == 2 else "SerializedFMUStateSize"
-    refused(stepping, lambda: stepping.call(name, state, None), "no place")
+    assert_refused(stepping, lambda: stepping.call(name, state, None), "no place")
 
 
 def test_a_fault_is_told_once_and_the_step_goes_on(version: Version, stepping: Importer) -> None:
@@ -157,6 +159,8 @@ def test_messages_of_a_category_are_switched_off_and_on(
     stepping.step(PERIOD, PERIOD)
     assert stepping.messages == []
     switched(True)
-    refused(stepping, lambda: switched(True, b"logAll"), "categories are")
-    refused(stepping, lambda: switched(True, None), "categories are")
-    refused(stepping, lambda: stepping.call("SetDebugLogging", True, 1, None), "null pointer")
+    assert_refused(stepping, lambda: switched(True, b"logAll"), "categories are")
+    assert_refused(stepping, lambda: switched(True, None), "categories are")
+    assert_refused(
+        stepping, lambda: stepping.call("SetDebugLogging", True, 1, None), "null pointer"
+    )

@@ -21,7 +21,7 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Function, short
+from language.program import Function, unqualified_name
 
 Real = Callable[..., float]
 
@@ -40,7 +40,7 @@ def text(expr: Expr) -> str:
         case Value(value):
             return repr(value)
         case Ref(name):
-            return short(name)
+            return unqualified_name(name)
         case Unary("-", operand):
             return f"(-{text(operand)})"
         case Binary(operator, left, right) | Compare(operator, left, right):
@@ -59,7 +59,7 @@ def compiled() -> dict[str, Real]:
         lines = [f"def {function.name}({', '.join(function.parameters)}):"]
         for op in function.body:
             assert isinstance(op, Assign)
-            lines.append(f"    {short(op.target)} = {text(op.value)}")
+            lines.append(f"    {unqualified_name(op.target)} = {text(op.value)}")
         exec("\n".join([*lines, "    return y"]), space)
     return {name: space[name] for name in FUNCTIONS}
 
@@ -67,13 +67,13 @@ def compiled() -> dict[str, Real]:
 PYTHON = compiled()
 
 
-def stated(function: Function) -> float:
+def stated_error(function: Function) -> float:
     found = re.fullmatch(r".*; error < ([0-9.]+) ULP", function.about)
     assert found
     return float(found[1])
 
 
-def error(name: str, *x: float) -> float:
+def ulp_error(name: str, *x: float) -> float:
     """Return the error at x in ULP of the exact result."""
     exact = EXACT[name](*(mpmath.mpf(value) for value in x))
     result = PYTHON[name](*x)
@@ -87,7 +87,7 @@ def bits(x: float) -> bytes:
     return struct.pack("<d", x)
 
 
-def around(x: float, steps: int = 2) -> list[float]:
+def neighbours_of(x: float, steps: int = 2) -> list[float]:
     """Return x and its neighbours on both sides, ascending."""
     low, high = [x], [x]
     for _ in range(steps):

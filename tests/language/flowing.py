@@ -62,7 +62,7 @@ class Flow:
         half = self.widths.get(name, 10.0) / 2
         return f'{name}: {{unit: "1", initial: {self.start[name]}, range: [-{half}, {half}]}}'
 
-    def ticked(
+    def run_ticks(
         self, count: int, u: float = 0.0, period: str = "1 s", substeps: int = 1
     ) -> dict[str, float]:
         """Return the states after some periods; tick 0 only starts."""

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from engine.interpreter import Interpreter
-from language.document import Document, Scalar
+from language.document import Document, ScalarNode
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.parse import parse_expression
 from language.problem import Problem, Problems, Source, Span, SpecError
 from language.program import Program
-from language.project import Project, document_of, read_document
-from language.syntax import Tree
+from language.project import Project, parse_document, read_document
+from language.syntax import SyntaxTree
 from language.units import Dimension, parse_unit
 
 ROOT = Path(__file__).parents[2]
@@ -26,16 +26,16 @@ NOWHERE = Span(Source("nowhere"), 1, 1)
 Made = TypeVar("Made")
 
 
-def scalar(text: str, name: str = "here") -> Scalar:
-    return Scalar(text, Span(Source(name, (text,)), 1, 1, max(1, len(text))))
+def scalar(text: str, name: str = "here") -> ScalarNode:
+    return ScalarNode(text, Span(Source(name, (text,)), 1, 1, max(1, len(text))))
 
 
-def tree(text: str) -> Tree:
+def tree(text: str) -> SyntaxTree:
     return parse_expression(scalar(text))
 
 
 def document(text: str, name: str = "here.yaml") -> Document:
-    return document_of(Source(name, tuple(text.splitlines())), text)
+    return parse_document(Source(name, tuple(text.splitlines())), text)
 
 
 def automaton(text: str, project: Project = SHIPPED, **values: str) -> Automaton:
@@ -52,7 +52,7 @@ def stepper(text: str, project: Project = SHIPPED, **values: str) -> Interpreter
 
 
 @cache
-def shipped(name: str, **values: str) -> Automaton:
+def load_shipped(name: str, **values: str) -> Automaton:
     given = {key: scalar(value) for key, value in values.items()}
     return automaton_of(read_document(SHIPPED.path_of(name)), SHIPPED, given)
 
@@ -65,7 +65,7 @@ def project_of(folder: Path, **files: str) -> Project:
     return Project(folder)
 
 
-def solved(made: Program) -> dict[str, float]:
+def solve_constants(made: Program) -> dict[str, float]:
     """Return the constants of a Program by name."""
     return {constant.name: constant.value for constant in made.constants}
 
@@ -74,13 +74,13 @@ def dimension(unit: str) -> Dimension:
     return parse_unit(unit).dimension
 
 
-def si(text: str) -> Fraction:
+def si_value(text: str) -> Fraction:
     """Return a literal such as `3 deg` in SI, exactly."""
     number, _, unit = text.partition(" ")
     return Fraction(number) * parse_unit(unit or "1").factor
 
 
-def refusal(make: Callable[[], object]) -> tuple[Problem, ...]:
+def raised_problems(make: Callable[[], object]) -> tuple[Problem, ...]:
     """Return the problems that something is refused with; () if it is not."""
     try:
         make()
@@ -91,10 +91,10 @@ def refusal(make: Callable[[], object]) -> tuple[Problem, ...]:
     return ()
 
 
-def told(make: Callable[[], object]) -> list[str]:
+def problem_lines(make: Callable[[], object]) -> list[str]:
     """Return what the user is told: `line:column label` of each problem."""
-    return [f"{p.span.line}:{p.span.column} {p.label}" for p in refusal(make)]
+    return [f"{p.span.line}:{p.span.column} {p.label}" for p in raised_problems(make)]
 
 
-def labels(problems: Problems) -> list[str]:
-    return [problem.label for problem in problems.found]
+def problem_labels(problems: Problems) -> list[str]:
+    return [problem.label for problem in problems.reported]

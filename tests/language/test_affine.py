@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.affine import jacobian
-from language.constants import parameter_constants, values_of
-from language.continuous import continuous_program
-from language.field import Field, field_blocks
-from language.lower import expression
+from language.constants import constant_values, parameter_constants
+from language.continuous import lower_continuous_automaton
+from language.field import VectorField, field_blocks
+from language.lower import lower_expression
 from language.matrix import Matrix
 from language.model import Automaton
 from language.operation import (
@@ -22,9 +22,9 @@ from language.operation import (
     Select,
     Value,
 )
-from language.parameter import constant_names
+from language.parameter import constant_bindings
 from language.problem import Problems
-from tests.language.making import automaton, shipped, tree
+from tests.language.making import automaton, load_shipped, tree
 
 STATES = ("x", "v", "z")
 CONSTANTS = {"constant.k": 3.5, "constant.c": -0.25, "calibration.tau": 0.04}
@@ -38,7 +38,7 @@ def block(**rates: str) -> Block:
     ops = []
     for name, text in rates.items():
         target = f"work.rate_{name}" if name in STATES else f"work.at_{name}"
-        ops.append(Assign(target, expression(tree(text), known)))
+        ops.append(Assign(target, lower_expression(tree(text), known)))
         known.setdefault(name, Ref(target))
     return tuple(ops)
 
@@ -140,15 +140,15 @@ def test_the_jacobian_of_a_sum_is_the_sum(a: tuple[float, ...], b: tuple[float, 
 
 
 def matrix_of(made: Automaton, mode: str) -> Matrix:
-    assert continuous_program(made, Problems()).period is None
+    assert lower_continuous_automaton(made, Problems()).period is None
     inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in made.inputs}
-    field = Field(made, constant_names(made), inputs, "memory.mode", "")
-    constants = values_of(parameter_constants(made, Problems()))
+    field = VectorField(made, constant_bindings(made), inputs, "memory.mode", "")
+    constants = constant_values(parameter_constants(made, Problems()))
     return jacobian(field_blocks(field)[f"rates_{mode}"], field.states, constants)
 
 
 def test_the_plant_in_contact_has_the_matrix_of_the_paper() -> None:
-    made = shipped("driveline")
+    made = load_shipped("driveline")
     p = {name: float(thing.value or 0) for name, thing in made.parameters.items()}
     r, k, c, inertia = p["R"], p["k_hs"], p["c_hs"], p["J_em"]
     vehicle = p["m"] * p["r_w"] ** 2 + 4 * p["J_wh"]
@@ -177,7 +177,7 @@ def test_the_plant_in_contact_has_the_matrix_of_the_paper() -> None:
 
 
 def test_the_plant_in_the_gap_relaxes_with_stiffness_over_damping() -> None:
-    made = shipped("driveline")
+    made = load_shipped("driveline")
     p = {name: float(thing.value or 0) for name, thing in made.parameters.items()}
     found = matrix_of(made, "no_contact")
     row = dict(zip(made.states, found[list(made.states).index("theta_b")], strict=True))

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from language.aliases import KEYS, known_as
+from language.aliases import KEY_ALIASES, key_alias_hint
 
 SCHEMA = Path(__file__).parent.parent.parent / "spec" / "modewright.schema.json"
 
 
-@pytest.mark.parametrize("word", KEYS)
+@pytest.mark.parametrize("word", KEY_ALIASES)
 def test_every_word_means_a_key_that_there_is(word: str) -> None:
     keys = json.dumps(json.loads(SCHEMA.read_text()))
-    for meant in KEYS[word]:
+    for meant in KEY_ALIASES[word]:
         assert f'"{meant}":' in keys
-        assert known_as(word, {meant, "about"}) == f"did you mean `{meant}`?"
-    assert known_as(word, {"about"}) == ""
+        assert key_alias_hint(word, {meant, "about"}) == f"did you mean `{meant}`?"
+    assert key_alias_hint(word, {"about"}) == ""

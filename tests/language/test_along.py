@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from language.along import Along
+from language.along import LieDerivative
 from language.evaluate import evaluate
-from language.moment import Moment
+from language.moment import GuardSnapshot
 from language.operation import Expr
 from tests.language.making import automaton, tree
 
@@ -25,10 +25,10 @@ TEXTS = [
 STEP = 1e-6
 
 
-def at(expr: Expr, moment: Moment, x: float, z: float) -> float:
+def at(expr: Expr, moment: GuardSnapshot, x: float, z: float) -> float:
     """Return an expression with what its story computes before it."""
     values: dict[str, float | int | bool] = {"state.x": x, "state.z": z}
-    for target, value in moment.story.steps:
+    for target, value in moment.path.assignments:
         values[target] = evaluate(value, values)
     return float(evaluate(expr, values))
 
@@ -36,9 +36,9 @@ def at(expr: Expr, moment: Moment, x: float, z: float) -> float:
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_rate_is_that_of_the_values(text: str) -> None:
     made = automaton(SPEC)
-    moment = Moment(made, next(iter(made.modes.values())))
-    expr = moment.expression(tree(text))
-    rate = Along(moment).of(expr)
+    moment = GuardSnapshot(made, next(iter(made.modes.values())))
+    expr = moment.lower_expression(tree(text))
+    rate = LieDerivative(moment).differentiate(expr)
     x, z = 0.4, 1.3
     later, before = (at(expr, moment, x + 0.7 * t, z + x * t + 0.35 * t * t) for t in (STEP, -STEP))
     expected = (later - before) / (2.0 * STEP)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from language.dimension import DimensionCheck
+from language.dimension import TypeChecker
 from language.evaluate import evaluate
-from language.lower import expression
+from language.lower import lower_expression
 from language.problem import Problems
-from language.scope import Scope
-from language.syntax import Number
+from language.scope import NameEnvironment
+from language.syntax import NumberLiteral
 from language.units import Dimension
-from tests.language.making import automaton, dimension, labels, told, tree
+from tests.language.making import automaton, dimension, problem_labels, problem_lines, tree
 
 UNITS = {
     "w_em": "rad/s",
@@ -27,13 +27,13 @@ UNITS = {
     "r_w": "m",
     "t": "s",
 }
-PLACE = Scope({name: dimension(unit) for name, unit in UNITS.items()})
+PLACE = NameEnvironment({name: dimension(unit) for name, unit in UNITS.items()})
 
 
 def kind(text: str) -> object:
     """Return what an expression is; None if something in it is refused."""
     problems = Problems()
-    found = DimensionCheck(PLACE, problems).kind(tree(text))
+    found = TypeChecker(PLACE, problems).infer_type(tree(text))
     return None if problems.has_errors else found
 
 
@@ -45,7 +45,7 @@ def angle(text: str) -> int | None:
 
 def fitting(text: str, unit: str) -> bool:
     problems = Problems()
-    DimensionCheck(PLACE, problems).quantity(tree(text), dimension(unit), "it")
+    TypeChecker(PLACE, problems).check_quantity(tree(text), dimension(unit), "it")
     return not problems.has_errors
 
 
@@ -123,7 +123,7 @@ def test_a_bare_number_is_no_angle_but_a_literal_converts(unit: str) -> None:
     assert kind("theta > 3") is None
     assert kind(f"theta > 3 {unit}") == "truth"
     literal = tree(f"3 {unit}")
-    assert isinstance(literal, Number)
+    assert isinstance(literal, NumberLiteral)
     assert literal.value == 3 * literal.unit.factor != 3
 
 
@@ -135,9 +135,9 @@ states: {x: {unit: m, initial: 0 m}}
 flow: {x: der(x) = 0}
 modes: {only: {}}
 """
-    assert told(lambda: automaton(text)) == ["3:67 `+` joins `deg` and `rad`"]
-    assert told(lambda: automaton(text.replace("0.1 rad", "6 deg"))) == []
-    assert told(lambda: automaton(text.replace("a + b", "a + 0.1 rad"))) == []
+    assert problem_lines(lambda: automaton(text)) == ["3:67 `+` joins `deg` and `rad`"]
+    assert problem_lines(lambda: automaton(text.replace("0.1 rad", "6 deg"))) == []
+    assert problem_lines(lambda: automaton(text.replace("a + b", "a + 0.1 rad"))) == []
 
 
 @pytest.mark.parametrize("unit", ["N*m", "rad", "degC", "m/s", "1"])
@@ -179,20 +179,23 @@ def test_degrees_celsius_below_zero_are_not_added_or_subtracted() -> None:
 
 
 def test_degrees_celsius_are_kelvins_in_an_expression() -> None:
-    assert evaluate(expression(tree("20 degC"), {}), {}) == 293.15
+    assert evaluate(lower_expression(tree("20 degC"), {}), {}) == 293.15
 
 
 def test_degrees_celsius_below_zero_are_kelvins_in_an_expression() -> None:
-    assert evaluate(expression(tree("-10 degC"), {}), {}) == 263.15
+    assert evaluate(lower_expression(tree("-10 degC"), {}), {}) == 263.15
 
 
 def test_the_hint_says_what_is_missing() -> None:
     problems = Problems()
-    check = DimensionCheck(PLACE, problems)
-    check.kind(tree("theta_b > 0.02"))
-    check.quantity(tree("w_em"), dimension("1/s"), "it")
-    assert labels(problems) == ["`>` joins `rad` and `1`", "this is in `rad/s`, `it` is in `1/s`"]
-    assert [problem.help for problem in problems.found] == [
+    check = TypeChecker(PLACE, problems)
+    check.infer_type(tree("theta_b > 0.02"))
+    check.check_quantity(tree("w_em"), dimension("1/s"), "it")
+    assert problem_labels(problems) == [
+        "`>` joins `rad` and `1`",
+        "this is in `rad/s`, `it` is in `1/s`",
+    ]
+    assert [problem.help for problem in problems.reported] == [
         "give the unit of the angle: `0.02 rad`, `3 deg`",
         "they differ in the power of the angle (rad)",
     ]

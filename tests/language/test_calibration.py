@@ -11,7 +11,7 @@ from language.load import load_automaton
 from language.project import Project, read_document
 from language.system import read_system
 from modewright import explaining
-from tests.language.making import project_of, told
+from tests.language.making import problem_lines, project_of
 
 FIT = """language: 1
 calibration: fit
@@ -95,7 +95,7 @@ def test_a_value_given_by_name_goes_before_a_calibration(tmp_path: Path) -> None
 
 def test_a_calibrated_value_says_its_file_and_line(tmp_path: Path) -> None:
     fitted(tmp_path, "driveline")
-    found = {row["path"]: row for row in explaining.explained_json("better", tmp_path)["values"]}
+    found = {row["path"]: row for row in explaining.spec_json("better", tmp_path)["values"]}
     row = found["parameters.k_hs.value"]
     assert (row["value"], row["layer"]) == ("5.2 kN*m/rad", "calibration fit")
     assert str(row["place"]).endswith("fit.yaml:8")
@@ -103,7 +103,7 @@ def test_a_calibrated_value_says_its_file_and_line(tmp_path: Path) -> None:
 
 def test_what_is_tunable_and_what_is_compiled_in_is_told(tmp_path: Path) -> None:
     fitted(tmp_path, "driveline")
-    lines = explaining.explained("fit", "model", {}, tmp_path).splitlines()
+    lines = explaining.explain_spec("fit", "model", {}, tmp_path).splitlines()
     assert lines == [
         "J_em = 0.061 kg*m^2  # tunable, std 0.002 kg*m^2, run-up, 2026-11-20",
         "k_hs = 5.2 kN*m/rad  # fixed, tip-out on the rig, 2026-11-20",
@@ -112,7 +112,7 @@ def test_what_is_tunable_and_what_is_compiled_in_is_told(tmp_path: Path) -> None
 
 def test_a_calibration_of_something_else_is_refused(tmp_path: Path) -> None:
     project = fitted(tmp_path, "driveline", of="estimator")
-    assert told(lambda: load_automaton("better", project)) == [
+    assert problem_lines(lambda: load_automaton("better", project)) == [
         "4:16 calibration `fit` is of `estimator`, not of `better`"
     ]
 
@@ -171,7 +171,7 @@ def test_a_calibration_has_values_at_points_of_a_table(tmp_path: Path) -> None:
     assert items(project, "warm", "lim") == [40, 4]
     assert items(project, "warm", "map") == [-1, -2, 3, 8]
     assert load_automaton("warm", project).parameters["lim"].kind == "tunable"
-    assert explaining.explained("tables", "model", {}, tmp_path).splitlines() == [
+    assert explaining.explain_spec("tables", "model", {}, tmp_path).splitlines() == [
         f"lim = {lim}  # tunable",
         f"map = {{points: {rows}}}  # fixed",
     ]
@@ -230,7 +230,7 @@ outputs: [most]
     )
     wrong = inner.replace("k1_lim", "k1_lin")
     project = project_of(tmp_path, inner=wrong)
-    (line,) = told(lambda: load_automaton("laid", project))
+    (line,) = problem_lines(lambda: load_automaton("laid", project))
     assert line.endswith("`host` has no parameter `k1_lin`")
 
 
@@ -255,5 +255,5 @@ outputs: [most]
 )  # fmt: skip
 def test_what_is_no_value_at_a_point(tmp_path: Path, parameters: str, label: str) -> None:
     project = tabled(tmp_path, parameters + "\n")
-    (line,) = told(lambda: load_automaton("warm", project))
+    (line,) = problem_lines(lambda: load_automaton("warm", project))
     assert line.endswith(label)

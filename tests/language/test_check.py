@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from language.load import load_automaton
-from tests.language.making import automaton, project_of, told
+from tests.language.making import automaton, problem_lines, project_of
 
 CONTINUOUS = """language: 1
 automaton: model
@@ -33,11 +33,11 @@ def sampled(folder: Path, more: str) -> list[str]:
     project = project_of(
         folder, model=CONTINUOUS.replace("MORE", ""), sampled=SAMPLED.replace("MORE", more)
     )
-    return told(lambda: load_automaton("sampled", project))
+    return problem_lines(lambda: load_automaton("sampled", project))
 
 
 def continuous(more: str) -> list[str]:
-    return told(lambda: automaton(CONTINUOUS.replace("MORE", more)))
+    return problem_lines(lambda: automaton(CONTINUOUS.replace("MORE", more)))
 
 
 @pytest.mark.parametrize("more", ["", "update: {x: 0 m}", OBSERVER.replace("F", ""), RUNS])

@@ -9,16 +9,30 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.constants import constant_value, exact_value, parameter_constants, values_of
+from language.constants import (
+    constant_values,
+    evaluate_constant,
+    evaluate_exactly,
+    parameter_constants,
+)
 from language.declaration import Formula
 from language.model import Automaton
-from language.number import rounded
+from language.number import round_to_type
 from language.operation import Assign
 from language.parameter import parameter_kinds, parameter_order
 from language.problem import Problems
 from language.program import Program, TransitionInfo
-from language.wait import MAX_TICKS
-from tests.language.making import automaton, labels, program, refusal, shipped, solved, told, tree
+from language.wait import MAX_WAIT_TICKS
+from tests.language.making import (
+    automaton,
+    load_shipped,
+    problem_labels,
+    problem_lines,
+    program,
+    raised_problems,
+    solve_constants,
+    tree,
+)
 
 TEXT = """language: 1
 automaton: clock
@@ -97,7 +111,7 @@ def test_only_what_follows_from_tunables_is_derived_anew() -> None:
 
 
 def test_the_shipped_inertia_is_that_of_the_formula() -> None:
-    made = shipped("driveline", m="1800 kg", r_w="31.83 cm")
+    made = load_shipped("driveline", m="1800 kg", r_w="31.83 cm")
     found = parameter_constants(made, Problems())["J_v"].value
     assert found == pytest.approx(1800 * 0.3183**2 + 4 * 0.7, rel=1e-15)
 
@@ -114,7 +128,7 @@ def test_values_that_follow_from_each_other_are_refused(
     derived: dict[str, str], circle: str
 ) -> None:
     lines = "\n".join(f'  {name}: {{derived: {text}, unit: "1"}}' for name, text in derived.items())
-    (problem,) = refusal(lambda: automaton(clock(lines)))
+    (problem,) = raised_problems(lambda: automaton(clock(lines)))
     assert problem.label == f"`derived` values in a circle: {circle}"
 
 
@@ -135,24 +149,26 @@ def test_values_that_follow_from_each_other_are_refused(
     ],
 )
 def test_a_parameter_that_contradicts_itself_is_refused(parameters: str, label: str) -> None:
-    assert label in [line.partition(" ")[2] for line in told(lambda: automaton(clock(parameters)))]
+    assert label in [
+        line.partition(" ")[2] for line in problem_lines(lambda: automaton(clock(parameters)))
+    ]
 
 
 def test_a_value_that_is_not_finite_is_told_with_its_name() -> None:
     made = automaton(clock("  a: {value: 0}\n  b: {derived: 1 / a}"))
     problems = Problems()
     assert parameter_constants(made, problems)["b"].value == 0
-    assert labels(problems) == ["parameter `b` is inf, not finite"]
+    assert problem_labels(problems) == ["parameter `b` is inf, not finite"]
 
 
 @pytest.mark.parametrize("value", ["9.9e308", "1.0e308 km", "9" * 400])
 def test_a_value_past_the_largest_double_is_a_problem(value: str) -> None:
-    assert refusal(lambda: program(clock(f"  a: {{value: {value}}}")))
+    assert raised_problems(lambda: program(clock(f"  a: {{value: {value}}}")))
 
 
 @given(st.fractions(-10, 10, max_denominator=10**9))
 def test_a_value_is_rounded_once_from_its_exact_value(exact: Fraction) -> None:
-    assert rounded(exact) == float(exact)
+    assert round_to_type(exact) == float(exact)
 
 
 # Formulas of parameters.
@@ -164,16 +180,18 @@ def formula(text: str) -> Formula:
 
 def test_a_constant_is_a_formula_of_parameters() -> None:
     made = automaton(clock(CHAIN))
-    values = values_of(parameter_constants(made, Problems()))
-    assert constant_value(formula("sqrt(c) + t"), made, values, "A") == math.sqrt(18) + 5
-    (problem,) = refusal(lambda: constant_value(formula("c + x"), made, values, "A"))
+    values = constant_values(parameter_constants(made, Problems()))
+    assert evaluate_constant(formula("sqrt(c) + t"), made, values, "A") == math.sqrt(18) + 5
+    (problem,) = raised_problems(lambda: evaluate_constant(formula("c + x"), made, values, "A"))
     assert problem.label == "`x` is not a parameter: A is made of parameters"
-    (problem,) = refusal(lambda: constant_value(formula("1 / (a - a)"), made, values, "A"))
+    (problem,) = raised_problems(
+        lambda: evaluate_constant(formula("1 / (a - a)"), made, values, "A")
+    )
     assert problem.label == "this is inf, not a finite number"
 
 
 def exact(text: str, made: Automaton) -> Fraction:
-    return exact_value(formula(text), made)
+    return evaluate_exactly(formula(text), made)
 
 
 def test_a_time_is_exact() -> None:
@@ -187,7 +205,7 @@ def test_a_time_is_exact() -> None:
 @pytest.mark.parametrize("text", ["max(t1, 0)", "if t1 > 0 then t1 else 0", "t1 / (t1 - t1)", "x"])
 def test_what_cannot_be_exact_is_no_time(text: str) -> None:
     made = automaton(clock("  t1: {value: 0.1 ms}"))
-    (problem,) = refusal(lambda: exact(text, made))
+    (problem,) = raised_problems(lambda: exact(text, made))
     assert problem.label == "a time is made of numbers, parameters and + - * /"
 
 
@@ -226,9 +244,9 @@ def test_a_wait_of_a_continuous_automaton_has_no_ticks_but_a_timer() -> None:
 
 
 def test_the_longest_wait_fits_its_counter() -> None:
-    assert waiting(program(clock(wait=f"{MAX_TICKS} ms"))).ticks == MAX_TICKS == 2**16 - 2
-    (line,) = told(lambda: program(clock(wait=f"{MAX_TICKS + 1} ms")))
-    assert line.endswith(f"a wait of {MAX_TICKS + 1} ticks is longer than {MAX_TICKS}")
+    assert waiting(program(clock(wait=f"{MAX_WAIT_TICKS} ms"))).ticks == MAX_WAIT_TICKS == 2**16 - 2
+    (line,) = problem_lines(lambda: program(clock(wait=f"{MAX_WAIT_TICKS + 1} ms")))
+    assert line.endswith(f"a wait of {MAX_WAIT_TICKS + 1} ticks is longer than {MAX_WAIT_TICKS}")
 
 
 @pytest.mark.parametrize(
@@ -243,7 +261,7 @@ def test_the_longest_wait_fits_its_counter() -> None:
 )
 def test_what_is_no_fixed_time_is_no_wait(wait: str, label: str) -> None:
     parameters = "  t_c: {value: 1 ms, tunable: true}\n  t_d: {derived: 2 * t_c, unit: s}"
-    (problem,) = refusal(lambda: program(clock(parameters, wait=wait)))
+    (problem,) = raised_problems(lambda: program(clock(parameters, wait=wait)))
     assert problem.label == label
 
 
@@ -253,7 +271,9 @@ def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
     (constant,) = (c for c in found.constants if c.kind == "tunable")
     assert (constant.name, constant.value, constant.type) == ("calibration.t_c", 30, "whole")
     assert (constant.range, constant.unit) == ((10, 50), "tick")
-    assert waiting(found).tunable == "calibration.t_c" and waiting(found).most == 2**16 - 1
+    assert (
+        waiting(found).tunable_wait == "calibration.t_c" and waiting(found).timer_limit == 2**16 - 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -268,13 +288,13 @@ def test_a_tunable_wait_has_whole_ticks_within_its_range(
     value: str, limits: str, label: str
 ) -> None:
     parameters = f"  t_c: {{value: {value}, tunable: true, range: {limits}}}"
-    (problem,) = refusal(lambda: program(clock(parameters, wait="t_c")))
+    (problem,) = raised_problems(lambda: program(clock(parameters, wait="t_c")))
     assert problem.label == label
 
 
 def test_a_tunable_wait_of_a_continuous_automaton_is_none() -> None:
     parameters = "  t_c: {value: 1 ms, tunable: true}"
-    (problem,) = refusal(lambda: program(clock(parameters, wait="t_c", period="")))
+    (problem,) = raised_problems(lambda: program(clock(parameters, wait="t_c", period="")))
     assert problem.label == "`t_c` is tunable: a wait is made of fixed values"
 
 
@@ -286,4 +306,4 @@ def test_a_wait_may_follow_from_fixed_values() -> None:
 def test_a_wait_follows_the_value_that_is_set() -> None:
     text = clock("  t_a: {value: 1 ms}", wait="2 * t_a")
     assert waiting(program(text, t_a="4.5 ms")).ticks == 9
-    assert "constant.t_a" not in solved(program(text))
+    assert "constant.t_a" not in solve_constants(program(text))

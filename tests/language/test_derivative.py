@@ -5,24 +5,24 @@ from __future__ import annotations
 import mpmath
 import pytest
 
-from language.derivative import derivative
+from language.derivative import differentiate
 from language.evaluate import evaluate
-from language.lower import expression
+from language.lower import lower_expression
 from language.operation import Ref
-from language.simplify import is_one, is_zero, replaced
-from language.syntax import Name, Tree, names
-from tests.language.making import refusal, tree
+from language.simplify import is_one, is_zero, substitute_names
+from language.syntax import Name, SyntaxTree, names
+from tests.language.making import raised_problems, tree
 
 NAMES = {name: Ref(name) for name in ("x", "z")}
 Z = 0.7
 
 
-def value(expr: Tree, x: float) -> float:
-    return float(evaluate(expression(expr, NAMES), {"x": x, "z": Z}))
+def value(expr: SyntaxTree, x: float) -> float:
+    return float(evaluate(lower_expression(expr, NAMES), {"x": x, "z": Z}))
 
 
 def slope(text: str, x: float) -> float:
-    return value(derivative(tree(text), "x", lambda part: value(part, x)), x)
+    return value(differentiate(tree(text), "x", lambda part: value(part, x)), x)
 
 
 SMOOTH = [
@@ -73,7 +73,7 @@ def test_simple_derivatives_are_exact(text: str, expected: float) -> None:
 
 @pytest.mark.parametrize("text", ["z", "z * z", "5", "sin(z)", "if z > 0 then 1 else 2"])
 def test_what_does_not_read_the_name_has_the_derivative_zero(text: str) -> None:
-    assert is_zero(derivative(tree(text), "x", lambda part: 0.0))
+    assert is_zero(differentiate(tree(text), "x", lambda part: 0.0))
 
 
 @pytest.mark.parametrize(
@@ -89,19 +89,19 @@ def test_what_does_not_read_the_name_has_the_derivative_zero(text: str) -> None:
     ],
 )
 def test_a_corner_at_the_point_is_refused(text: str) -> None:
-    (problem,) = refusal(lambda: slope(text, 0.0))
+    (problem,) = raised_problems(lambda: slope(text, 0.0))
     assert "no derivative there" in problem.label
-    assert not refusal(lambda: slope(text, 0.5))
+    assert not raised_problems(lambda: slope(text, 0.5))
 
 
 def test_a_function_without_a_derivative_is_refused() -> None:
-    (problem,) = refusal(lambda: slope("delay(x, 1)", 0.5))
+    (problem,) = raised_problems(lambda: slope("delay(x, 1)", 0.5))
     assert problem.label == "`delay` has no derivative here"
 
 
 def test_what_is_exactly_zero_or_one_is_left_out() -> None:
-    assert is_one(derivative(tree("z + x - 3"), "x", lambda part: 0.0))
-    twice = derivative(tree("z * x"), "x", lambda part: 0.0)
+    assert is_one(differentiate(tree("z + x - 3"), "x", lambda part: 0.0))
+    twice = differentiate(tree("z * x"), "x", lambda part: 0.0)
     assert isinstance(twice, Name) and twice.path == "z"
-    assert is_zero(replaced(tree("z * (x - x) + 0 / z"), {}))
-    assert [name.path for name in names(replaced(tree("x * z"), {"x": tree("1")}))] == ["z"]
+    assert is_zero(substitute_names(tree("z * (x - x) + 0 / z"), {}))
+    assert [name.path for name in names(substitute_names(tree("x * z"), {"x": tree("1")}))] == ["z"]

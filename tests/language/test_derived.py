@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.load import lowered, program_of
+from language.load import lower_automaton, program_of
 from language.program import Program
-from tests.language.making import program, project_of, shipped, solved, told
+from tests.language.making import load_shipped, problem_lines, program, project_of, solve_constants
 
 MODEL = """language: 1
 automaton: m
@@ -93,9 +93,9 @@ def test_a_measured_equation_is_read_with_what_remains_of_it(tmp_path: Path) -> 
 
 
 def test_the_estimator_has_the_numbers_of_the_written_one() -> None:
-    taken, written = (lowered(shipped(n)) for n in ("estimator", "estimator_written"))
+    taken, written = (lower_automaton(load_shipped(n)) for n in ("estimator", "estimator_written"))
     ours, theirs = (
-        {k: v for k, v in solved(p).items() if "_lin" not in k} for p in (taken, written)
+        {k: v for k, v in solve_constants(p).items() if "_lin" not in k} for p in (taken, written)
     )
     numbers = [name for name in theirs if name.startswith("solved.")]
     more = ["solved.drive_f_constant.w_w", "solved.coast_f_constant.w_w"]
@@ -110,7 +110,7 @@ def test_the_estimator_has_the_numbers_of_the_written_one() -> None:
 def test_what_remains_is_that_of_the_written_estimator(mode: str) -> None:
     found = []
     for name in ("estimator", "estimator_written"):
-        inside = Interpreter(program_of(shipped(name)))
+        inside = Interpreter(program_of(load_shipped(name)))
         inside.run("step")
         inside.set("state.theta_b", 0.0123)
         inside.run(f"predict_{mode}")
@@ -119,30 +119,30 @@ def test_what_remains_is_that_of_the_written_estimator(mode: str) -> None:
 
 
 def test_a_point_that_is_missing_is_asked_for(tmp_path: Path) -> None:
-    (line,) = told(lambda: made(tmp_path, ("      at: {v: 1.5}\n", "")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("      at: {v: 1.5}\n", "")))
     assert line.endswith("A has no constant entry v, v: it depends on `v`")
 
 
 def test_a_point_is_made_of_parameters(tmp_path: Path) -> None:
-    (line,) = told(lambda: made(tmp_path, ("at: {v: 1.5}", "at: {v: z}")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("at: {v: 1.5}", "at: {v: z}")))
     assert line.endswith("A has no constant entry v, v: it depends on `z`")
     made(tmp_path, ("at: {v: 1.5}", "at: {v: p, x: z}"))
 
 
 def test_a_state_that_is_left_out_stands_still(tmp_path: Path) -> None:
-    (line,) = told(lambda: made(tmp_path, ("of: m.still", "of: m.moves")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("of: m.still", "of: m.moves")))
     assert "`z` moves in `m.moves`" in line
 
 
 def test_what_a_balance_reads_has_a_value_here(tmp_path: Path) -> None:
-    (line,) = told(lambda: made(tmp_path, ("  z: {initial: 0.5}\n", "")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("  z: {initial: 0.5}\n", "")))
     assert line.endswith("the balance of `v` reads `z`, which has no value here")
-    (line,) = told(lambda: made(tmp_path, ("u: {unit: 1/s}, ", "")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("u: {unit: 1/s}, ", "")))
     assert line.endswith("the balance of `v` reads `u`, which has no value here")
 
 
 def test_matrices_are_taken_from_the_model_or_written_not_both(tmp_path: Path) -> None:
-    lines = told(lambda: made(tmp_path, ("of: m.still", "of: m.still\n      f: {x: c}")))
+    lines = problem_lines(lambda: made(tmp_path, ("of: m.still", "of: m.still\n      f: {x: c}")))
     assert [line.partition(" ")[2] for line in lines] == [
         "`f` is taken from the model: `of` stands beside it"
     ]
@@ -154,14 +154,14 @@ def test_the_branch_taken_at_the_point_is_differentiated(tmp_path: Path) -> None
     assert info.a[1][1] == -(0.5 + 3) / 2
     (info,) = made(tmp_path, ("at: {v: 1.5}", "at: {v: 0.5}"), model=bent).observers
     assert info.a[1][1] == -(0.5 + 0.5) / 2
-    (line,) = told(lambda: made(tmp_path, ("at: {v: 1.5}", "at: {v: 1}"), model=bent))
+    (line,) = problem_lines(lambda: made(tmp_path, ("at: {v: 1.5}", "at: {v: 1}"), model=bent))
     assert "no derivative there" in line
-    (line,) = told(lambda: made(tmp_path, ("      at: {v: 1.5}\n", ""), model=bent))
+    (line,) = problem_lines(lambda: made(tmp_path, ("      at: {v: 1.5}\n", ""), model=bent))
     assert line.endswith("`v` decides which branch is taken")
 
 
 def test_a_measure_is_of_one_unit(tmp_path: Path) -> None:
-    lines = told(lambda: made(tmp_path, ("y_p: pull", "y_p: x")))
+    lines = problem_lines(lambda: made(tmp_path, ("y_p: pull", "y_p: x")))
     assert any("`y_p` is in `1/s`" in line for line in lines)
-    (line,) = told(lambda: made(tmp_path, ("y_p: pull", "y_p: puII")))
+    (line,) = problem_lines(lambda: made(tmp_path, ("y_p: pull", "y_p: puII")))
     assert "`y_p` measures `puII`" in line

@@ -7,26 +7,37 @@ import math
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from language.dimension import DimensionCheck
+from language.dimension import TypeChecker
 from language.evaluate import evaluate
-from language.kind import Kind
-from language.lower import expression
+from language.kind import ExprType
+from language.lower import lower_expression
 from language.operation import Expr, Value
 from language.problem import Problems
-from language.scope import Scope
-from language.syntax import Application, Arithmetic, Choice, Name, Negative, Power, Relation, Tree
+from language.scope import NameEnvironment
+from language.syntax import (
+    Arithmetic,
+    Conditional,
+    FunctionCall,
+    Name,
+    Negation,
+    Power,
+    Relation,
+    SyntaxTree,
+)
 from language.units import Dimension
-from tests.language.making import NOWHERE, automaton, dimension, told, tree
+from tests.language.making import NOWHERE, automaton, dimension, problem_lines, tree
 
 UNITS = {"x": "m", "v": "m/s", "m": "kg", "F": "N", "t": "s", "c": "1", "i": "A", "Tk": "K"}
-NAMES: dict[str, Kind] = {name: dimension(unit) for name, unit in UNITS.items()}
-SCOPE = Scope({**NAMES, "flag": "truth", "broken": None}, frozenset({"plant.on"}), "in a test")
+NAMES: dict[str, ExprType] = {name: dimension(unit) for name, unit in UNITS.items()}
+SCOPE = NameEnvironment(
+    {**NAMES, "flag": "truth", "broken": None}, frozenset({"plant.on"}), "in a test"
+)
 
 
-def checked(text: str) -> tuple[Kind | None, list[str]]:
+def checked(text: str) -> tuple[ExprType | None, list[str]]:
     problems = Problems()
-    kind = DimensionCheck(SCOPE, problems).kind(tree(text))
-    return kind, [f"{problem.span.column} {problem.label}" for problem in problems.found]
+    kind = TypeChecker(SCOPE, problems).infer_type(tree(text))
+    return kind, [f"{problem.span.column} {problem.label}" for problem in problems.reported]
 
 
 @pytest.mark.parametrize(
@@ -120,9 +131,9 @@ def test_a_mistake_that_was_told_is_not_told_again_further_out() -> None:
 
 def test_the_nearest_name_is_proposed() -> None:
     problems = Problems()
-    check = DimensionCheck(Scope({"theta_d": dimension("rad")}), problems)
-    check.kind(tree("theta_D + mex(theta_d, 0)"))
-    hints = [problem.help for problem in problems.found]
+    check = TypeChecker(NameEnvironment({"theta_d": dimension("rad")}), problems)
+    check.infer_type(tree("theta_D + mex(theta_d, 0)"))
+    hints = [problem.help for problem in problems.reported]
     assert hints == ["did you mean `theta_d`?", "did you mean `max`?"]
 
 
@@ -141,12 +152,12 @@ POWERS = (2.0, 3.0, 5.0, 7.0, 11.0)
 VALUES = {name: 0.6 + 0.35 * place for place, name in enumerate(UNITS)}
 
 
-def larger(kind: Kind | None) -> float:
+def larger(kind: ExprType | None) -> float:
     assert isinstance(kind, Dimension)
     return math.prod(p**k for p, k in zip(POWERS, kind.powers, strict=True))
 
 
-def composed(parts: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+def composed(parts: st.SearchStrategy[SyntaxTree]) -> st.SearchStrategy[SyntaxTree]:
     at = st.just(NOWHERE)
     some = st.one_of(parts, parts.map(lambda x: Arithmetic("*", x, x, NOWHERE)))
     pair = st.one_of(parts.map(lambda x: (x, x)), st.tuples(some, parts)).map(tuple)
@@ -154,12 +165,12 @@ def composed(parts: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
     return st.one_of(
         st.builds(Arithmetic, st.sampled_from(["*", "/"]), parts, parts, at),
         st.builds(Arithmetic, st.sampled_from(["+", "-"]), parts, parts, at),
-        st.builds(Negative, parts, at),
+        st.builds(Negation, parts, at),
         st.builds(Power, parts, st.integers(-3, 3), at),
-        st.builds(Application, st.sampled_from(["min", "max"]), pair, at),
-        st.builds(lambda x: Application("abs", (x,), NOWHERE), parts),
-        st.builds(lambda x: Application("sqrt", (x,), NOWHERE), some),
-        st.builds(Choice, condition, parts, parts, at),
+        st.builds(FunctionCall, st.sampled_from(["min", "max"]), pair, at),
+        st.builds(lambda x: FunctionCall("abs", (x,), NOWHERE), parts),
+        st.builds(lambda x: FunctionCall("sqrt", (x,), NOWHERE), some),
+        st.builds(Conditional, condition, parts, parts, at),
     )
 
 
@@ -168,15 +179,15 @@ quantities = st.recursive(
 )
 
 
-def worth(part: Tree, factors: dict[str, float]) -> float:
+def worth(part: SyntaxTree, factors: dict[str, float]) -> float:
     known: dict[str, Expr] = {n: Value(VALUES[n] * factors[n]) for n in UNITS}
-    return float(evaluate(expression(part, known), {}))
+    return float(evaluate(lower_expression(part, known), {}))
 
 
 @given(quantities)
-def test_an_accepted_expression_scales_as_its_dimension_says(part: Tree) -> None:
+def test_an_accepted_expression_scales_as_its_dimension_says(part: SyntaxTree) -> None:
     problems = Problems()
-    kind = DimensionCheck(Scope(NAMES), problems).kind(part)
+    kind = TypeChecker(NameEnvironment(NAMES), problems).infer_type(part)
     assume(not problems.has_errors)
     before = worth(part, dict.fromkeys(UNITS, 1.0))
     after = worth(part, {name: larger(NAMES[name]) for name in UNITS})
@@ -203,7 +214,7 @@ def fall(
     equations: str = "", balance: str = "der(v) = -g", up: str = "", down: str = ""
 ) -> list[str]:
     text = FALL.format(equations=equations, balance=balance, up=up, down=down)
-    return [line.partition(" ")[2] for line in told(lambda: automaton(text))]
+    return [line.partition(" ")[2] for line in problem_lines(lambda: automaton(text))]
 
 
 @pytest.mark.parametrize("balance", ["m * der(v) = -m * g", "der(v) * m = -m * g", "der(v) = 0"])

@@ -7,26 +7,26 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import MAX_BYTES, Items, Scalar, Table, read_text
+from language.document import MAX_BYTES, MappingNode, ScalarNode, SequenceNode, read_text
 from language.problem import Source
-from language.yaml_tree import MAX_DEPTH, parse
-from tests.language.making import automaton, refusal, told
+from language.yaml_tree import MAX_DEPTH, parse_yaml
+from tests.language.making import automaton, problem_lines, raised_problems
 
 
-def read(text: str) -> Table:
-    return parse(Source("here", tuple(text.splitlines())), text)
+def read(text: str) -> MappingNode:
+    return parse_yaml(Source("here", tuple(text.splitlines())), text)
 
 
 def complaints(text: str) -> list[str]:
-    return told(lambda: read(text))
+    return problem_lines(lambda: read(text))
 
 
-def leaf(table: Table, *keys: str) -> Scalar:
+def leaf(table: MappingNode, *keys: str) -> ScalarNode:
     node: object = table
     for key in keys:
-        assert isinstance(node, Table)
+        assert isinstance(node, MappingNode)
         node = node.get(key)
-    assert isinstance(node, Scalar)
+    assert isinstance(node, ScalarNode)
     return node
 
 
@@ -70,8 +70,8 @@ def test_a_key_without_a_value_holds_an_empty_text() -> None:
 
 def test_an_empty_mapping_and_list_are_no_scalars() -> None:
     table = read("a: {}\nb: []\n")
-    assert isinstance(table.get("a"), Table)
-    assert isinstance(table.get("b"), Items)
+    assert isinstance(table.get("a"), MappingNode)
+    assert isinstance(table.get("b"), SequenceNode)
     assert table.get("c") is None
 
 
@@ -103,9 +103,9 @@ def test_every_node_knows_its_place() -> None:
     assert (entry.span.line, entry.span.column, entry.span.width) == (2, 1, 2)
     inner = leaf(table, "bc", "d")
     assert (inner.span.line, inner.span.column, inner.span.width) == (2, 9, 3)
-    assert isinstance(entry.node, Table)
+    assert isinstance(entry.node, MappingNode)
     items = entry.node.get("e")
-    assert isinstance(items, Items)
+    assert isinstance(items, SequenceNode)
     assert [node.span.column for node in items.nodes] == [18, 21]
 
 
@@ -133,13 +133,13 @@ def test_a_quoted_text_stands_where_its_span_says(entries: dict[str, str]) -> No
     table = read("\n".join(lines))
     for entry, line in zip(table, lines, strict=True):
         node = entry.node
-        assert isinstance(node, Scalar)
+        assert isinstance(node, ScalarNode)
         column = node.text_span.column - 1
         assert line[column : column + len(node.text)] == node.text
 
 
 def test_a_duplicate_key_names_the_first_place() -> None:
-    (problem,) = refusal(lambda: read("a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n"))
+    (problem,) = raised_problems(lambda: read("a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n"))
     assert (problem.span.line, problem.span.column, problem.label) == (5, 3, "`c` is given twice")
     assert problem.help == "it is given first at here:3:3"
 
@@ -150,7 +150,7 @@ def test_a_duplicate_key_is_refused_however_it_is_written(text: str) -> None:
 
 
 def test_a_key_given_three_times_is_told_twice() -> None:
-    problems = refusal(lambda: read("a: 1\na: 2\na: 3\n"))
+    problems = raised_problems(lambda: read("a: 1\na: 2\na: 3\n"))
     assert [problem.help for problem in problems] == ["it is given first at here:1:1"] * 2
 
 
@@ -180,7 +180,7 @@ def test_an_anchor_and_its_alias_are_both_told() -> None:
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "---\n"])
 def test_an_empty_file_is_told_what_it_starts_with(text: str) -> None:
-    problems = refusal(lambda: read(text))
+    problems = raised_problems(lambda: read(text))
     assert [problem.label for problem in problems] in (
         ["the file is empty"],
         ["a spec is a mapping that starts with `language: 1`"],
@@ -205,7 +205,7 @@ def test_a_file_that_is_no_mapping_is_refused(text: str) -> None:
     ],
 )
 def test_what_is_no_yaml_is_a_problem_with_a_place(text: str) -> None:
-    (problem,) = refusal(lambda: read(text))
+    (problem,) = raised_problems(lambda: read(text))
     assert problem.label.startswith("this is not YAML: ")
     assert problem.span.line >= 1
 
@@ -218,9 +218,9 @@ def test_nesting_is_read_up_to_a_depth_and_refused_beyond(pair: str) -> None:
         return "a: " + opening * (depth - 1) + "1" + pair[1] * (depth - 1)
 
     assert complaints(nested(MAX_DEPTH)) == []
-    (problem,) = refusal(lambda: read(nested(MAX_DEPTH + 1)))
+    (problem,) = raised_problems(lambda: read(nested(MAX_DEPTH + 1)))
     assert problem.label == f"nested deeper than {MAX_DEPTH} levels"
-    assert refusal(lambda: read(nested(100 * MAX_DEPTH)))
+    assert raised_problems(lambda: read(nested(100 * MAX_DEPTH)))
 
 
 def test_indented_blocks_are_counted_too() -> None:
@@ -234,7 +234,7 @@ def test_a_byte_order_mark_is_no_character(tmp_path: Path) -> None:
     path.write_bytes(b"\xef\xbb\xbflanguage: 1\n")
     source, text = read_text(path, "a.yaml")
     assert source.lines == ("language: 1",)
-    assert parse(source, text).entries["language"].span.column == 1
+    assert parse_yaml(source, text).entries["language"].span.column == 1
 
 
 def test_windows_line_ends_are_read() -> None:
@@ -247,26 +247,26 @@ def test_windows_line_ends_are_read() -> None:
 def test_a_binary_file_is_refused_at_its_line(tmp_path: Path, data: bytes, line: int) -> None:
     path = tmp_path / "a.yaml"
     path.write_bytes(data)
-    (problem,) = refusal(lambda: read_text(path))
+    (problem,) = raised_problems(lambda: read_text(path))
     assert (problem.span.line, problem.label) == (line, "this is not UTF-8 text")
 
 
 def test_a_file_that_cannot_be_read_is_a_problem(tmp_path: Path) -> None:
-    assert told(lambda: read_text(tmp_path / "none.yaml"))[0].startswith(
+    assert problem_lines(lambda: read_text(tmp_path / "none.yaml"))[0].startswith(
         "1:1 the file cannot be read"
     )
-    assert told(lambda: read_text(tmp_path))[0].startswith("1:1 the file cannot be read")
+    assert problem_lines(lambda: read_text(tmp_path))[0].startswith("1:1 the file cannot be read")
 
 
 def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     path.write_bytes(b"#" * (MAX_BYTES + 1))
-    (problem,) = refusal(lambda: read_text(path))
+    (problem,) = raised_problems(lambda: read_text(path))
     assert problem.label.startswith(f"the file has {MAX_BYTES + 1} bytes")
 
 
 def test_a_comma_in_braces_is_explained() -> None:
     states = "states: {x: {unit: m, initial: max(1 m, 2 m)}}"
     text = f"language: 1\nautomaton: a\n{states}\nmodes: {{o: {{}}}}\n"
-    problems = refusal(lambda: automaton(text))
+    problems = raised_problems(lambda: automaton(text))
     assert [problem.help for problem in problems] == ['quote it: `initial: "max(1 m, 2 m)"`']

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from language.eigen import eigenvalues, governing_entry
+from language.eigen import dominant_entry, eigenvalues
 from language.matrix import Matrix
 
 ROUNDING = 1e-13
@@ -63,5 +63,5 @@ def test_the_governing_entry_moves_the_eigenvalue_most_when_all_change_by_a_perc
             changed = a.copy()
             changed[i, j] *= 1.0 + 1e-6
             moved[i, j] = min(abs(other - value) for other in np.linalg.eigvals(changed))
-    best = governing_entry(rows(a), value)
+    best = dominant_entry(rows(a), value)
     assert moved[best] == pytest.approx(max(moved.values()), rel=1e-3)

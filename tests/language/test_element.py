@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from language.printing import block_lines, program_text
-from tests.language.making import automaton, program, stepper, told
+from language.printing import block_lines, format_program
+from tests.language.making import automaton, problem_lines, program, stepper
 
 CART = """language: 1
 automaton: cart
@@ -66,12 +66,12 @@ def test_terms_of_a_mode_come_after_those_of_the_root() -> None:
     ],
 )
 def test_what_is_wrong_with_them_is_told(more: str, line: str) -> None:
-    assert any(found.endswith(line) for found in told(lambda: automaton(cart(more=more))))
+    assert any(found.endswith(line) for found in problem_lines(lambda: automaton(cart(more=more))))
 
 
 def test_elements_and_places_have_no_influence() -> None:
     more = ELEMENTS + "\nplaces: {v: {weight: 9 N}, F: {angle_rate: v}}"
-    assert program_text(program(cart(more=more))) == program_text(program(cart()))
+    assert format_program(program(cart(more=more))) == format_program(program(cart()))
     made = automaton(cart(more=more))
     assert made.elements["spring"].kind == "elastic"
     assert set(made.elements["spring"].parts) == {"twist", "rate", "torque", "stiffness"}
@@ -90,7 +90,7 @@ def test_an_output_may_read_something_else() -> None:
 
 
 def test_an_output_that_reads_nothing_known_is_told() -> None:
-    lines = told(lambda: automaton(cart(outputs="{place: xx}")))
+    lines = problem_lines(lambda: automaton(cart(outputs="{place: xx}")))
     assert [line.partition(" ")[2] for line in lines] == [
         "output `xx` is not a state, an equation or `mode`"
     ]
@@ -112,6 +112,6 @@ def test_a_parameter_may_say_how_it_is_fitted() -> None:
     ],
 )
 def test_what_is_wrong_with_a_fitting_is_told(old: str, new: str, line: str) -> None:
-    assert [t.partition(" ")[2] for t in told(lambda: automaton(cart().replace(old, new)))] == [
-        line
-    ]
+    assert [
+        t.partition(" ")[2] for t in problem_lines(lambda: automaton(cart().replace(old, new)))
+    ] == [line]

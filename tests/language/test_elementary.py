@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from language.functions import FUNCTIONS
-from tests.language.computing import PYTHON, around, bits, error, stated
+from tests.language.computing import PYTHON, bits, neighbours_of, stated_error, ulp_error
 
 POINTS = 50_000
 BOUNDS = {
@@ -38,7 +38,7 @@ def anywhere(name: str, draw: random.Random) -> float:
     choice = draw.randrange(4)
     if name == "log":
         power = draw.uniform(-1022.0, 1023.9) if choice else draw.uniform(-0.6, 0.6)
-        near = around(math.ldexp(1.0, draw.randrange(-1021, 1024)), 3)
+        near = neighbours_of(math.ldexp(1.0, draw.randrange(-1021, 1024)), 3)
         return math.exp2(power) if choice < 3 else draw.choice(near)
     if choice == 0:
         return draw.uniform(low, high)
@@ -51,7 +51,7 @@ def anywhere(name: str, draw: random.Random) -> float:
     if name == "tanh":
         return draw.choice((-1.0, 1.0)) * draw.uniform(*((0.45, 0.625), (0.625, 0.75))[choice - 2])
     if choice == 2:
-        return draw.choice(around(draw.randrange(-63_661, 63_662) * (math.pi / 2), 1))
+        return draw.choice(neighbours_of(draw.randrange(-63_661, 63_662) * (math.pi / 2), 1))
     return (draw.randrange(-63_661, 63_661) + 0.5) * (math.pi / 2) + draw.uniform(-0.02, 0.02)
 
 
@@ -61,7 +61,7 @@ def specials(name: str) -> list[float]:
     tiny = [0.0, 5e-324, 1e-310, 2.0**-1022, 1e-200, 2.0**-54, 2.0**-27, 2.0**-26]
     some = [0.625, 1.0, WORST_ANGLE, math.log(2.0), 1.5 * math.log(2.0), 19.07, *tiny]
     some += [n * (math.pi / 4) for n in (*range(1, 65), 1000, 4095, 4096, 65535, 127_322, 127_323)]
-    near = [y for x in (*some, high) for y in around(x)]
+    near = [y for x in (*some, high) for y in neighbours_of(x)]
     return [x for y in near for x in (y, -y) if low <= x <= high] + [low]
 
 
@@ -70,8 +70,8 @@ def specials(name: str) -> list[float]:
 def test_error_is_as_stated(name: str) -> None:
     draw = random.Random(f"elementary {name}")
     arguments = [anywhere(name, draw) for _ in range(POINTS)] + specials(name)
-    worst = max(arguments, key=lambda x: error(name, x))
-    assert error(name, worst) < stated(FUNCTIONS[name]), worst
+    worst = max(arguments, key=lambda x: ulp_error(name, x))
+    assert ulp_error(name, worst) < stated_error(FUNCTIONS[name]), worst
 
 
 @settings(derandomize=True, deadline=None, max_examples=300)
@@ -88,7 +88,7 @@ def test_any_argument(x: float, name: str) -> None:
     assert math.isfinite(result)
     assert bits(result) == bits(PYTHON[name](clamped))
     with mpmath.workdps(60):
-        assert error(name, clamped) < stated(FUNCTIONS[name])
+        assert ulp_error(name, clamped) < stated_error(FUNCTIONS[name])
 
 
 @settings(derandomize=True, deadline=None, max_examples=1000)
@@ -138,13 +138,13 @@ def test_exact_values() -> None:
 def test_log_grows_with_its_argument() -> None:
     draw = random.Random("log grows")
     for x in (anywhere("log", draw) for _ in range(2000)):
-        values = [PYTHON["log"](y) for y in sorted(y for y in around(x, 2) if y > 0.0)]
+        values = [PYTHON["log"](y) for y in sorted(y for y in neighbours_of(x, 2) if y > 0.0)]
         assert values == sorted(values)
 
 
 def test_monotone_near_the_clamps() -> None:
     def values(name: str, x: float) -> list[float]:
-        return [PYTHON[name](y) for y in around(x, 400)]
+        return [PYTHON[name](y) for y in neighbours_of(x, 400)]
 
     for x in BOUNDS["exp"]:
         assert values("exp", x) == sorted(values("exp", x))
@@ -158,6 +158,6 @@ def test_monotone_near_the_clamps() -> None:
 
 def test_within_minus_one_and_one() -> None:
     for n in range(-63_661, 63_662, 7):
-        for x in around(n * (math.pi / 2), 1):
+        for x in neighbours_of(n * (math.pi / 2), 1):
             assert abs(PYTHON["sin"](x)) <= 1.0
             assert abs(PYTHON["cos"](x)) <= 1.0

@@ -22,7 +22,7 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import short
+from language.program import unqualified_name
 from tests.language.computing import polynomial
 from tests.language.test_elementary import WORST_ANGLE
 
@@ -67,7 +67,9 @@ def test_form(name: str) -> None:
         assert op.target not in known
         known.append(op.target)
     assert known[-1] == "work.y"
-    assert FUNCTIONS[name].locals == tuple(short(name) for name in known[len(parameters) :])
+    assert FUNCTIONS[name].locals == tuple(
+        unqualified_name(name) for name in known[len(parameters) :]
+    )
 
 
 def values_of(*literals: Value) -> list[Fraction]:
@@ -76,9 +78,9 @@ def values_of(*literals: Value) -> list[Fraction]:
 
 def test_reduction_constants() -> None:
     """The parts are the constants; the products of the leading parts are exact."""
-    first, second, third = values_of(*elementary.QUARTER)
+    first, second, third = values_of(*elementary.HALF_PI_PARTS)
     assert (first * 2**36).denominator == (second * 2**72).denominator == 1
-    rest = mpmath.pi / 2 - sum(mpmath.mpf(part.value) for part in elementary.QUARTER)
+    rest = mpmath.pi / 2 - sum(mpmath.mpf(part.value) for part in elementary.HALF_PI_PARTS)
     assert abs(rest) < mpmath.mpf(2) ** -127
     for part in (first, second):
         assert (part.numerator * 63_662).bit_length() <= 53
@@ -115,18 +117,20 @@ def test_lambert_coefficients() -> None:
         padded = top + [Fraction(0)] * (size - len(top))
         top, bottom = [odd * a + b for a, b in zip(padded, shifted, strict=True)], padded
     numerator = bottom + [Fraction(0)] * (len(top) - len(bottom))
-    below = [Fraction(c) for c in elementary.LAMBERT_BELOW]
-    above = [Fraction(c) for c in elementary.LAMBERT_ABOVE]
+    below = [Fraction(c) for c in elementary.LAMBERT_DENOMINATOR]
+    above = [Fraction(c) for c in elementary.LAMBERT_NUMERATOR]
     assert [c for c in top if c] == below
     assert [d - n for d, n in zip(top, numerator, strict=True) if d != n] == above
     x = mpmath.mpf(0.625)
     z = x * x
-    fraction = polynomial(elementary.LAMBERT_ABOVE, z) / polynomial(elementary.LAMBERT_BELOW, z)
+    fraction = polynomial(elementary.LAMBERT_NUMERATOR, z) / polynomial(
+        elementary.LAMBERT_DENOMINATOR, z
+    )
     assert abs(1 - z * fraction - mpmath.tanh(x) / x) < mpmath.mpf(2) ** -56.9
 
 
 @pytest.mark.parametrize(
-    ("series", "bits"), [(logarithm.SERIES, 59.4), (logarithm.SERIES_SINGLE, 30.2)]
+    ("series", "bits"), [(logarithm.LOG_SERIES, 59.4), (logarithm.LOG_SERIES_FLOAT32, 30.2)]
 )
 def test_logarithm_series_error(series: tuple[float, ...], bits: float) -> None:
     for i in range(1, 401):
@@ -154,6 +158,6 @@ def test_bases_of_the_arc_tangent() -> None:
         "steep behind": lambda a: mpmath.pi / 2 + a,
     }
     for name, made in turned.items():
-        for a, (first, rest) in zip(about, tangent.BASES[name], strict=True):
+        for a, (first, rest) in zip(about, tangent.ATAN_BASES[name], strict=True):
             assert first == float(made(a))
             assert abs(made(a) - first - mpmath.mpf(rest)) < mpmath.mpf(2) ** -106

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from engine.interpreter import Interpreter
 from tests.language.flowing import Flow
-from tests.language.making import solved
+from tests.language.making import solve_constants
 
 EXACT = 1e-13
 """Relative: some ten roundings of 1.1e-16 a tick, over at most fifty ticks."""
@@ -42,7 +42,7 @@ def swung(t: float, u: float = 0.0) -> tuple[float, float]:
 @pytest.mark.parametrize("u", [0.0, 2.5])
 @pytest.mark.parametrize(("period", "count"), [("0.1 s", 50), ("0.25 s", 20), ("10 ms", 50)])
 def test_a_damped_swing_is_exact(tmp_path: Path, period: str, count: int, u: float) -> None:
-    found = swing(tmp_path).ticked(count, u, period=period)
+    found = swing(tmp_path).run_ticks(count, u, period=period)
     t = count * float(period.split()[0]) / (1000 if "ms" in period else 1)
     x, v = swung(t, u)
     scale = W * max(1.0, u)
@@ -53,7 +53,7 @@ def test_a_damped_swing_is_exact(tmp_path: Path, period: str, count: int, u: flo
 def test_a_decay_and_a_ramp_are_exact(tmp_path: Path) -> None:
     flow = "x: der(x) = -2 1/s * x, z: der(z) = 3 1/s * z, q: der(q) = 0.5 1/s * x + u"
     start = {"x": 1.0, "z": 1.0, "q": 0.0}
-    found = Flow(tmp_path, flow, start, widths={"z": 300}).ticked(8, 0.75, period="0.2 s")
+    found = Flow(tmp_path, flow, start, widths={"z": 300}).run_ticks(8, 0.75, period="0.2 s")
     t = 8 * 0.2
     expected = {
         "x": math.exp(-2 * t),
@@ -67,7 +67,7 @@ def test_two_half_steps_are_a_whole_one(tmp_path: Path) -> None:
     """E = Eh^2, F = (I + Eh) Fh: what the step to the middle is made of, seen by no affine flow."""
     pulled = SWING.replace("v * 1 1/s", "v * 1 1/s + u * 1")
     flow = Flow(tmp_path, pulled, {"x": 1.0, "v": 0.5}, parameters=PARAMETERS)
-    numbers = solved(flow.program(period="0.4 s"))
+    numbers = solve_constants(flow.program(period="0.4 s"))
 
     def of(letter: str) -> NDArray[np.float64]:
         names = [[f"solved.one_{letter}.{row}.{column}" for column in "xv"] for row in "xv"]
@@ -79,14 +79,14 @@ def test_two_half_steps_are_a_whole_one(tmp_path: Path) -> None:
 
 def test_a_state_that_follows_from_others_alone_is_not_pulled(tmp_path: Path) -> None:
     """x' = v is its row of A: nothing else moves it, so that F has no column for it."""
-    numbers = solved(swing(tmp_path).program(period="0.4 s"))
+    numbers = solve_constants(swing(tmp_path).program(period="0.4 s"))
     assert "solved.one_F.x.v" in numbers
     assert not [name for name in numbers if re.fullmatch(r"solved\.one_Fh?\.\w\.x", name)]
 
 
 def test_substeps_change_nothing_for_an_affine_flow(tmp_path: Path) -> None:
     flow = swing(tmp_path)
-    whole, parts = (flow.ticked(10, 1.0, period="0.3 s", substeps=n) for n in (1, 7))
+    whole, parts = (flow.run_ticks(10, 1.0, period="0.3 s", substeps=n) for n in (1, 7))
     assert parts == pytest.approx(whole, rel=0, abs=EXACT * W)
 
 
@@ -131,7 +131,7 @@ def test_the_flow_goes_on_in_the_mode_that_an_event_leads_to(tmp_path: Path) -> 
         after = 0.4 * count - turn
         expected = 0.3 * math.exp(after) if after > 0 else math.exp(-0.8 * count)
         located = 0.4 / 2**24 * 3
-        found = made.ticked(count, period="0.4 s")["x"]
+        found = made.run_ticks(count, period="0.4 s")["x"]
         assert found == pytest.approx(expected, rel=located)
 
 
@@ -146,7 +146,7 @@ def test_a_rest_that_is_not_linear_is_of_second_order(tmp_path: Path) -> None:
     exact = 1 / (1.5 + (1 / 0.5 - 1.5) * math.exp(2.0))
 
     def error(substeps: int) -> float:
-        return abs(made.ticked(1, substeps=substeps)["x"] - exact)
+        return abs(made.run_ticks(1, substeps=substeps)["x"] - exact)
 
     for order in orders(error, (8, 16, 32, 64)):
         assert 1.9 < order < 2.1
@@ -158,7 +158,7 @@ def test_a_stiff_linear_part_does_not_spoil_the_order(tmp_path: Path) -> None:
     made = Flow(tmp_path, flow, {"x": 1.0, "z": 1.0})
 
     def error(substeps: int) -> float:
-        return abs(made.ticked(1, substeps=substeps)["x"] - 0.5)
+        return abs(made.run_ticks(1, substeps=substeps)["x"] - 0.5)
 
     for order in orders(error, (32, 64)):
         assert 1.9 < order < 2.1

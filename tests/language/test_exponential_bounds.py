@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.exponential import LARGEST_NORM
+from language.exponential import MAX_STEP_NORM
 from language.program import Program
-from language.taylor import taylor_terms
+from language.taylor import taylor_term_count
 from tests.language.flowing import Flow
-from tests.language.making import program, project_of, refusal, told
+from tests.language.making import problem_lines, program, project_of, raised_problems
 
 ONE = {"x": 1.0}
 TWO = {"x": 1.0, "z": 1.0}
@@ -39,24 +39,24 @@ def series_length(made: Program) -> int:
     return size
 
 
-@given(st.floats(1e-6, LARGEST_NORM))
+@given(st.floats(1e-6, MAX_STEP_NORM))
 def test_the_number_of_terms_is_the_smallest_that_is_enough(norm: float) -> None:
     exact = terms_of(Fraction(norm))
     near = [abs(rest(Fraction(norm), k) - 1) for k in (exact - 1, exact)]
-    assert taylor_terms(((norm,),)) == exact or min(near) < 1e-12
+    assert taylor_term_count(((norm,),)) == exact or min(near) < 1e-12
 
 
 def test_at_the_ends_it_is_the_smallest_too() -> None:
-    assert taylor_terms(((0.0,),)) == taylor_terms(((1e-20,),)) == 1
-    assert taylor_terms(((-LARGEST_NORM,),)) == terms_of(Fraction(LARGEST_NORM))
+    assert taylor_term_count(((0.0,),)) == taylor_term_count(((1e-20,),)) == 1
+    assert taylor_term_count(((-MAX_STEP_NORM,),)) == terms_of(Fraction(MAX_STEP_NORM))
 
 
 def test_what_turns_into_another_quantity_is_gone_after_a_term() -> None:
     """A chain of three: its third power is 0, whatever its norm."""
     chain = ((0.0, 3.5, 0.0), (0.0, 0.0, 3.5), (0.0, 0.0, 0.0))
-    assert taylor_terms(chain) == 3
+    assert taylor_term_count(chain) == 3
     circle = ((0.0, 3.5, 0.0), (0.0, 0.0, 3.5), (3.5, 0.0, 0.0))
-    assert taylor_terms(circle) == taylor_terms(((3.5,),))
+    assert taylor_term_count(circle) == taylor_term_count(((3.5,),))
 
 
 ENTRIES = st.floats(-1.25, 1.25, width=16)  # short, for exact powers of them
@@ -68,7 +68,7 @@ def test_no_term_that_is_left_out_counts(rows: list[list[float]]) -> None:
     """Largest entries of the series that are left out, in exact arithmetic, for any start."""
     z = [[Fraction(entry) for entry in row] for row in rows]
     norm = max(sum(abs(entry) for entry in row) for row in z)
-    terms = taylor_terms(tuple(tuple(row) for row in rows))
+    terms = taylor_term_count(tuple(tuple(row) for row in rows))
     power = [[Fraction(i == j) for j in range(3)] for i in range(3)]
     for k in range(40):
         size = max(sum(abs(entry) for entry in row) for row in power) * norm
@@ -111,13 +111,13 @@ def test_the_norm_is_a_row_sum_in_units_of_the_ranges(
     """Row x: 1 + 2 width_z / width_x, row z: 0.5 + 0.5 width_x / width_z."""
     text = "x: der(x) = -1 1/s * x + 2 1/s * z, z: der(z) = -0.5 1/s * z - 0.5 1/s * x"
     program = Flow(tmp_path, text, TWO, widths=widths).program
-    if norm > LARGEST_NORM:
-        (line,) = told(program)
+    if norm > MAX_STEP_NORM:
+        (line,) = problem_lines(program)
         assert line.endswith(f"|A h| = {norm:.3g} is above 4")
     else:
         made = program()
-        assert made.motion
-        assert made.motion.norms["one"] == norm
+        assert made.integration
+        assert made.integration.norms["one"] == norm
         assert 1 < series_length(made) <= terms_of(Fraction(norm))
 
 
@@ -126,37 +126,37 @@ def test_a_step_that_is_too_long_is_a_problem_that_proposes_substeps(
     tmp_path: Path, sign: str
 ) -> None:
     flow = decay(tmp_path, f"{sign}19")
-    (problem,) = refusal(flow.program)
+    (problem,) = raised_problems(flow.program)
     assert problem.label == "mode `one` is too fast for one step: |A h| = 19 is above 4"
     assert problem.help == f"{math.ceil(19 / 4)} times as many `substeps` are enough"
-    assert refusal(lambda: flow.program(substeps=math.ceil(19 / 4) - 1))
-    assert not refusal(lambda: flow.program(substeps=math.ceil(19 / 4)))
+    assert raised_problems(lambda: flow.program(substeps=math.ceil(19 / 4) - 1))
+    assert not raised_problems(lambda: flow.program(substeps=math.ceil(19 / 4)))
 
 
 def test_substeps_that_are_there_are_counted_in(tmp_path: Path) -> None:
     flow = decay(tmp_path, "40")
-    (problem,) = refusal(lambda: flow.program(substeps=2))
+    (problem,) = raised_problems(lambda: flow.program(substeps=2))
     assert problem.help == "5 times as many `substeps` are enough"
-    assert not refusal(lambda: flow.program(substeps=2 * 5))
+    assert not raised_problems(lambda: flow.program(substeps=2 * 5))
 
 
 def test_a_norm_of_4_is_not_too_long(tmp_path: Path) -> None:
-    assert not refusal(decay(tmp_path, "-4").program)
-    assert refusal(decay(tmp_path, "-4.001").program)
+    assert not raised_problems(decay(tmp_path, "-4").program)
+    assert raised_problems(decay(tmp_path, "-4.001").program)
 
 
 def test_every_mode_that_is_too_fast_is_told(tmp_path: Path) -> None:
     fast = "x: der(x) = -5 1/s * x"
     flow = Flow(tmp_path, fast, ONE, leave="two: {when: x <= 0}", other=fast)
-    assert len(refusal(flow.program)) == 2
+    assert len(raised_problems(flow.program)) == 2
 
 
 def test_rk4_knows_no_such_bound(tmp_path: Path) -> None:
     """It takes |A h| = 4 and more where that is no decay; where it is, its own limit counts."""
     swings = "x: der(x) = 1 1/s * z * 50, z: der(z) = -1 1/s * x / 50"
     flow = Flow(tmp_path, swings, TWO)
-    assert refusal(flow.program)
-    assert not refusal(lambda: flow.program(method="rk4"))
+    assert raised_problems(flow.program)
+    assert not raised_problems(lambda: flow.program(method="rk4"))
 
 
 BARE = """language: 1
@@ -183,9 +183,9 @@ def test_the_terms_are_enough_for_the_whole_range_of_a_tunable(tmp_path: Path) -
 def test_the_bound_holds_for_the_whole_range_of_a_tunable(tmp_path: Path) -> None:
     fast = TAU.replace("[0.5, 2]", "[0.2, 2]")
     flow = Flow(tmp_path, "x: tau * der(x) = -x", ONE, parameters=fast)
-    (problem,) = refusal(flow.program)
+    (problem,) = raised_problems(flow.program)
     assert problem.label == "mode `one` is too fast for one step: |A h| = 5 is above 4"
-    assert not refusal(lambda: flow.program(substeps=2))
+    assert not raised_problems(lambda: flow.program(substeps=2))
 
 
 def test_what_is_derived_from_a_tunable_follows_it_to_the_ends_of_its_range(tmp_path: Path) -> None:
@@ -199,7 +199,7 @@ def test_what_is_derived_from_a_tunable_follows_it_to_the_ends_of_its_range(tmp_
 )
 def test_a_flow_that_is_far_too_fast_is_a_problem_not_a_crash(tmp_path: Path, flow: str) -> None:
     gap = "gap: {value: 0 s, tunable: true}"
-    (problem,) = refusal(Flow(tmp_path, flow, ONE, parameters=gap).program)
+    (problem,) = raised_problems(Flow(tmp_path, flow, ONE, parameters=gap).program)
     assert "is too fast for one step" in problem.label
 
 
@@ -207,7 +207,7 @@ def test_a_flow_that_is_far_too_fast_is_a_problem_not_a_crash(tmp_path: Path, fl
 def test_a_divisor_that_is_0_is_told_before_the_step_is_looked_at(
     tmp_path: Path, flow: str
 ) -> None:
-    (problem,) = refusal(Flow(tmp_path, flow, ONE).program)
+    (problem,) = raised_problems(Flow(tmp_path, flow, ONE).program)
     assert problem.label == "this divisor may be 0: it lies from 0 to 0"
 
 
@@ -219,5 +219,5 @@ def test_a_state_without_a_range_is_refused(tmp_path: Path, place: str) -> None:
     clock = clock.replace("automaton: m", "automaton: s\nperiod: 1 s\nnumbers: float64\nmodel: m")
     clock = clock.replace("flow: {x: der(x) = 0}", "runs: {of: m.one, method: exponential}")
     project = project_of(tmp_path, m=model)
-    (line,) = told(lambda: program(clock, project))
+    (line,) = problem_lines(lambda: program(clock, project))
     assert line.endswith("state `x` needs a `range`: method `exponential` scales with it")

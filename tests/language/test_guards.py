@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.evaluate import evaluate
-from language.guards import excluded
-from language.lower import expression
+from language.guards import are_syntactically_exclusive
+from language.lower import lower_expression
 from language.operation import Expr, Value
-from tests.language.making import automaton, refusal, told, tree
+from tests.language.making import automaton, problem_lines, raised_problems, tree
 
 TEXT = """language: 1
 automaton: slide
@@ -42,7 +42,7 @@ def slide(p: str, q: str) -> str:
 
 
 def overlaps(p: str, q: str) -> list[str]:
-    return [line.partition(" ")[2] for line in told(lambda: automaton(slide(p, q)))]
+    return [line.partition(" ")[2] for line in problem_lines(lambda: automaton(slide(p, q)))]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def overlaps(p: str, q: str) -> list[str]:
     ],
 )
 def test_complements_need_no_priorities(p: str, q: str) -> None:
-    assert excluded(tree(p), tree(q))
+    assert are_syntactically_exclusive(tree(p), tree(q))
     assert overlaps(p, q) == []
 
 
@@ -103,7 +103,7 @@ def test_guards_that_may_hold_together_are_refused_with_a_witness(p: str, q: str
     ],
 )
 def test_what_is_proven_to_exclude_each_other_needs_no_priorities(p: str, q: str) -> None:
-    assert not excluded(tree(p), tree(q))
+    assert not are_syntactically_exclusive(tree(p), tree(q))
     assert overlaps(p, q) == []
 
 
@@ -122,17 +122,17 @@ def test_a_tunable_counts_with_all_its_values() -> None:
         p="to: end, when: x < 0.4 m",
         q="to: end, when: x > limit",
     )
-    (label,) = told(lambda: automaton(text))
+    (label,) = problem_lines(lambda: automaton(text))
     assert re.search(r"both enabled at x = 0\.[23]\d*, limit = 0\.[23]", label), label
-    assert told(lambda: automaton(text.replace("[0.2, 1]", "[0.4, 1]"))) == []
+    assert problem_lines(lambda: automaton(text.replace("[0.2, 1]", "[0.4, 1]"))) == []
 
 
 def test_regions_beside_are_in_any_of_their_modes() -> None:
     """The equation `side` has another value in each mode of the region."""
     text = slide("side > 0 and x > 0", "x > 0 and side < 1")
-    (label,) = told(lambda: automaton(text + REGION.format(left=0.5, right=2)))
+    (label,) = problem_lines(lambda: automaton(text + REGION.format(left=0.5, right=2)))
     assert "`p` and `q` are both enabled at" in label
-    assert told(lambda: automaton(text + REGION.format(left=-1, right=2))) == []
+    assert problem_lines(lambda: automaton(text + REGION.format(left=-1, right=2))) == []
 
 
 def test_different_priorities_decide() -> None:
@@ -151,7 +151,7 @@ def test_no_priority_and_priority_0_are_the_same() -> None:
 
 def test_the_problem_stands_at_the_later_guard_and_says_what_helps() -> None:
     text = slide("x > limit", "v > 0")
-    (problem,) = refusal(lambda: automaton(text))
+    (problem,) = raised_problems(lambda: automaton(text))
     line = text.splitlines()[problem.span.line - 1]
     assert line[problem.span.column - 1 :].startswith("v > 0")
     assert problem.help == "give them different priorities: the smallest wins"
@@ -160,14 +160,14 @@ def test_the_problem_stands_at_the_later_guard_and_says_what_helps() -> None:
 def test_every_pair_is_looked_at() -> None:
     more = "to: end, when: x > 0}, r: {to: end, when: flag"
     text = TEXT.format(p="to: end, when: v > 0", q=more)
-    assert len(refusal(lambda: automaton(text))) == 3
+    assert len(raised_problems(lambda: automaton(text))) == 3
 
 
 def test_guards_of_two_modes_never_meet() -> None:
     text = slide("x > limit", "x <= limit").replace(
         "end: {}", "end: {transitions: {back: {to: free, when: x > 2 m}}}"
     )
-    assert told(lambda: automaton(text)) == []
+    assert problem_lines(lambda: automaton(text)) == []
 
 
 sides = st.sampled_from(["x", "v", "x + 1", "2 * v"])
@@ -187,20 +187,22 @@ reals = st.sampled_from([-1.0, -0.5, -0.0, 0.0, 0.5, 1.0, 2.0, float("nan"), flo
 
 def holds(text: str, x: float, v: float) -> bool:
     known: dict[str, Expr] = {"x": Value(x), "v": Value(v)}
-    return bool(evaluate(expression(tree(text), known), {}))
+    return bool(evaluate(lower_expression(tree(text), known), {}))
 
 
 @given(conditions, conditions, reals, reals)
 def test_what_is_taken_for_disjoint_never_holds_together(
     p: str, q: str, x: float, v: float
 ) -> None:
-    if excluded(tree(p), tree(q)):
+    if are_syntactically_exclusive(tree(p), tree(q)):
         assert not (holds(p, x, v) and holds(q, x, v))
 
 
 @given(conditions, conditions)
 def test_exclusion_is_mutual(p: str, q: str) -> None:
-    assert excluded(tree(p), tree(q)) == excluded(tree(q), tree(p))
+    assert are_syntactically_exclusive(tree(p), tree(q)) == are_syntactically_exclusive(
+        tree(q), tree(p)
+    )
 
 
 def test_where_only_time_matters_the_witness_is_an_instant() -> None:

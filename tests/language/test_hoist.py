@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from engine.interpreter import Interpreter
-from language.hoist import hoisted, inputs_once, parameters_once
-from language.load import lowered
+from language.hoist import fold_parameters, hoist_inputs, run_passes
+from language.load import lower_automaton
 from language.operation import Assign
-from language.printing import expr_text
+from language.printing import format_expr
 from language.program import Program
-from language.traversal import walk
+from language.traversal import walk_ops
 from tests.language.making import automaton
 
 TEXT = """language: 1
@@ -37,23 +37,23 @@ outputs: [v, never, third, pull]
 
 
 def slide() -> Program:
-    return lowered(automaton(TEXT))
+    return lower_automaton(automaton(TEXT))
 
 
 def assigned(program: Program, block: str) -> dict[str, str]:
     """Return the assignments of a block as text."""
-    ops = walk(program.blocks[block])
-    return {op.target: expr_text(op.value) for op in ops if isinstance(op, Assign)}
+    ops = walk_ops(program.blocks[block])
+    return {op.target: format_expr(op.value) for op in ops if isinstance(op, Assign)}
 
 
 def test_what_follows_from_fixed_parameters_is_a_constant() -> None:
-    found = {c.name: (c.kind, c.value, c.about) for c in parameters_once(slide()).constants}
+    found = {c.name: (c.kind, c.value, c.about) for c in fold_parameters(slide()).constants}
     assert found["constant.m_g"] == ("fixed", 3.0 * 9.81, "m * g")
     assert found["constant.per_m"] == ("fixed", 1.0 / 3.0, "1 / m")
 
 
 def test_what_follows_from_a_tunable_is_derived_again_after_a_change() -> None:
-    made = hoisted(slide())
+    made = run_passes(slide())
     assert assigned(made, "derive") == {"derived.c_per_m": "(calibration.c / constant.m)"}
     stepper = Interpreter(made)
     stepper.set("calibration.c", 1.5)
@@ -62,7 +62,7 @@ def test_what_follows_from_a_tunable_is_derived_again_after_a_change() -> None:
 
 
 def test_a_division_by_a_parameter_is_a_multiplication_unless_its_inverse_is_not_normal() -> None:
-    made = parameters_once(slide())
+    made = fold_parameters(slide())
     assert assigned(made, "rates_go")["work.rate_v"].endswith("* constant.per_m)")
     assert assigned(made, "equations_go")["equation.never"] == (
         "((state.v / constant.nil) * constant.m)"
@@ -71,7 +71,7 @@ def test_a_division_by_a_parameter_is_a_multiplication_unless_its_inverse_is_not
 
 
 def test_what_reads_frozen_inputs_and_fixed_parameters_is_computed_where_they_are_latched() -> None:
-    made = inputs_once(parameters_once(slide()))
+    made = hoist_inputs(fold_parameters(slide()))
     latched = assigned(made, "latch")
     assert latched["before.F_minus_m_g_sin_slope"] == (
         "(before.F - (constant.m_g * sin(before.slope)))"
@@ -80,7 +80,7 @@ def test_what_reads_frozen_inputs_and_fixed_parameters_is_computed_where_they_ar
 
 
 def test_a_value_that_a_block_computes_twice_is_computed_once() -> None:
-    rates = assigned(hoisted(slide()), "rates_go")
+    rates = assigned(run_passes(slide()), "rates_go")
     assert rates["work.v_squared"] == "(work.at_v * work.at_v)"
     texts = [text for name, text in rates.items() if name != "work.v_squared"]
     assert not any("(work.at_v * work.at_v)" in text for text in texts)
@@ -89,7 +89,7 @@ def test_a_value_that_a_block_computes_twice_is_computed_once() -> None:
 @pytest.mark.parametrize("slope", [0.0, -0.3, 1.0])
 def test_the_values_stay_but_for_the_rounding_of_a_reciprocal(slope: float) -> None:
     values = []
-    for made in (slide(), hoisted(slide())):
+    for made in (slide(), run_passes(slide())):
         stepper = Interpreter(made)
         for name, value in (("F", 4.0), ("slope", slope)):
             stepper.set(f"input.{name}", value)

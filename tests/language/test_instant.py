@@ -9,10 +9,10 @@ from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from engine.interpreter import Interpreter
-from language.instant import moments
+from language.instant import change_moments
 from lockstep.compare import compare
-from tests.language.test_recursive import STATES, A, Matrix, covariance, made, step, ticks
-from tests.lockstep.programs import taped
+from tests.language.test_recursive import STATES, A, Matrix, covariance, make_program, step, ticks
+from tests.lockstep.programs import record_ticks
 
 B = np.array([[0.0], [1.0], [0.0]])
 
@@ -39,7 +39,9 @@ def theirs(a: Matrix, b: Matrix, time: float) -> tuple[Matrix, Matrix]:
 )
 def test_moments_are_those_of_quadrature(entries: list[float], time: float) -> None:
     a, b = np.array(entries[:4]).reshape(2, 2), np.array(entries[4:]).reshape(2, 1)
-    mean, spread = (np.array(m) for m in moments(tuple(map(tuple, a)), tuple(map(tuple, b)), time))
+    mean, spread = (
+        np.array(m) for m in change_moments(tuple(map(tuple, a)), tuple(map(tuple, b)), time)
+    )
     wanted, covered = theirs(a, b, time)
     assert np.allclose(mean[:, 0], wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)))
     size = np.max(np.abs(covered + np.outer(wanted, wanted)))
@@ -49,8 +51,8 @@ def test_moments_are_those_of_quadrature(entries: list[float], time: float) -> N
 
 def test_a_tick_adds_mean_and_covariance_of_the_change() -> None:
     """Beside the same observer without it, from the same states, with no measurement."""
-    within = made(("process_noise", "unknown_instant: {u: 0.25 s}\n      process_noise"))
-    one, other = Interpreter(within), Interpreter(made())
+    within = make_program(("process_noise", "unknown_instant: {u: 0.25 s}\n      process_noise"))
+    one, other = Interpreter(within), Interpreter(make_program())
     calm = {"y_x": 0.3, "y_v": 0.1, "u": 1.0, "ok": True, "new": True}
     for inside in (one, other):
         step(inside, calm)
@@ -74,4 +76,4 @@ def test_engine_and_c_are_equal(numbers: str) -> None:
     inputs = [{f"input.{n}": v for n, v in one.items() if n != "new"} for one in series]
     for one, now in zip(series, inputs, strict=True):
         now.update({"is_new.y_x": True, "is_new.y_v": one["new"]})
-    assert compare(taped(made(within, ("float64", numbers)), inputs)).is_equal
+    assert compare(record_ticks(make_program(within, ("float64", numbers)), inputs)).is_equal

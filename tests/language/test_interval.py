@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.evaluate import evaluate
-from language.interval import ANYTHING, Interval
-from language.lower import expression
+from language.interval import UNBOUNDED, Interval
+from language.lower import lower_expression
 from language.operation import Ref
-from language.ranging import Ranging
-from language.syntax import Likeness, Tree
+from language.ranging import RangeAnalysis
+from language.syntax import SyntaxTree, TreeNumbering
 from tests.language.making import tree
 
 RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}
@@ -30,14 +30,14 @@ def ranged(text: str) -> tuple[Interval, list[str]]:
     """Return the interval of a text and what is reported in it."""
     found: list[str] = []
 
-    def report(what: str, part: Tree, interval: Interval) -> None:
-        if interval.known:
+    def report(what: str, part: SyntaxTree, interval: Interval) -> None:
+        if interval.is_certain:
             found.append(f"{what} {part.span.column}")
 
-    ranging = Ranging(
-        lambda name: RANGES.get(name, ANYTHING), lambda name: ANYTHING, Likeness(), report
+    ranging = RangeAnalysis(
+        lambda name: RANGES.get(name, UNBOUNDED), lambda name: UNBOUNDED, TreeNumbering(), report
     )
-    return ranging.expression(tree(text)), found
+    return ranging.analyse(tree(text)), found
 
 
 @pytest.mark.parametrize("text", TEXTS)
@@ -45,7 +45,7 @@ def ranged(text: str) -> tuple[Interval, list[str]]:
 def test_every_value_lies_in_the_interval(text: str, a: float, b: float) -> None:
     interval, reported = ranged(text)
     assert reported == []
-    value = evaluate(expression(tree(text), {"a": Ref("a"), "b": Ref("b")}), {"a": a, "b": b})
+    value = evaluate(lower_expression(tree(text), {"a": Ref("a"), "b": Ref("b")}), {"a": a, "b": b})
     slack = 1e-9 * max(1.0, abs(float(value)))
     assert interval.low - slack <= value <= interval.high + slack
 

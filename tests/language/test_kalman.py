@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from engine.interpreter import Interpreter
-from language.load import automaton_of, lowered
+from language.load import automaton_of, lower_automaton
 from language.program import Program
 from language.project import read_document
-from tests.language.making import ROOT, program, project_of, solved, stepper
+from tests.language.making import ROOT, program, project_of, solve_constants, stepper
 
 Matrix = NDArray[np.float64]
 
@@ -49,12 +49,12 @@ def at_rate(
         folder = tmp_path_factory.mktemp(rate)
         project = project_of(folder, other=VARIANT.format(base=request.param, period=period))
         document = read_document(project.path_of("other_rate"))
-        made[rate] = lowered(automaton_of(document, project))
+        made[rate] = lower_automaton(automaton_of(document, project))
     return made
 
 
 def matrix(made: Program, letter: str, rows: tuple[str, ...], columns: tuple[str, ...]) -> Matrix:
-    numbers = solved(made)
+    numbers = solve_constants(made)
     return np.array(
         [
             [numbers.get(f"solved.drive_{letter}.{row}.{col}", 0.0) for col in columns]
@@ -94,7 +94,7 @@ def test_the_gain_is_that_of_the_paper(at_rate: dict[str, Program], rate: str) -
 
 @pytest.mark.parametrize("rate", RATES)
 def test_both_contacts_have_the_same_numbers(at_rate: dict[str, Program], rate: str) -> None:
-    numbers = solved(at_rate[rate])
+    numbers = solve_constants(at_rate[rate])
     drive = {name: value for name, value in numbers.items() if name.startswith("solved.drive_")}
     drive = {name: value for name, value in drive.items() if "contact" not in name}
     assert len(drive) > 20
@@ -111,7 +111,7 @@ def test_inputs_and_the_constant_part_act_as_in_the_paper(
 ) -> None:
     """The three columns by what the prediction does: T_em, T_br and f at theta_b = +-alpha."""
     made = at_rate[rate]
-    alpha = side * solved(made)["constant.alpha"]
+    alpha = side * solve_constants(made)["constant.alpha"]
     free = predicted(made, mode, theta_b=alpha)
     columns = [predicted(made, mode, theta_b=alpha, **{name: 1.0}) - free for name in INPUTS]
     assert close(np.column_stack([*columns, free]), PAPER["rates"][rate][key])
@@ -172,7 +172,7 @@ def test_a_cycle_of_prediction_and_correction_is_that_of_filterpy(
 ) -> None:
     made = at_rate["1kHz"]
     theirs, gain = reference(made)
-    ours, p = Interpreter(made), solved(made)
+    ours, p = Interpreter(made), solve_constants(made)
     ours.run("step")
     start = {"theta_d": 0.07, "w_em": 310.0, "w_w": 38.4, "theta_b": p["constant.alpha"]}
     before = {"T_em": 27.0, "T_br": 3.0}
@@ -238,7 +238,9 @@ def one_gain() -> float:
 
 
 def test_one_state_has_the_gain_of_its_quadratic_equation() -> None:
-    assert solved(program(ONE))["solved.only_L.x.y_x"] == pytest.approx(one_gain(), rel=1e-13)
+    assert solve_constants(program(ONE))["solved.only_L.x.y_x"] == pytest.approx(
+        one_gain(), rel=1e-13
+    )
 
 
 def test_one_state_follows_its_closed_form() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.language.making import program, refusal, told
+from tests.language.making import problem_lines, program, raised_problems
 from tests.language.test_kalman import ONE
 
 OWN = "modes.only.observer"
@@ -13,7 +13,9 @@ MEASURED = "check_observer looks at the keys of `measures`, not at the states th
 
 def refused(old: str, new: str) -> list[str]:
     assert old in ONE
-    return [line.partition(" ")[2] for line in told(lambda: program(ONE.replace(old, new)))]
+    return [
+        line.partition(" ")[2] for line in problem_lines(lambda: program(ONE.replace(old, new)))
+    ]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +58,7 @@ def test_noise_without_a_steady_gain_is_a_problem(old: str, new: str) -> None:
 
 def test_a_state_that_nothing_measures_and_that_grows_is_a_problem() -> None:
     text = ONE.replace("measures: {y_x: x}", "measures: {y_x: x}\n      C: {y_x: {x: 0}}")
-    (problem,) = refusal(lambda: program(text.replace("-1 / tau", "1 / tau")))
+    (problem,) = raised_problems(lambda: program(text.replace("-1 / tau", "1 / tau")))
     assert "not detectable" in problem.label
 
 
@@ -66,4 +68,6 @@ def test_a_measured_state_that_is_none_is_refused() -> None:
 
 def test_a_measured_state_has_the_dimension_of_its_input() -> None:
     text = ONE.replace("y_x: {unit: m}", "y_x: {unit: V}").replace("initial: y_x", "initial: 0 m")
-    assert told(lambda: program(text.replace("r: {value: 0.5 m^2}", "r: {value: 0.5 V^2}")))
+    assert problem_lines(
+        lambda: program(text.replace("r: {value: 0.5 m^2}", "r: {value: 0.5 V^2}"))
+    )

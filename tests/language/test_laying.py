@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from language.document import Scalar
+from language.document import ScalarNode
 from language.load import load_automaton, program_of
-from language.project import Project, expanded, read_document
-from language.tree import at
-from tests.language.making import project_of, told
+from language.project import Project, expand_document, read_document
+from language.tree import find_node
+from tests.language.making import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart
@@ -57,9 +57,9 @@ def cart(folder: Path, effects: str, **more: str) -> Project:
 
 
 def text(project: Project, path: str, name: str = "laid") -> str:
-    tree = expanded(read_document(project.path_of(name)), project).root
-    node = at(tree, path.split("."))
-    assert isinstance(node, Scalar), path
+    tree = expand_document(read_document(project.path_of(name)), project).root
+    node = find_node(tree, path.split("."))
+    assert isinstance(node, ScalarNode), path
     return node.text
 
 
@@ -112,23 +112,25 @@ def test_a_redirection_that_finds_nothing_is_refused(tmp_path: Path) -> None:
     project = cart(tmp_path, "{lag@F: {}}", unread="")
     project_of(tmp_path, cart=CART.replace("inputs: {", "inputs: {G: {unit: N}, "))
     project_of(tmp_path, laid="language: 1\nvariant: laid\nextends: cart\neffects: {lag@G: {}}\n")
-    assert told(lambda: expanded(read_document(project.path_of("laid")), project)) == [
-        "4:15 `lag` cannot be laid here: nothing reads `G`"
-    ]
+    assert problem_lines(
+        lambda: expand_document(read_document(project.path_of("laid")), project)
+    ) == ["4:15 `lag` cannot be laid here: nothing reads `G`"]
 
 
 def test_an_element_without_what_an_effect_needs_is_told_the_key(tmp_path: Path) -> None:
     project = cart(tmp_path, "{split@body: {}}")
     project_of(tmp_path, cart=CART.replace(", far: [load]", ""))
-    assert told(lambda: expanded(read_document(project.path_of("laid")), project)) == [
-        "4:17 `split` cannot be laid here: element `body` has no `far`"
-    ]
+    assert problem_lines(
+        lambda: expand_document(read_document(project.path_of("laid")), project)
+    ) == ["4:17 `split` cannot be laid here: element `body` has no `far`"]
 
 
 def test_an_expression_is_no_name_to_redirect(tmp_path: Path) -> None:
     project = cart(tmp_path, "{split@body: {}}")
     project_of(tmp_path, cart=CART.replace("inertia: m,", "inertia: m + m,"))
-    (line,) = told(lambda: expanded(read_document(project.path_of("laid")), project))
+    (line,) = problem_lines(
+        lambda: expand_document(read_document(project.path_of("laid")), project)
+    )
     assert line.endswith("`m + m` would be redirected, and only a name can be")
 
 

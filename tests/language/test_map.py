@@ -6,10 +6,10 @@ from fractions import Fraction
 
 import pytest
 
-from language.experiment import Column, RecordingMap
+from language.experiment import ColumnMapping, RecordingMap
 from language.map import column_dimension, read_map
 from language.project import read_document
-from tests.language.making import SHIPPED, dimension, document, refusal, told
+from tests.language.making import SHIPPED, dimension, document, problem_lines, raised_problems
 
 TEXT = """language: 1
 map: some
@@ -25,13 +25,13 @@ def some(columns: str = "a: {to: u}", time: str = TIME, more: str = "") -> Recor
     return read_map(document(TEXT.format(columns=columns, time=time, more=more)), SHIPPED)
 
 
-def one(keys: str) -> Column:
+def one(keys: str) -> ColumnMapping:
     (column,) = some(f"a: {{{keys}}}").columns.values()
     return column
 
 
 def lines(*parts: str) -> list[str]:
-    return [line.partition(" ")[2] for line in told(lambda: some(*parts))]
+    return [line.partition(" ")[2] for line in problem_lines(lambda: some(*parts))]
 
 
 def test_a_column_is_that_of_its_name_unless_it_says_which() -> None:
@@ -151,5 +151,5 @@ def test_the_shipped_maps_are_read(name: str) -> None:
 
 def test_another_kind_is_no_map() -> None:
     document_ = read_document(SHIPPED.path_of("driveline"))
-    (problem,) = refusal(lambda: read_map(document_, SHIPPED))
+    (problem,) = raised_problems(lambda: read_map(document_, SHIPPED))
     assert problem.label == "`driveline` is an automaton, not a map"

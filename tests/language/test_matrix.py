@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from language.matrix import (
     Matrix,
-    exponential,
-    exponential_integral,
+    expm,
+    expm_integral,
     identity,
     multiply,
     solve,
     transpose,
 )
-from language.riccati import discrete_noise, steady_gain
+from language.riccati import discretise_noise, steady_kalman_gain
 
 CLOSE = 1e-9
 """Asked of every number that is printed into C; measured differences are below 1e-11."""
@@ -40,7 +40,7 @@ def near(ours: Matrix, theirs: NDArray[np.float64]) -> None:
 
 @given(squares(), st.floats(0.001, 1.0))
 def test_the_exponential_is_that_of_scipy(a: Matrix, h: float) -> None:
-    near(exponential(a, h), scipy.linalg.expm(np.array(a) * h))
+    near(expm(a, h), scipy.linalg.expm(np.array(a) * h))
 
 
 @given(squares(), st.floats(0.001, 1.0))
@@ -48,7 +48,7 @@ def test_its_integral_is_the_corner_of_the_augmented_exponential(a: Matrix, h: f
     n = len(a)
     block = np.zeros((2 * n, 2 * n))
     block[:n, :n], block[:n, n:] = np.array(a) * h, np.eye(n) * h
-    near(exponential_integral(a, h), scipy.linalg.expm(block)[:n, n:])
+    near(expm_integral(a, h), scipy.linalg.expm(block)[:n, n:])
 
 
 @given(squares(), st.floats(0.001, 0.1))
@@ -58,7 +58,7 @@ def test_the_noise_of_a_period_is_that_of_van_loan(a: Matrix, h: float) -> None:
     density = tuple(tuple(float(i == j) * (i + 1) for j in range(n)) for i in range(n))
     root = np.sqrt(np.array(density))
     _, expected = van_loan_discretization(np.array(a), root, h)
-    found = discrete_noise(a, density, h)
+    found = discretise_noise(a, density, h)
     near(found, expected)
     assert found == transpose(found)
 
@@ -66,9 +66,9 @@ def test_the_noise_of_a_period_is_that_of_van_loan(a: Matrix, h: float) -> None:
 @given(squares())
 def test_the_steady_gain_is_that_of_the_riccati_equation(a: Matrix) -> None:
     n, h = len(a), 0.01
-    phi, seen = exponential(a, h), identity(n)
-    noise = discrete_noise(a, identity(n), h)
-    gain, covariance = steady_gain(phi, noise, seen, identity(n))
+    phi, seen = expm(a, h), identity(n)
+    noise = discretise_noise(a, identity(n), h)
+    gain, covariance = steady_kalman_gain(phi, noise, seen, identity(n))
     f, q, r = np.array(phi), np.array(noise), np.eye(n)
     p = scipy.linalg.solve_discrete_are(f.T, np.eye(n), q, r)
     near(covariance, p)
@@ -85,4 +85,4 @@ def test_a_solution_solves_and_a_singular_matrix_is_refused() -> None:
 def test_a_state_that_nobody_sees_and_that_grows_has_no_gain() -> None:
     phi = ((1.0, 0.0), (0.0, 1.01))
     with pytest.raises(ValueError, match="steady_gain"):
-        steady_gain(phi, identity(2), ((1.0, 0.0),), ((1.0,),))
+        steady_kalman_gain(phi, identity(2), ((1.0, 0.0),), ((1.0,),))

@@ -10,11 +10,11 @@ import pytest
 
 from engine.interpreter import Interpreter
 from language.load import automaton_of, program_of
-from language.program import MotionLimit, Program
+from language.program import Program, StabilityLimit
 from language.project import read_document
-from language.stability import largest_step
+from language.stability import largest_stable_step
 from tests.language.flowing import Flow
-from tests.language.making import project_of, refusal, told
+from tests.language.making import problem_lines, project_of, raised_problems
 
 BERNOULLI = "x: der(x) = -2 1/s * x + 3 1/s * x^2"
 ORDERS = {"euler": 1, "midpoint": 2, "rk4": 4}
@@ -67,15 +67,19 @@ def test_the_polynomial_inside_a_step_has_the_order_of_the_method(
 
 
 def test_exact_takes_affine_flows_only_and_lists_the_other_terms(tmp_path: Path) -> None:
-    (problem,) = refusal(lambda: Flow(tmp_path, BERNOULLI, {"x": 0.5}).program(method="exact"))
+    (problem,) = raised_problems(
+        lambda: Flow(tmp_path, BERNOULLI, {"x": 0.5}).program(method="exact")
+    )
     assert problem.label == (
         "the flow of mode `one` is not linear in the states with constant coefficients: "
         "`3 1/s * x^2`"
     )
     bent = "x: der(x) = -u * x + abs(x) * 1 1/s + 2 1/s * x - u"
-    (problem,) = refusal(lambda: Flow(tmp_path, bent, {"x": 0.5}).program(method="exact"))
+    (problem,) = raised_problems(lambda: Flow(tmp_path, bent, {"x": 0.5}).program(method="exact"))
     assert problem.label.endswith("coefficients: `-u * x`, `abs(x) * 1 1/s`")
-    assert not refusal(lambda: Flow(tmp_path, "x: der(x) = u - 1 1/s * x", {"x": 0.5}).program())
+    assert not raised_problems(
+        lambda: Flow(tmp_path, "x: der(x) = u - 1 1/s * x", {"x": 0.5}).program()
+    )
 
 
 # The largest stable step.
@@ -94,9 +98,9 @@ def driveline(folder: Path, method: str, period: str, more: str = "") -> Program
     return program_of(automaton_of(read_document(project.path_of("other")), project))
 
 
-def limit(made: Program, mode: str) -> MotionLimit:
-    assert made.motion
-    (found,) = [limit for limit in made.motion.limits if limit.mode == mode]
+def limit(made: Program, mode: str) -> StabilityLimit:
+    assert made.integration
+    (found,) = [limit for limit in made.integration.stability_limits if limit.mode == mode]
     return found
 
 
@@ -122,7 +126,7 @@ def test_eulers_contact_oscillation_grows_beyond_c_over_k(tmp_path: Path) -> Non
 
 def test_the_model_of_the_paper_cannot_run_at_10_ms(tmp_path: Path) -> None:
     """And the reason is named; 8 ms is below 2.785 c/k = 8.123 ms."""
-    (problem,) = refusal(lambda: driveline(tmp_path, "rk4", "10 ms"))
+    (problem,) = raised_problems(lambda: driveline(tmp_path, "rk4", "10 ms"))
     assert problem.label == (
         "`rk4` is not stable in mode `no_contact` with a step of 0.01 s: the largest is 0.008124 s"
     )
@@ -146,20 +150,20 @@ modes: {{one: {{flow: {{x: der(x) = -100 1/s * x}}}}}}
         program_of(automaton_of(read_document(project.path_of("m")), project))
 
     made(27)
-    (line,) = told(lambda: made(28))
+    (line,) = problem_lines(lambda: made(28))
     assert "with a step of 0.028 s: the largest is 0.02785 s" in line
 
 
 @pytest.mark.parametrize("flow", ["x: der(x) = 50 1/s * x", "x: der(x) = u"])
 def test_what_does_not_decay_sets_no_limit(tmp_path: Path, flow: str) -> None:
-    assert not refusal(lambda: Flow(tmp_path, flow, {"x": 1.0}).program(method="euler"))
+    assert not raised_problems(lambda: Flow(tmp_path, flow, {"x": 1.0}).program(method="euler"))
 
 
 def test_an_oscillation_is_limited_by_the_imaginary_part_too() -> None:
     """|R(i y)| = 1 of RK4 at y = 2 sqrt(2); midpoint and Euler have no such stretch."""
     nearly = complex(-2e-6, 1.0)
-    assert largest_step("rk4", nearly) == pytest.approx(2 * math.sqrt(2), rel=1e-4)
-    assert largest_step("euler", complex(-0.1, 1.0)) == pytest.approx(0.2 / 1.01, rel=1e-9)
+    assert largest_stable_step("rk4", nearly) == pytest.approx(2 * math.sqrt(2), rel=1e-4)
+    assert largest_stable_step("euler", complex(-0.1, 1.0)) == pytest.approx(0.2 / 1.01, rel=1e-9)
 
 
 # One flow, without transitions.
@@ -204,5 +208,7 @@ modes:
   rest: {runs: {of: m.one, method: euler}}
 """
     project = project_of(tmp_path, s=clock)
-    lines = told(lambda: program_of(automaton_of(read_document(project.path_of("s")), project)))
+    lines = problem_lines(
+        lambda: program_of(automaton_of(read_document(project.path_of("s")), project))
+    )
     assert any("one method, one number of substeps" in line for line in lines)

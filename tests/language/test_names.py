@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from language.names import check_file_name, check_name, report_case_twins
+from language.names import check_file_name, check_name, report_case_collisions
 from language.problem import Problems
 from language.reserved import reserved_words
 from tests.language.making import NOWHERE
@@ -13,7 +13,7 @@ from tests.language.making import NOWHERE
 def complaints(name: str) -> list[str]:
     problems = Problems()
     check_name(name, NOWHERE, problems)
-    return [problem.label for problem in problems.found]
+    return [problem.label for problem in problems.reported]
 
 
 @pytest.mark.parametrize("language", ["GRAMMAR", "YAML", "C", "C++", "A2L", "GENERATED"])
@@ -42,14 +42,14 @@ def test_anything_else_is_none(name: str) -> None:
 def test_an_automaton_is_not_named_like_another_file(name: str) -> None:
     problems = Problems()
     check_file_name(name, NOWHERE, problems)
-    assert len(problems.found) == 1 + (name == "main")
+    assert len(problems.reported) == 1 + (name == "main")
 
 
 def test_names_that_differ_in_case_only_are_told_once_each() -> None:
     problems = Problems()
     named = [(name, NOWHERE) for name in ("a", "b", "A", "a", "B")]
-    report_case_twins(named, problems)
-    assert [p.label for p in problems.found] == [
+    report_case_collisions(named, problems)
+    assert [p.label for p in problems.reported] == [
         "`A` and `a` differ in case only",
         "`B` and `b` differ in case only",
     ]

@@ -10,8 +10,8 @@ from fractions import Fraction
 import numpy as np
 from hypothesis import example, given, strategies as st
 
-from language.evaluate import OPERATIONS, evaluate
-from language.number import decimal, rounded, single
+from language.evaluate import BINARY_OPERATIONS, evaluate
+from language.number import round_to_float32, round_to_type, shortest_decimal
 from language.operation import Binary, Call, Value, real
 
 SINGLES = st.floats(width=32)
@@ -40,11 +40,11 @@ def native(operator: str, a: float, b: float) -> float:
 @example("3.4028235677973366e38")
 def test_a_text_becomes_the_nearest_float32_by_one_rounding(text: str) -> None:
     exact = Fraction(Decimal(text))
-    value = rounded(exact, "float32")
+    value = round_to_type(exact, "float32")
     if math.isinf(value):
         assert exact >= Fraction(LARGEST) + Fraction(2) ** 103
         return
-    assert single(value) == value
+    assert round_to_float32(value) == value
     wrong = abs(Fraction(value) - exact)
     for side in (-math.inf, math.inf):
         with np.errstate(over="ignore"):
@@ -55,11 +55,11 @@ def test_a_text_becomes_the_nearest_float32_by_one_rounding(text: str) -> None:
 
 def test_two_roundings_would_give_another_float32() -> None:
     text = "1.00000017881393432617187501"
-    assert rounded(Fraction(text), "float32") == 1.0 + 2.0**-22
-    assert single(float(text)) == float(np.float32(text)) == 1.0 + 2.0**-22
+    assert round_to_type(Fraction(text), "float32") == 1.0 + 2.0**-22
+    assert round_to_float32(float(text)) == float(np.float32(text)) == 1.0 + 2.0**-22
     below = "1.00000017881393432617187499"
-    assert rounded(Fraction(below), "float32") == 1.0 + 2.0**-23
-    assert single(float(below)) == 1.0 + 2.0**-22
+    assert round_to_type(Fraction(below), "float32") == 1.0 + 2.0**-23
+    assert round_to_float32(float(below)) == 1.0 + 2.0**-22
 
 
 @given(st.floats(min_value=0.0, max_value=LARGEST, width=32, exclude_max=True))
@@ -68,9 +68,9 @@ def test_a_tie_goes_to_the_even_float32_and_a_hair_more_goes_up(low: float) -> N
     middle = (Fraction(low) + Fraction(high)) / 2
     hair = Fraction(1, 10**100)
     even = low if struct.unpack("<I", bits(low))[0] % 2 == 0 else high
-    assert rounded(middle, "float32") == even
-    assert rounded(middle - hair, "float32") == low
-    assert rounded(middle + hair, "float32") == high
+    assert round_to_type(middle, "float32") == even
+    assert round_to_type(middle - hair, "float32") == low
+    assert round_to_type(middle + hair, "float32") == high
 
 
 @given(SINGLES, SINGLES)
@@ -83,7 +83,7 @@ def test_a_tie_goes_to_the_even_float32_and_a_hair_more_goes_up(low: float) -> N
 @example(2.0**-149, 3.0)
 def test_an_operation_of_doubles_rounded_again_is_that_of_float32(a: float, b: float) -> None:
     for operator in "+-*/":
-        found = single(float(OPERATIONS[operator](a, b)))
+        found = round_to_float32(float(BINARY_OPERATIONS[operator](a, b)))
         assert bits(found) == bits(native(operator, a, b)), operator
     expected = np.sqrt(np.float32(a)) if a >= 0.0 else math.nan
     found = evaluate(Call("sqrt", (Value(a),)), {}, "float32")
@@ -104,15 +104,15 @@ def test_a_literal_is_rounded_from_its_exact_value() -> None:
 
 
 def test_the_largest_values_overflow_to_infinity() -> None:
-    assert rounded(Fraction(10) ** 39, "float32") == math.inf
-    assert rounded(-(Fraction(10) ** 400), "float32") == -math.inf
-    assert rounded(-(Fraction(10) ** 400)) == -math.inf
-    assert single(1e39) == math.inf
-    assert single(LARGEST) == LARGEST
+    assert round_to_type(Fraction(10) ** 39, "float32") == math.inf
+    assert round_to_type(-(Fraction(10) ** 400), "float32") == -math.inf
+    assert round_to_type(-(Fraction(10) ** 400)) == -math.inf
+    assert round_to_float32(1e39) == math.inf
+    assert round_to_float32(LARGEST) == LARGEST
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32))
 def test_the_decimal_of_a_float32_reads_back_and_is_that_of_numpy(value: float) -> None:
-    text = decimal(value, "float32")
-    assert rounded(Fraction(text), "float32") == value
+    text = shortest_decimal(value, "float32")
+    assert round_to_type(Fraction(text), "float32") == value
     assert Fraction(text) == Fraction(np.format_float_scientific(np.float32(value), unique=True))

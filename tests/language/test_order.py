@@ -9,14 +9,21 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.declaration import Formula
-from language.graph import chain
+from language.graph import format_cycle
 from language.model import Mode
 from language.operation import Assign
-from language.order import equation_order, report_circle
+from language.order import equation_order, report_cycle
 from language.problem import Problems
-from language.program import short
+from language.program import unqualified_name
 from language.syntax import names
-from tests.language.making import NOWHERE, labels, program, refusal, told, tree
+from tests.language.making import (
+    NOWHERE,
+    problem_labels,
+    problem_lines,
+    program,
+    raised_problems,
+    tree,
+)
 
 Reading = dict[str, list[str]]
 
@@ -85,7 +92,7 @@ def test_a_loop_names_members_that_read_each_other(reading: Reading, data: st.Da
     texts = summed(reading)
     texts[first] += f" + {last}"
     texts[last] += f" + {first}"
-    (problem,) = refusal(lambda: order(texts))
+    (problem,) = raised_problems(lambda: order(texts))
     members = problem.label.partition(": ")[2].replace("`", "").split(" -> ")
     assert members[0] == members[-1]
     for one, other in itertools.pairwise(members):
@@ -101,21 +108,21 @@ def test_a_loop_names_members_that_read_each_other(reading: Reading, data: st.Da
     ],
 )
 def test_an_algebraic_loop_is_told_once(equations: dict[str, str], loop: str) -> None:
-    (problem,) = refusal(lambda: order(equations))
+    (problem,) = raised_problems(lambda: order(equations))
     assert problem.label == f"an algebraic loop in mode `only`: {loop}"
 
 
 def test_a_chain_ends_where_it_started() -> None:
-    assert chain(["a", "b"]) == "`a` -> `b` -> `a`"
+    assert format_cycle(["a", "b"]) == "`a` -> `b` -> `a`"
 
 
 def test_a_circle_of_values_is_told_and_none_is_not() -> None:
     problems = Problems()
     spans = dict.fromkeys("abc", NOWHERE)
-    report_circle({"a": tree("b"), "b": tree("c"), "c": tree("x")}, spans, "derived", problems)
-    assert problems.found == []
-    report_circle({"a": tree("b"), "b": tree("a"), "c": tree("x")}, spans, "derived", problems)
-    assert labels(problems) == ["`derived` values in a circle: `a` -> `b` -> `a`"]
+    report_cycle({"a": tree("b"), "b": tree("c"), "c": tree("x")}, spans, "derived", problems)
+    assert problems.reported == []
+    report_cycle({"a": tree("b"), "b": tree("a"), "c": tree("x")}, spans, "derived", problems)
+    assert problem_labels(problems) == ["`derived` values in a circle: `a` -> `b` -> `a`"]
 
 
 MODES = """language: 1
@@ -136,17 +143,19 @@ def test_each_mode_has_an_order_of_its_own() -> None:
     made = program(MODES)
     for block, expected in (("equations_one", ["c", "a", "b"]), ("equations_two", ["a", "b", "c"])):
         targets = [op.target for op in made.blocks[block] if isinstance(op, Assign)]
-        assert [short(name) for name in targets if name.startswith("equation.")] == expected
+        assert [
+            unqualified_name(name) for name in targets if name.startswith("equation.")
+        ] == expected
 
 
 def test_a_loop_in_one_mode_is_told_there() -> None:
-    lines = told(lambda: program(MODES.replace("a: 4 m", "a: c")))
+    lines = problem_lines(lambda: program(MODES.replace("a: 4 m", "a: c")))
     assert lines == ["10:24 an algebraic loop in mode `two`: `c` -> `a` -> `c`"]
 
 
 def test_loops_in_two_modes_are_both_told() -> None:
     text = MODES.replace("a: 4 m", "a: c").replace("c: 3 m", "c: a")
-    assert len(told(lambda: program(text))) == 2
+    assert len(problem_lines(lambda: program(text))) == 2
 
 
 def test_start_values_come_after_those_that_they_read() -> None:
@@ -159,6 +168,6 @@ def test_start_values_come_after_those_that_they_read() -> None:
 
 
 def test_a_circle_of_start_values_is_refused() -> None:
-    lines = told(lambda: program(MODES.replace("initial: 2 m", "initial: z")))
+    lines = problem_lines(lambda: program(MODES.replace("initial: 2 m", "initial: z")))
     assert lines == ["5:10 `initial` values in a circle: `x` -> `z` -> `x`"]
     assert Fraction(1, 1000) == program(MODES).period

@@ -7,38 +7,38 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import Items, Node, Scalar, Table
+from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.load import automaton_of
 from language.model import Automaton
-from language.overlay import lay, without
+from language.overlay import apply_overlay, without_keys
 from language.problem import Problem, Problems, Source
 from language.project import read_document
-from language.syntax import form
-from language.yaml_tree import parse
-from tests.language.making import automaton, project_of, refusal, told, tree
+from language.syntax import structural_key
+from language.yaml_tree import parse_yaml
+from tests.language.making import automaton, problem_lines, project_of, raised_problems, tree
 
 Plain = str | list[str] | dict[str, "Plain"]
 
 
-def read(text: str, name: str = "base") -> Table:
-    return parse(Source(name, tuple(text.splitlines())), text)
+def read(text: str, name: str = "base") -> MappingNode:
+    return parse_yaml(Source(name, tuple(text.splitlines())), text)
 
 
-def plain(node: Node) -> Plain:
+def plain(node: YamlNode) -> Plain:
     """Return a tree without its places."""
     match node:
-        case Scalar(text, _, _):
+        case ScalarNode(text, _, _):
             return text
-        case Items(nodes, _):
+        case SequenceNode(nodes, _):
             return [str(plain(item)) for item in nodes]
-        case Table():
+        case MappingNode():
             return {entry.key: plain(entry.node) for entry in node}
 
 
 def laid(base: str, over: str, *, template: bool = False) -> tuple[Plain, list[Problem]]:
     problems = Problems()
-    result = lay(read(base), read(over, "over"), problems, template=template)
-    return plain(result), problems.found
+    result = apply_overlay(read(base), read(over, "over"), problems, template=template)
+    return plain(result), problems.reported
 
 
 @pytest.mark.parametrize(
@@ -68,9 +68,9 @@ def test_what_is_there_keeps_its_place_in_the_order_and_new_names_come_last() ->
 
 def test_a_value_keeps_the_place_that_it_came_from() -> None:
     base, over = read("{a: 1, b: {c: 2}}"), read("{b: {c: 3}}", "over")
-    result = lay(base, over, Problems())
+    result = apply_overlay(base, over, Problems())
     kept, table = result.get("a"), result.get("b")
-    assert isinstance(table, Table)
+    assert isinstance(table, MappingNode)
     changed = table.get("c")
     assert kept is not None and changed is not None
     assert [kept.span.source.name, changed.span.source.name] == ["base", "over"]
@@ -143,22 +143,22 @@ def test_any_two_mappings_merge_by_name(base: Plain, over: Plain) -> None:
 @given(mappings, mappings, mappings)
 def test_layers_may_be_laid_in_any_grouping(a: Plain, b: Plain, c: Plain) -> None:
     first, second, third = (read(shown(part)) for part in (a, b, c))
-    left = lay(lay(first, second, Problems()), third, Problems())
+    left = apply_overlay(apply_overlay(first, second, Problems()), third, Problems())
     assert plain(left) == merged(merged(a, b), c)
 
 
 @given(mappings)
 def test_what_was_added_can_be_removed(added: dict[str, Plain]) -> None:
     base = read("{kept: 1}")
-    more = lay(base, read(shown(added)), Problems())
+    more = apply_overlay(base, read(shown(added)), Problems())
     removal = "{" + ", ".join(f"{key}: {{remove: true}}" for key in added) + "}"
     problems = Problems()
-    assert plain(lay(more, read(removal), problems)) == {"kept": "1"}
-    assert problems.found == []
+    assert plain(apply_overlay(more, read(removal), problems)) == {"kept": "1"}
+    assert problems.reported == []
 
 
 def test_without_leaves_the_others() -> None:
-    assert plain(without(read("{a: 1, b: 2}"), "a", "c")) == {"b": "2"}
+    assert plain(without_keys(read("{a: 1, b: 2}"), "a", "c")) == {"b": "2"}
 
 
 # Templates: laid under a mode, after all variants.
@@ -186,18 +186,18 @@ NAMED = LAMP.replace("on_", "bright_one").replace("off", "dim")
 def test_a_mode_is_laid_over_its_template() -> None:
     made = automaton(NAMED)
     bright, dim, dark = made.modes.values()
-    assert [form(mode.equations["bright"].tree) for mode in (bright, dim)] == [
-        form(tree("2 m")),
-        form(tree("1 m")),
+    assert [structural_key(mode.equations["bright"].tree) for mode in (bright, dim)] == [
+        structural_key(tree("2 m")),
+        structural_key(tree("1 m")),
     ]
-    assert form(dim.update["x"].tree) == form(tree("x + bright"))
+    assert structural_key(dim.update["x"].tree) == structural_key(tree("x + bright"))
     assert [(t.target, t.priority) for t in dim.transitions] == [("bright_one", 3)]
     assert [(t.source, t.target) for t in bright.transitions] == [("bright_one", "dim")]
     assert dark.transitions == ()
 
 
 def test_an_unknown_template_is_told_with_the_nearest() -> None:
-    problems = refusal(lambda: automaton(NAMED.replace("like: common", "like: comon", 1)))
+    problems = raised_problems(lambda: automaton(NAMED.replace("like: common", "like: comon", 1)))
     assert ("there is no template `comon`", "did you mean `common`?") in [
         (problem.label, problem.help) for problem in problems
     ]
@@ -227,7 +227,7 @@ def test_a_variant_has_a_name_of_its_own(tmp_path: Path) -> None:
 def test_a_template_is_applied_after_the_variants(tmp_path: Path) -> None:
     made = variant(tmp_path, "templates: {common: {update: {x: x + 5 m}}}")
     for mode in made.modes.values():
-        assert form(mode.update["x"].tree) == form(tree("x + 5 m"))
+        assert structural_key(mode.update["x"].tree) == structural_key(tree("x + 5 m"))
 
 
 def test_a_variant_of_a_variant_has_the_changes_of_both(tmp_path: Path) -> None:
@@ -245,15 +245,15 @@ def test_the_last_layer_wins(tmp_path: Path) -> None:
 
 
 def test_a_removal_of_what_the_base_has_not_is_refused(tmp_path: Path) -> None:
-    lines = told(lambda: variant(tmp_path, "modes: {bright: {remove: true}}"))
+    lines = problem_lines(lambda: variant(tmp_path, "modes: {bright: {remove: true}}"))
     assert lines == ["4:9 `bright` cannot be removed: it is not there"]
 
 
 def test_a_new_key_where_no_such_key_is_known_is_refused(tmp_path: Path) -> None:
-    lines = told(lambda: variant(tmp_path, "modes: {dim: {updates: {x: 0 m}}}"))
+    lines = problem_lines(lambda: variant(tmp_path, "modes: {dim: {updates: {x: 0 m}}}"))
     assert lines == ["4:15 `updates` is not a key of `modes.dim`"]
 
 
 def test_all_problems_of_a_variant_are_told_in_one_run(tmp_path: Path) -> None:
     body = "modes: {bright: {remove: true}}\nstates: {z: {remove: true}}"
-    assert len(told(lambda: variant(tmp_path, body))) == 2
+    assert len(problem_lines(lambda: variant(tmp_path, body))) == 2

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from language.parse import MAX_TEXT, parse_balance
+from language.parse import MAX_EXPRESSION_LENGTH, parse_balance
 from language.syntax import Name
-from tests.language.making import refusal, scalar, tree
+from tests.language.making import raised_problems, scalar, tree
 
 NO_PRODUCT = "there is no implied multiplication"
 
 
 def first(text: str) -> tuple[int, str, str]:
     """Return column, label and help of the one problem of a text."""
-    (problem,) = refusal(lambda: tree(text))
+    (problem,) = raised_problems(lambda: tree(text))
     return problem.span.column, problem.label, problem.help
 
 
@@ -133,13 +133,13 @@ def test_an_operation_has_the_place_of_all_that_it_is_written_with(text: str) ->
 
 @pytest.mark.parametrize("text", ["J * der(w)", "", "J * der(w) T"])
 def test_a_balance_without_equality_is_refused(text: str) -> None:
-    (problem,) = refusal(lambda: parse_balance(scalar(text)))
+    (problem,) = raised_problems(lambda: parse_balance(scalar(text)))
     assert problem.label == "a balance is `coefficient * der(x) = ...`"
 
 
 @pytest.mark.parametrize(("text", "column"), [("a = b = c", 7), ("a = b < c = d", 11)])
 def test_a_balance_has_one_equality(text: str, column: int) -> None:
-    (problem,) = refusal(lambda: parse_balance(scalar(text)))
+    (problem,) = raised_problems(lambda: parse_balance(scalar(text)))
     assert problem.span.column == column
 
 
@@ -153,6 +153,9 @@ def test_parentheses_alone_nest_nothing() -> None:
 
 
 def test_an_expression_of_the_longest_length_is_read_and_a_longer_one_refused() -> None:
-    longest = "x" + " " * (MAX_TEXT - 1)
+    longest = "x" + " " * (MAX_EXPRESSION_LENGTH - 1)
     assert isinstance(tree(longest), Name)
-    assert first(longest + " ")[1] == f"an expression of {MAX_TEXT + 1} characters is too long"
+    assert (
+        first(longest + " ")[1]
+        == f"an expression of {MAX_EXPRESSION_LENGTH + 1} characters is too long"
+    )

@@ -9,11 +9,11 @@ from collections.abc import Callable
 import mpmath
 import pytest
 
-from language.evaluate import apply
+from language.evaluate import apply_function
 from language.functions import FUNCTIONS
-from language.number import single
+from language.number import NumberType, round_to_float32
 from tests.language import test_elementary_single as of_single
-from tests.language.computing import PYTHON, error, stated
+from tests.language.computing import PYTHON, stated_error, ulp_error
 
 Kept = Callable[[float], float]
 POINTS = 20_000
@@ -40,15 +40,15 @@ def test_error_is_as_stated() -> None:
     draw = random.Random("pow")
     with mpmath.workdps(60):
         pairs = [anywhere(draw, -1000, 707.0, float) for _ in range(POINTS)]
-        worst = max(pairs, key=lambda pair: error("pow", *pair))
-        assert error("pow", *worst) < stated(FUNCTIONS["pow"]), worst
+        worst = max(pairs, key=lambda pair: ulp_error("pow", *pair))
+        assert ulp_error("pow", *worst) < stated_error(FUNCTIONS["pow"]), worst
 
 
 def test_error_is_as_stated_in_float32() -> None:
     draw = random.Random("single pow")
-    pairs = [anywhere(draw, -125, 86.0, single) for _ in range(of_single.POINTS)]
-    worst = max(pairs, key=lambda pair: of_single.error("pow", *pair))
-    assert of_single.error("pow", *worst) < of_single.stated("pow"), worst
+    pairs = [anywhere(draw, -125, 86.0, round_to_float32) for _ in range(of_single.POINTS)]
+    worst = max(pairs, key=lambda pair: of_single.ulp_error("pow", *pair))
+    assert of_single.ulp_error("pow", *worst) < of_single.stated_error("pow"), worst
 
 
 @pytest.mark.parametrize(
@@ -60,8 +60,11 @@ def test_error_is_as_stated_in_float32() -> None:
     ],
 )
 @pytest.mark.parametrize("number", ["float64", "float32"])
-def test_values_that_are_known(base: float, degree: float, power: float, number: str) -> None:
-    assert apply("pow", [single(base), single(degree)], number) == power  # type: ignore[arg-type]
+def test_values_that_are_known(
+    base: float, degree: float, power: float, number: NumberType
+) -> None:
+    arguments = [round_to_float32(base), round_to_float32(degree)]
+    assert apply_function("pow", arguments, number) == power
 
 
 def test_a_power_is_clamped_as_exp_is() -> None:

@@ -14,7 +14,6 @@ from language.operation import (
     Binary,
     Branch,
     Call,
-    Choose,
     Compare,
     Count,
     Expr,
@@ -23,15 +22,16 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
 )
-from language.printing import block_lines, digest, expr_text, program_text
+from language.printing import block_lines, digest, format_expr, format_program
 from language.project import read_document
-from tests.language.making import SHIPPED, program, shipped
+from tests.language.making import SHIPPED, load_shipped, program
 
 X, Y = Ref("state.x"), Ref("state.y")
 
@@ -55,7 +55,7 @@ X, Y = Ref("state.x"), Ref("state.y")
     ],
 )
 def test_an_expression_is_printed_with_every_parenthesis(expr: Expr, text: str) -> None:
-    assert expr_text(expr) == text
+    assert format_expr(expr) == text
 
 
 @pytest.mark.parametrize(
@@ -66,12 +66,12 @@ def test_an_expression_is_printed_with_every_parenthesis(expr: Expr, text: str) 
         (Store("work.list", Value(1), Y), ["work.list[1] := state.y"]),
         (Count("timer.a", X, 3, "k"), ["count timer.a up to 3 while state.x    # k"]),
         (FaultBit("limit"), ["fault limit"]),
-        (Run("b"), ["run b"]),
-        (Loop(2, "work.k", (Run("b"),)), ["repeat 2 times as work.k", "    run b"]),
-        (Branch(X, (Run("b"),)), ["if state.x", "    run b"]),
-        (Branch(X, (), (Run("c"),)), ["if state.x", "else", "    run c"]),
+        (RunBlock("b"), ["run b"]),
+        (Loop(2, "work.k", (RunBlock("b"),)), ["repeat 2 times as work.k", "    run b"]),
+        (Branch(X, (RunBlock("b"),)), ["if state.x", "    run b"]),
+        (Branch(X, (), (RunBlock("c"),)), ["if state.x", "else", "    run c"]),
         (
-            Choose("memory.mode", ((1, (Run("b"),)), (2, ()))),
+            Switch("memory.mode", ((1, (RunBlock("b"),)), (2, ()))),
             ["when memory.mode is 1", "    run b", "when memory.mode is 2"],
         ),
     ],
@@ -84,21 +84,21 @@ def test_an_operation_is_printed_a_line_each(op: Op, lines: list[str]) -> None:
 @pytest.mark.parametrize("name", ["estimator", "driveline"])
 def test_the_text_of_a_program_is_the_same_in_every_run(name: str) -> None:
     document = read_document(SHIPPED.path_of(name))
-    first, second = program_of(shipped(name)), program_of(automaton_of(document, SHIPPED))
-    assert program_text(first) == program_text(second)
+    first, second = program_of(load_shipped(name)), program_of(automaton_of(document, SHIPPED))
+    assert format_program(first) == format_program(second)
     assert digest(first) == digest(second)
-    assert program_text(first).startswith(f"program {name}\nnumbers float64\n")
+    assert format_program(first).startswith(f"program {name}\nnumbers float64\n")
 
 
 def test_the_digest_is_16_hexadecimal_digits() -> None:
-    assert re.fullmatch("[0-9a-f]{16}", digest(program_of(shipped("estimator"))))
+    assert re.fullmatch("[0-9a-f]{16}", digest(program_of(load_shipped("estimator"))))
 
 
 # Every value counts.
 
 
 def test_the_digest_changes_with_every_parameter() -> None:
-    made = shipped("estimator")
+    made = load_shipped("estimator")
     digests = {"": digest(program_of(made))}
     for name, thing in made.parameters.items():
         if thing.value is not None and name != "t_wait":
@@ -111,8 +111,8 @@ def test_the_digest_changes_with_every_parameter() -> None:
 
 @pytest.mark.parametrize(("name", "value"), [("t_wait", "0.71 ms"), ("m", "1250.0001 kg")])
 def test_the_digest_changes_with_a_value_that_is_set(name: str, value: str) -> None:
-    assert digest(program_of(shipped("estimator", **{name: value}))) != digest(
-        program_of(shipped("estimator"))
+    assert digest(program_of(load_shipped("estimator", **{name: value}))) != digest(
+        program_of(load_shipped("estimator"))
     )
 
 

@@ -9,11 +9,18 @@ import pytest
 from language.document import Document
 from language.load import automaton_of, load_automaton
 from language.problem import Problems, Source, Span
-from language.project import Project, expanded, layered, lineage, read_document, shown
+from language.project import (
+    Project,
+    apply_variant,
+    display_path,
+    expand_document,
+    lineage,
+    read_document,
+)
 from language.scenario import read_scenario
 from language.system import read_system
 from modewright.api import check
-from tests.language.making import SHIPPED, document, project_of, refusal, told
+from tests.language.making import SHIPPED, document, problem_lines, project_of, raised_problems
 
 PLAIN = """language: 1
 automaton: {name}
@@ -34,7 +41,7 @@ def variant(name: str, base: str, body: str = "") -> str:
 
 
 def extended(project: Project, name: str) -> Document:
-    return expanded(read_document(project.path_of(name)), project)
+    return expand_document(read_document(project.path_of(name)), project)
 
 
 def test_a_file_is_found_by_the_name_of_what_it_holds(tmp_path: Path) -> None:
@@ -93,7 +100,7 @@ def test_a_shipped_automaton_takes_the_own_model(tmp_path: Path) -> None:
 
 def test_two_definitions_are_refused_with_both_files(tmp_path: Path) -> None:
     project = project_of(tmp_path, a=plain("ball"), b=plain("ball"))
-    (problem,) = refusal(lambda: project.path_of("ball"))
+    (problem,) = raised_problems(lambda: project.path_of("ball"))
     assert problem.label == "`ball` is defined twice"
     assert "a.yaml" in problem.help and "b.yaml" in problem.help
 
@@ -101,24 +108,24 @@ def test_two_definitions_are_refused_with_both_files(tmp_path: Path) -> None:
 def test_two_kinds_share_their_names(tmp_path: Path) -> None:
     system = "language: 1\nsystem: ball\ninstances: {one: {of: ball}}\n"
     project = project_of(tmp_path, a=plain("ball"), b=system)
-    assert told(lambda: project.path_of("ball")) == ["1:1 `ball` is defined twice"]
+    assert problem_lines(lambda: project.path_of("ball")) == ["1:1 `ball` is defined twice"]
 
 
 def test_an_unknown_name_is_refused_with_the_nearest() -> None:
-    (problem,) = refusal(lambda: SHIPPED.path_of("drivelin"))
+    (problem,) = raised_problems(lambda: SHIPPED.path_of("drivelin"))
     assert problem.label == "there is no spec named `drivelin`"
     assert problem.help == "did you mean `driveline`?"
 
 
 def test_an_unknown_name_is_told_where_it_is_written(tmp_path: Path) -> None:
     project = project_of(tmp_path, v=variant("v", "balll"), a=plain("ball"))
-    (problem,) = refusal(lambda: extended(project, "v"))
+    (problem,) = raised_problems(lambda: extended(project, "v"))
     assert (problem.span.line, problem.span.column, problem.span.width) == (3, 10, 5)
     assert problem.help == "did you mean `ball`?"
 
 
 def test_a_path_that_is_no_file_is_refused(tmp_path: Path) -> None:
-    lines = told(lambda: load_automaton(str(tmp_path / "none.yaml"), SHIPPED))
+    lines = problem_lines(lambda: load_automaton(str(tmp_path / "none.yaml"), SHIPPED))
     assert lines == ["1:1 the file cannot be read: No such file or directory"]
 
 
@@ -148,11 +155,11 @@ def test_a_file_of_a_project_that_is_no_yaml_hides_no_other(tmp_path: Path) -> N
     ],
 )
 def test_a_file_starts_with_its_version_its_kind_and_its_name(text: str, lines: list[str]) -> None:
-    assert told(lambda: document(text)) == lines
+    assert problem_lines(lambda: document(text)) == lines
 
 
 def test_a_document_of_another_kind_is_no_automaton() -> None:
-    lines = told(lambda: load_automaton("ev_driveline", SHIPPED))
+    lines = problem_lines(lambda: load_automaton("ev_driveline", SHIPPED))
     assert [line.partition(" ")[2] for line in lines] == [
         "`ev_driveline` is a system, not an automaton"
     ]
@@ -160,7 +167,9 @@ def test_a_document_of_another_kind_is_no_automaton() -> None:
 
 def test_a_variant_says_what_it_extends(tmp_path: Path) -> None:
     project = project_of(tmp_path, v="language: 1\nvariant: v\n")
-    assert told(lambda: extended(project, "v")) == ["2:10 a variant says what it `extends`"]
+    assert problem_lines(lambda: extended(project, "v")) == [
+        "2:10 a variant says what it `extends`"
+    ]
 
 
 def test_a_variant_becomes_what_its_base_is(tmp_path: Path) -> None:
@@ -184,27 +193,29 @@ def test_a_circle_of_variants_is_refused_with_the_chain(
 ) -> None:
     project = project_of(tmp_path, **{name: variant(name, base) for name, base in bases.items()})
     for make in (extended, lambda p, name: lineage(read_document(p.path_of(name)), p)):
-        assert told(lambda make=make: make(project, "v")) == [f"3:10 {chain}"]  # type: ignore[misc]
+        assert problem_lines(lambda make=make: make(project, "v")) == [f"3:10 {chain}"]  # type: ignore[misc]
 
 
 def test_twenty_one_layers_are_too_many(tmp_path: Path) -> None:
     chain = {f"v{k}": variant(f"v{k}", f"v{k + 1}") for k in range(20)}
     project = project_of(tmp_path, **chain, v20=plain("v20"))
     assert extended(project, "v1").kind == "automaton"
-    assert told(lambda: extended(project, "v0")) == ["3:10 more than 20 layers lie over each other"]
+    assert problem_lines(lambda: extended(project, "v0")) == [
+        "3:10 more than 20 layers lie over each other"
+    ]
 
 
 @pytest.mark.parametrize("base", ["v.yaml", "./v.yaml"])
 def test_a_circle_of_variants_by_paths_is_refused(tmp_path: Path, base: str) -> None:
     project = project_of(tmp_path, v=variant("v", base))
-    assert told(lambda: extended(project, "v")) == ["3:10 `v` extends itself: `v` -> `v`"]
+    assert problem_lines(lambda: extended(project, "v")) == ["3:10 `v` extends itself: `v` -> `v`"]
 
 
 def test_an_automaton_that_is_its_own_model_is_refused(tmp_path: Path) -> None:
     clocked = "period: 1 ms\nnumbers: float64\nmodel: ball\n"
     text = plain("ball").replace("flow: {x: der(x) = 0}\n", clocked)
     project = project_of(tmp_path, a=text)
-    assert told(lambda: load_automaton("ball", project))
+    assert problem_lines(lambda: load_automaton("ball", project))
 
 
 def test_a_warning_of_a_variant_is_told(tmp_path: Path) -> None:
@@ -280,10 +291,10 @@ def test_a_variant_is_laid_over_what_it_extends_or_a_relative_of_it(tmp_path: Pa
     )
     hot = read_document(project.path_of("hot"))
     base = read_document(project.path_of("v"))
-    made = layered(base, hot, project, Problems())
+    made = apply_variant(base, hot, project, Problems())
     assert automaton_of(made, project).parameters["p"].value == 3
     other = read_document(project.path_of("cube"))
-    (problem,) = refusal(lambda: layered(other, hot, project, Problems()))
+    (problem,) = raised_problems(lambda: apply_variant(other, hot, project, Problems()))
     assert problem.label == "variant `hot` extends `ball`, not `cube`"
 
 
@@ -291,6 +302,6 @@ def test_a_path_is_shown_as_short_as_it_can_be(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert shown(tmp_path / "spec" / "a.yaml") == str(Path("spec") / "a.yaml")
+    assert display_path(tmp_path / "spec" / "a.yaml") == str(Path("spec") / "a.yaml")
     outside = tmp_path.parent / "a.yaml"
-    assert shown(outside) == str(outside)
+    assert display_path(outside) == str(outside)

@@ -16,7 +16,7 @@ from engine.interpreter import Interpreter
 from language.program import Program
 from lockstep.compare import compare
 from tests.language.making import program
-from tests.lockstep.programs import taped
+from tests.lockstep.programs import record_ticks
 
 TOLERANCE = 1e-9
 """Of the largest value: semantics, rule 17."""
@@ -54,7 +54,7 @@ CONSTANT = "0.2 1/s^5"
 VARYING = "0.2 1/s^5 + 3 1/s * (u - previous(u))^2"
 
 
-def made(*changes: tuple[str, str], noise: str = CONSTANT) -> Program:
+def make_program(*changes: tuple[str, str], noise: str = CONSTANT) -> Program:
     text = SPEC.replace("NOISE", noise)
     for old, new in changes:
         assert old in text
@@ -107,7 +107,7 @@ def filterpy_at(x: Matrix, p: Matrix, density: float) -> KalmanFilter:
 
 @pytest.mark.parametrize("noise", [CONSTANT, VARYING])
 def test_it_is_filterpy_tick_by_tick(noise: str) -> None:
-    inside = Interpreter(made(noise=noise))
+    inside = Interpreter(make_program(noise=noise))
     series = ticks(60)
     step(inside, series[0])
     for before, now in itertools.pairwise(series):
@@ -128,8 +128,8 @@ def test_it_is_filterpy_tick_by_tick(noise: str) -> None:
 
 def test_without_gaps_it_stays_in_the_steady_state() -> None:
     """It starts with the steady covariance of before a correction, so nothing ever changes."""
-    inside = Interpreter(made())
-    steady = Interpreter(made(("gain: recursive, covariance: keep", "gain: steady")))
+    inside = Interpreter(make_program())
+    steady = Interpreter(make_program(("gain: recursive, covariance: keep", "gain: steady")))
     first = np.zeros((3, 3))
     for k, given in enumerate(ticks(40)):
         for one in (inside, steady):
@@ -143,7 +143,7 @@ def test_without_gaps_it_stays_in_the_steady_state() -> None:
 
 
 def test_the_innovation_is_that_of_the_prediction_and_0_without_a_measurement() -> None:
-    inside = Interpreter(made())
+    inside = Interpreter(make_program())
     for given in ticks(12):
         step(inside, given)
         if not given["ok"]:
@@ -163,7 +163,7 @@ COMING_BACK = (
 @pytest.mark.parametrize("kept", [True, False])
 def test_covariance_is_kept_across_modes_or_steady_on_entry(kept: bool) -> None:
     changes = COMING_BACK if kept else (*COMING_BACK, ("keep", "steady"))
-    inside = Interpreter(made(*changes))
+    inside = Interpreter(make_program(*changes))
     calm = {"y_x": 0.0, "y_v": 0.0, "u": 0.0, "ok": True, "new": True}
     step(inside, calm)
     first = covariance(inside)
@@ -179,7 +179,7 @@ def test_covariance_is_kept_across_modes_or_steady_on_entry(kept: bool) -> None:
 
 def test_variances_stay_within_their_limits_with_a_fault() -> None:
     limits = "covariance: keep, covariance_range: {x: [0.001, 0.05], v: [0.01 1/s^2, 0.095 1/s^2]}"
-    used = made(("covariance: keep", limits))
+    used = make_program(("covariance: keep", limits))
     inside = Interpreter(used)
     bit = 1 << used.faults.index("covariance_range")
     calm = {"y_x": 0.0, "y_v": 0.0, "u": 0.0, "ok": True, "new": True}
@@ -208,5 +208,5 @@ def test_engine_and_c_are_equal(numbers: str, noise: str) -> None:
     inputs = [{f"input.{n}": v for n, v in given.items() if n != "new"} for given in series]
     for given, one in zip(series, inputs, strict=True):
         one.update({"is_new.y_x": True, "is_new.y_v": given["new"]})
-    verdict = compare(taped(made(*change, noise=noise), inputs))
+    verdict = compare(record_ticks(make_program(*change, noise=noise), inputs))
     assert verdict.is_equal and verdict.transitions > 0, verdict

@@ -9,13 +9,13 @@ import pytest
 from filterpy.common import van_loan_discretization
 
 from engine.interpreter import Interpreter
-from language.operation import Block, Branch, Compare, Loop, Ref, Run, Value
-from language.traversal import walk
+from language.operation import Block, Branch, Compare, Loop, Ref, RunBlock, Value
+from language.traversal import walk_ops
 from lockstep.compare import compare
 from modewright.api import program as shipped_program
-from tests.language.making import program, project_of, told
-from tests.language.test_recursive import CONSTANT, SPEC, made
-from tests.lockstep.programs import taped
+from tests.language.making import problem_lines, program, project_of
+from tests.language.test_recursive import CONSTANT, SPEC, make_program
+from tests.lockstep.programs import record_ticks
 
 OBSERVING = """  on_2:
     observer:
@@ -95,7 +95,7 @@ def test_a_run_that_predicts_is_equal_in_c(tmp_path: Path) -> None:
         {"input.y_x": 0.08 * k, "input.u": 0.5 * (k % 3), "is_new.y_x": k % 2 == 0}
         for k in range(30)
     ]
-    assert compare(taped(used, inputs)).is_equal
+    assert compare(record_ticks(used, inputs)).is_equal
 
 
 def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
 
     def lines(old: str, new: str) -> list[str]:
         assert old in HYBRID
-        return told(lambda: program(HYBRID.replace(old, new), project))
+        return problem_lines(lambda: program(HYBRID.replace(old, new), project))
 
     (line,) = lines("gain: recursive, covariance: keep", "gain: steady")
     assert "`predict: runs` needs `gain: recursive`" in line
@@ -112,12 +112,14 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
     assert lines("    runs: {of: m.free, method: exponential}\n", "")
     (line,) = lines("      predict: runs\n", "      predict: runs\n      correct: u\n")
     assert "`correct` names an input of type bool, `u` is none" in line
-    assert told(lambda: made(("gain: recursive, covariance: keep", "covariance: keep")))
-    (line,) = told(lambda: made(("initial: on_1", "equations: {w: u * 1}\ninitial: on_1"),
+    assert problem_lines(
+        lambda: make_program(("gain: recursive, covariance: keep", "covariance: keep"))
+    )
+    (line,) = problem_lines(lambda: make_program(("initial: on_1", "equations: {w: u * 1}\ninitial: on_1"),
                                 noise="0.2 1/s^5 + 0 1/s^3 * w"))  # fmt: skip
     assert line.endswith("`w` is an equation: an observer reads states and inputs")
     other = OBSERVING.format(states="[v, x, b]")
-    (line,) = told(lambda: made(("  on_2: {}", other)))
+    (line,) = problem_lines(lambda: make_program(("  on_2: {}", other)))
     assert line.endswith("observers of an automaton have the same states in the same order")
     program(
         SPEC.replace("NOISE", CONSTANT).replace("  on_2: {}", OBSERVING.format(states="[x, v, b]"))
@@ -135,7 +137,7 @@ def blocks_by(method: str, folder: Path) -> dict[str, Block]:
 def test_a_run_by_rk4_holds_states_after_each_segment(tmp_path: Path) -> None:
     blocks = blocks_by("rk4", tmp_path)
     (loop,) = (op for op in blocks["run_only"] if isinstance(op, Loop))
-    assert Run("hold") in tuple(walk(loop.body))
+    assert RunBlock("hold") in tuple(walk_ops(loop.body))
     assert "hold" not in blocks_by("exponential", tmp_path)
 
 
@@ -156,7 +158,7 @@ def test_a_run_by_rk4_is_equal_in_c_where_it_leaves_its_ranges(tmp_path: Path) -
         {"input.y_x": 0.08 * k, "input.u": 3.0 * (k % 3), "is_new.y_x": k % 2 == 0}
         for k in range(30)
     ]
-    tape = taped(used, inputs)
+    tape = record_ticks(used, inputs)
     assert compare(tape).is_equal
     inside = Interpreter(used)
     for given in inputs:
@@ -174,4 +176,4 @@ def test_modes_with_the_same_limits_share_what_keeps_them() -> None:
     blocks = shipped_program("hko").blocks
     assert [name for name in blocks if name.startswith("bound_")] == ["bound_drive"]
     for mode in ("drive", "gap", "coast"):
-        assert blocks[f"correct_{mode}"][-1] == Run("bound_drive")
+        assert blocks[f"correct_{mode}"][-1] == RunBlock("bound_drive")

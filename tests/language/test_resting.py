@@ -9,10 +9,10 @@ import pytest
 from engine.interpreter import Interpreter
 from language.operation import Assign, Ref
 from language.program import Program
-from language.resting import carried_on, movable, moving
-from language.run import HOLD
-from language.traversal import block_writes, reached
-from tests.language.making import automaton, program, project_of, shipped
+from language.resting import ever_varying_states, varying_states, written_states
+from language.run import SATURATION_BLOCK
+from language.traversal import block_writes, reachable_blocks
+from tests.language.making import automaton, load_shipped, program, project_of
 
 CART = """\
 language: 1
@@ -80,26 +80,32 @@ def clock(folder: Path, text: str, method: str) -> Program:
 
 def written(made: Program, block: str) -> set[str]:
     """Return what a block and those that it runs write."""
-    return {name for run in reached(block, made.blocks) for name in block_writes(made.blocks[run])}
+    return {
+        name
+        for run in reachable_blocks(block, made.blocks)
+        for name in block_writes(made.blocks[run])
+    }
 
 
 def test_a_state_rests_by_its_balance_or_by_an_equation() -> None:
     cart = automaton(CART)
-    assert moving(cart, "still") == ("a",)
-    assert moving(cart, "both") == ("a", "b")
-    assert movable(cart) == ("a", "b")
+    assert varying_states(cart, "still") == ("a",)
+    assert varying_states(cart, "both") == ("a", "b")
+    assert ever_varying_states(cart) == ("a", "b")
 
 
 def test_what_a_region_beside_balances_may_move() -> None:
     oven = automaton(BESIDE)
-    assert moving(oven, "only") == movable(oven) == ("h",)
+    assert varying_states(oven, "only") == ever_varying_states(oven) == ("h",)
 
 
 def test_the_angle_of_the_gap_rests_in_contact_and_the_load_everywhere() -> None:
-    driveline = shipped("driveline_load")
-    contact, gap = (set(moving(driveline, mode)) for mode in ("drive_contact", "no_contact"))
+    driveline = load_shipped("driveline_load")
+    contact, gap = (
+        set(varying_states(driveline, mode)) for mode in ("drive_contact", "no_contact")
+    )
     assert gap - contact == {"theta_b"}
-    assert set(driveline.states) - set(movable(driveline)) == {"T_l"}
+    assert set(driveline.states) - set(ever_varying_states(driveline)) == {"T_l"}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -141,7 +147,7 @@ def test_what_rests_is_held_where_a_transition_resets_it(tmp_path: Path, method:
     reset = "both: {when: a > 1.5, reset: {c: 20}}"
     cart = CART.replace("both: {when: a > 1.5}", reset)
     made = program(CLOCK.format(method=method), project_of(tmp_path, cart=cart))
-    assert carried_on(automaton(cart)) == ("a", "b", "c")
+    assert written_states(automaton(cart)) == ("a", "b", "c")
     inside = Interpreter(made)
     inside.set("input.u", 1.0)
     for _ in range(6):
@@ -157,7 +163,7 @@ def test_at_a_crossing_only_what_moves_is_held_in_its_range(tmp_path: Path, meth
     made = clock(tmp_path, BACK, method)
     (back,) = [name for name in made.blocks if name.startswith("back_")]
     assert "state.c" in written(made, back)
-    told = repr(made.blocks[back] if method == "euler" else made.blocks[HOLD])
+    told = repr(made.blocks[back] if method == "euler" else made.blocks[SATURATION_BLOCK])
     moves = [True, method != "euler", False]  # what is held by the block of all runs moves in one
     assert [f"range_{name}" in told for name in "abc"] == moves
     inside = Interpreter(made)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.run import HOLD
-from language.traversal import reached
+from language.run import SATURATION_BLOCK
+from language.traversal import reachable_blocks
 from tests.language.making import program, project_of
 
 LANE = """\
@@ -77,7 +77,7 @@ def test_names_that_read_alike_when_joined_are_kept_apart(tmp_path: Path) -> Non
 def test_the_rings_hold_what_the_longest_rewind_asks_for(tmp_path: Path) -> None:
     made = program(TWINS, project_of(tmp_path, lane=LANE))
     assert {v.size for v in made.variables if v.name == "memory.past_x"} == {8}
-    assert [info.rewind for info in made.transitions] == [8, 2]
+    assert [info.rewind_ticks for info in made.transitions] == [8, 2]
 
 
 @pytest.mark.parametrize("method", ["euler", "exact", "midpoint", "rk4"])
@@ -89,7 +89,9 @@ def test_what_leaves_its_range_at_a_crossing_is_held_there(
     text = HELD.replace("METHOD", method).replace("ON_RANGE", on_range)
     made = program(text, project_of(tmp_path, pushed=PUSHED))
     (back,) = [name for name in made.blocks if name.startswith("back_")]
-    assert (HOLD in reached(back, made.blocks)) == (method in ("midpoint", "rk4"))
+    assert (SATURATION_BLOCK in reachable_blocks(back, made.blocks)) == (
+        method in ("midpoint", "rk4")
+    )
     inside = Interpreter(made)
     for _ in range(3):
         inside.run("step")

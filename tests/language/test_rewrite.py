@@ -6,8 +6,15 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.parse import parse_balance, parse_expression
-from language.rewrite import joined, reads, renamed, sides, substituted, summands
-from language.syntax import form, names
+from language.rewrite import (
+    join_summands,
+    names_in_text,
+    rename_names,
+    split_balance,
+    split_summands,
+    substitute_reads,
+)
+from language.syntax import names, structural_key
 from tests.language.making import scalar
 
 leaves = st.sampled_from(["a", "b", "ab", "m", "x_1", "2", "0.5", "3 m", "2.0e-3 N*m", "5 1/s"])
@@ -31,29 +38,30 @@ expressions = st.recursive(
 @given(expressions)
 def test_a_name_is_replaced_wherever_it_is_read_and_nothing_else_is(text: str) -> None:
     before = [name.path for name in names(parse_expression(scalar(text)))]
-    new, found = substituted(text, {"a": "zz", "m": "yy"})
+    new, found = substitute_reads(text, {"a": "zz", "m": "yy"})
     after = [name.path for name in names(parse_expression(scalar(new)))]
     assert after == [{"a": "zz", "m": "yy"}.get(name, name) for name in before]
     assert found == {"a", "m"} & set(before)
-    assert reads(text) == before
+    assert names_in_text(text) == before
 
 
 @given(expressions, expressions)
 def test_what_is_put_for_a_name_is_one_operand(text: str, put: str) -> None:
     """Substituting in the text and in the tree are one: parse(text[a := put])."""
-    new, _ = substituted(text, {"a": put})
-    marked, _ = substituted(text, {"a": "qq"})
-    by_tree = repr(form(parse_expression(scalar(marked)))).replace(
-        repr(form(parse_expression(scalar("qq")))), repr(form(parse_expression(scalar(put))))
+    new, _ = substitute_reads(text, {"a": put})
+    marked, _ = substitute_reads(text, {"a": "qq"})
+    by_tree = repr(structural_key(parse_expression(scalar(marked)))).replace(
+        repr(structural_key(parse_expression(scalar("qq")))),
+        repr(structural_key(parse_expression(scalar(put)))),
     )
-    assert repr(form(parse_expression(scalar(new)))) == by_tree
+    assert repr(structural_key(parse_expression(scalar(new)))) == by_tree
 
 
 @given(st.lists(st.tuples(st.sampled_from("+-"), expressions), min_size=1, max_size=4))
 def test_summands_are_those_of_the_top_level(parts: list[tuple[str, str]]) -> None:
     wrapped = [(sign, f"({text})") for sign, text in parts]
     wrapped[0] = ("+", wrapped[0][1])
-    assert summands(joined(wrapped)) == wrapped
+    assert split_summands(join_summands(wrapped)) == wrapped
 
 
 @pytest.mark.parametrize(
@@ -67,22 +75,22 @@ def test_summands_are_those_of_the_top_level(parts: list[tuple[str, str]]) -> No
     ],
 )
 def test_signs_that_are_no_sums(text: str, wanted: list[tuple[str, str]]) -> None:
-    assert summands(text) == wanted
+    assert split_summands(text) == wanted
 
 
 def test_no_summand_is_zero() -> None:
-    assert joined([]) == "0"
+    assert join_summands([]) == "0"
 
 
 def test_the_derivative_of_a_state_is_no_read_of_it_but_follows_its_name() -> None:
     text = "m * der(x) = -k * x + in(x)"
-    assert substituted(text, {"x": "y"})[0] == "m * der(x) = -k * y + in(x)"
-    assert renamed(text, {"x": "y"}) == "m * der(y) = -k * y + in(y)"
-    assert sides(text) == ("m * der(x)", "-k * x + in(x)")
+    assert substitute_reads(text, {"x": "y"})[0] == "m * der(x) = -k * y + in(x)"
+    assert rename_names(text, {"x": "y"}) == "m * der(y) = -k * y + in(y)"
+    assert split_balance(text) == ("m * der(x)", "-k * x + in(x)")
     left, _ = parse_balance(scalar("m * der(x) = x"))
-    assert reads("m * der(x)") == ["m"] and len(names(left)) == 2
+    assert names_in_text("m * der(x)") == ["m"] and len(names(left)) == 2
 
 
 def test_a_path_a_function_and_a_unit_are_no_names() -> None:
     text = "max(max, m.max) + 3 m * m"
-    assert substituted(text, {"max": "q", "m": "r"})[0] == "max(q, m.max) + 3 m * r"
+    assert substitute_reads(text, {"max": "q", "m": "r"})[0] == "max(q, m.max) + 3 m * r"

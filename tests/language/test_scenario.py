@@ -9,12 +9,21 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.experiment import Scenario, System
-from language.literal import constant
+from language.literal import evaluate_literal
 from language.project import read_document
 from language.scenario import MAX_HORIZON, read_scenario
 from language.system import read_system
 from language.units import parse_unit
-from tests.language.making import SHIPPED, dimension, document, project_of, refusal, si, told, tree
+from tests.language.making import (
+    SHIPPED,
+    dimension,
+    document,
+    problem_lines,
+    project_of,
+    raised_problems,
+    si_value,
+    tree,
+)
 
 PLANT = """language: 1
 automaton: plant
@@ -54,7 +63,7 @@ def run(
 
 
 def lines(system: System, *parts: str) -> list[str]:
-    return [line.partition(" ")[2] for line in told(lambda: run(system, *parts))]
+    return [line.partition(" ")[2] for line in problem_lines(lambda: run(system, *parts))]
 
 
 def steps(made: Scenario, name: str) -> list[tuple[Fraction, Fraction]]:
@@ -151,7 +160,7 @@ def test_an_input_that_is_wrong_is_refused(system: System, inputs: str, label: s
 
 def test_the_problem_of_a_step_stands_at_the_step(system: System) -> None:
     text = "u: {start: 0, steps: {1 s: 3, 0.5 s: 4}}"
-    (problem,) = refusal(lambda: run(system, text))
+    (problem,) = raised_problems(lambda: run(system, text))
     line = problem.span.source.lines[problem.span.line - 1]
     assert line[problem.span.column - 1 :].startswith("0.5 s: 4")
 
@@ -161,7 +170,7 @@ def test_the_problem_of_a_step_stands_at_the_step(system: System) -> None:
 
 def test_a_start_value_is_a_formula_of_literals(system: System) -> None:
     made = run(system, "u: 0", "p.x: 36 km/h * 2 s - 5 m, p.phi: -3 deg")
-    assert made.initial == {"p.x": 15, "p.phi": -si("3 deg")}
+    assert made.initial == {"p.x": 15, "p.phi": -si_value("3 deg")}
 
 
 @pytest.mark.parametrize(
@@ -205,13 +214,13 @@ def test_a_bare_0_starts_anything(system: System) -> None:
     ],
 )
 def test_a_constant_is_exact_and_has_a_dimension(text: str, value: Fraction, unit: str) -> None:
-    found, kind = constant(tree(text))
+    found, kind = evaluate_literal(tree(text))
     assert (found, kind.powers) == (value, dimension(unit).powers)
 
 
 def test_a_sum_with_a_free_value_has_the_angle_of_the_other() -> None:
     for text in ("2 m/s / 1 m + 3 rad/s", "3 rad/s - 2 m/s / 1 m"):
-        assert constant(tree(text))[1] == dimension("rad/s")
+        assert evaluate_literal(tree(text))[1] == dimension("rad/s")
 
 
 # Times.
@@ -238,13 +247,13 @@ def test_a_day_is_the_longest_horizon(system: System) -> None:
 
 def test_a_scenario_without_a_horizon_is_refused(system: System) -> None:
     text = "language: 1\nscenario: run\nof: rig\ninputs: {u: 0}\n"
-    assert told(lambda: read_scenario(document(text), SHIPPED, system)) == [
+    assert problem_lines(lambda: read_scenario(document(text), SHIPPED, system)) == [
         "2:11 `horizon` is missing"
     ]
 
 
 def test_another_kind_is_no_scenario(system: System) -> None:
-    (line,) = told(lambda: read_scenario(document(RIG), SHIPPED, system))
+    (line,) = problem_lines(lambda: read_scenario(document(RIG), SHIPPED, system))
     assert line == "2:9 `rig` is a system, not a scenario"
 
 

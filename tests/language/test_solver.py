@@ -9,29 +9,29 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from language.halfspace import disproved
-from language.lower import expression
+from language.halfspace import is_disproved_by_bounds
+from language.lower import lower_expression
 from language.operation import Expr, Ref
-from language.question import Extent, Question
+from language.question import SolverQuery, VariableDomain
 from language.solver import Solver
 from tests.language.making import tree
 
 SOLVER = Solver()
 EXTENTS = {
-    "x": Extent(low=Fraction(-4), high=Fraction(4)),
-    "y": Extent(),
-    "n": Extent("whole", low=Fraction(0), high=Fraction(9)),
-    "p": Extent("truth"),
-    "key": Extent("whole", numbers=(0, 1, 2), names=("parked", "on_road", "open")),
+    "x": VariableDomain(low=Fraction(-4), high=Fraction(4)),
+    "y": VariableDomain(),
+    "n": VariableDomain("whole", low=Fraction(0), high=Fraction(9)),
+    "p": VariableDomain("truth"),
+    "key": VariableDomain("whole", numbers=(0, 1, 2), names=("parked", "on_road", "open")),
 }
 KNOWN: dict[str, Expr] = {
     name: Ref(name, extent.type == "whole") for name, extent in EXTENTS.items()
 }
 
 
-def question(*texts: str) -> Question:
-    conditions = tuple(expression(tree(text), KNOWN) for text in texts)
-    return Question(conditions, (), EXTENTS, {})
+def question(*texts: str) -> SolverQuery:
+    conditions = tuple(lower_expression(tree(text), KNOWN) for text in texts)
+    return SolverQuery(conditions, (), EXTENTS, {})
 
 
 NEVER = [
@@ -60,7 +60,7 @@ NEVER = [
 
 @pytest.mark.parametrize("texts", NEVER)
 def test_what_can_never_be_is_proven(texts: tuple[str, ...]) -> None:
-    assert SOLVER.ask(question(*texts)) == "never"
+    assert SOLVER.solve(question(*texts)) == "never"
 
 
 SOMETIMES = [
@@ -77,7 +77,7 @@ SOMETIMES = [
 @pytest.mark.parametrize("texts", SOMETIMES)
 def test_what_is_found_holds_by_our_own_arithmetic(texts: tuple[str, ...]) -> None:
     asked = question(*texts)
-    found = SOLVER.ask(asked)
+    found = SOLVER.solve(asked)
     assert not isinstance(found, str)
     assert asked.holds_at(found)
 
@@ -87,7 +87,7 @@ def test_threads_ask_side_by_side() -> None:
     together = Solver()
     many = [*NEVER, *SOMETIMES] * 20
     with ThreadPoolExecutor(8) as pool:
-        answers = list(pool.map(lambda texts: together.ask(question(*texts)), many))
+        answers = list(pool.map(lambda texts: together.solve(question(*texts)), many))
     proven = [found == "never" for found in answers]
     assert proven == [texts in NEVER for texts in many]
     assert "open" not in answers
@@ -96,7 +96,7 @@ def test_threads_ask_side_by_side() -> None:
 def test_functions_without_a_theory_are_any_within_their_bounds() -> None:
     """z3 takes sin(0.5) for 0.9, so its witness is none by our arithmetic."""
     asked = question("sin(x) > 0.9", "x < 1", "x > 0")
-    found = SOLVER.ask(asked)
+    found = SOLVER.solve(asked)
     assert not isinstance(found, str)
     assert not asked.holds_at(found)
 
@@ -123,7 +123,7 @@ def test_a_point_outside_of_the_extents_is_no_witness() -> None:
     ],
 )
 def test_linear_conditions_are_disproved_without_a_solver(texts: tuple[str, ...]) -> None:
-    assert disproved(question(*texts))
+    assert is_disproved_by_bounds(question(*texts))
 
 
 sides = st.sampled_from(["x", "y", "x + y", "2 * x - y", "-x", "0.5", "x * y", "n"])
@@ -144,5 +144,5 @@ def test_what_is_disproved_never_holds(texts: list[str], x: float, y: float, n: 
     asked = question(*texts)
     point: dict[str, Any] = {"x": x, "y": y, "n": n}
     if asked.holds_at(point):
-        assert not disproved(asked)
-        assert SOLVER.ask(asked) != "never"
+        assert not is_disproved_by_bounds(asked)
+        assert SOLVER.solve(asked) != "never"

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from language.document import Scalar
+from language.document import ScalarNode
 from language.experiment import System
 from language.system import read_system
-from tests.language.making import document, project_of, refusal, told
+from tests.language.making import document, problem_lines, project_of, raised_problems
 
 PLANT = """language: 1
 automaton: plant
@@ -53,21 +53,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def rig(
+def read_rig(
     folder: Path,
     connections: str = JOINED,
     instances: str = PAIR,
     outputs: str = "",
-    overrides: dict[str, Scalar] | None = None,
+    overrides: dict[str, ScalarNode] | None = None,
 ) -> System:
     text = SYSTEM.format(instances=instances, connections=connections, outputs=outputs)
     return read_system(document(text), project_of(folder), overrides)
 
 
-def lines(
+def system_problem_lines(
     folder: Path, connections: str = JOINED, instances: str = PAIR, outputs: str = ""
 ) -> list[str]:
-    found = told(lambda: rig(folder, connections, instances, outputs))
+    found = problem_lines(lambda: read_rig(folder, connections, instances, outputs))
     return [line.partition(" ")[2] for line in found]
 
 
@@ -75,15 +75,15 @@ def lines(
 
 
 def test_a_connection_joins_an_input_with_an_input_an_output_or_a_value(folder: Path) -> None:
-    made = rig(folder, "p.u: 36 km/h, f.in_x: p.x, f.ratio: -2")
+    made = read_rig(folder, "p.u: 36 km/h, f.in_x: p.x, f.ratio: -2")
     found = {".".join(target): made.connections[target].source for target in made.connections}
     assert found == {"p.u": 10, "f.in_x": "p.x", "f.ratio": -2}
-    assert rig(folder, "p.u: speed, f.in_x: knob").connections["f", "in_x"].source == "knob"
+    assert read_rig(folder, "p.u: speed, f.in_x: knob").connections["f", "in_x"].source == "knob"
 
 
 @pytest.mark.parametrize("value", ["3 mm", "0.003", "'0.003 m'"])
 def test_a_bare_value_is_in_the_unit_of_the_input(folder: Path, value: str) -> None:
-    made = rig(folder, f"p.u: speed, f.in_x: {value}")
+    made = read_rig(folder, f"p.u: speed, f.in_x: {value}")
     assert made.connections["f", "in_x"].source == Fraction(3, 1000)
 
 
@@ -107,39 +107,43 @@ def test_a_bare_value_is_in_the_unit_of_the_input(folder: Path, value: str) -> N
 )
 def test_what_cannot_be_joined_is_refused(folder: Path, connection: str, label: str) -> None:
     rest = "p.u: speed" if connection.startswith("f.in_x") else JOINED
-    assert label in lines(folder, f"{rest}, {connection}")
+    assert label in system_problem_lines(folder, f"{rest}, {connection}")
 
 
 def test_the_nearest_name_is_proposed(folder: Path) -> None:
-    (first, second) = refusal(lambda: rig(folder, "p.u: sped, f.inx: p.x, f.in_x: p.x"))
+    (first, second) = raised_problems(
+        lambda: read_rig(folder, "p.u: sped, f.inx: p.x, f.in_x: p.x")
+    )
     assert (first.help, second.help) == ("did you mean `speed`?", "did you mean `f.in_x`?")
 
 
 def test_an_input_that_nothing_is_connected_to_needs_a_default(folder: Path) -> None:
-    (problem,) = refusal(lambda: rig(folder, "p.u: speed"))
+    (problem,) = raised_problems(lambda: read_rig(folder, "p.u: speed"))
     assert problem.label == "input `f.in_x` is not connected"
     assert problem.help == "connect it, or give it a `default` in the automaton"
-    assert lines(folder, "f.in_x: p.x") == ["input `p.u` is not connected"]
+    assert system_problem_lines(folder, "f.in_x: p.x") == ["input `p.u` is not connected"]
 
 
 @pytest.mark.parametrize("output", ["p.far", "p.mode", "f.fine"])
 def test_a_truth_value_or_a_mode_is_no_number(folder: Path, output: str) -> None:
     instances = f"{PAIR}, g: {{of: filter}}"
-    assert lines(folder, f"{JOINED}, g.in_x: p.x, g.ratio: {output}", instances)
+    assert system_problem_lines(folder, f"{JOINED}, g.in_x: p.x, g.ratio: {output}", instances)
 
 
 @pytest.mark.parametrize("source", ["p.far", "true"])
 def test_a_truth_input_takes_a_truth_value(folder: Path, source: str) -> None:
-    assert lines(folder, f"{JOINED}, f.run: {source}") == []
+    assert system_problem_lines(folder, f"{JOINED}, f.run: {source}") == []
 
 
 def test_outputs_are_outputs_of_instances(folder: Path) -> None:
-    assert rig(folder, JOINED, PAIR, "a: p.x, b: f.x").outputs == {"a": "p.x", "b": "f.x"}
-    assert lines(folder, JOINED, PAIR, "a: p.u") == ["`p.u` is not an output of an instance"]
+    assert read_rig(folder, JOINED, PAIR, "a: p.x, b: f.x").outputs == {"a": "p.x", "b": "f.x"}
+    assert system_problem_lines(folder, JOINED, PAIR, "a: p.u") == [
+        "`p.u` is not an output of an instance"
+    ]
 
 
 def test_inputs_of_a_system_have_units_and_defaults(folder: Path) -> None:
-    inputs = rig(folder).inputs
+    inputs = read_rig(folder).inputs
     assert inputs["speed"].unit.factor == Fraction(1000, 3600)
     assert (inputs["speed"].default, inputs["knob"].default) == (None, Fraction(5, 1000))
 
@@ -151,12 +155,12 @@ THREE = "a: {of: filter}, b: {of: filter}, p: {of: plant}, c: {of: filter}"
 
 
 def test_instances_run_after_those_that_they_read(folder: Path) -> None:
-    assert rig(folder, CHAIN, THREE).order == ("p", "c", "b", "a")
+    assert read_rig(folder, CHAIN, THREE).order == ("p", "c", "b", "a")
 
 
 def test_what_is_free_runs_in_the_order_of_the_file(folder: Path) -> None:
     free = "p.u: speed, a.in_x: p.x, b.in_x: p.x, c.in_x: p.x"
-    assert rig(folder, free, THREE).order == ("p", "a", "b", "c")
+    assert read_rig(folder, free, THREE).order == ("p", "a", "b", "c")
 
 
 @given(file=st.permutations("abcd"), chain=st.permutations("abcd"))
@@ -165,7 +169,7 @@ def test_any_chain_runs_from_its_start(folder: Path, file: list[str], chain: lis
     instances = ", ".join(f"{name}: {{of: filter}}" for name in file)
     pairs = itertools.pairwise(chain)
     ends = [f"{later}.in_x: {earlier}.x" for earlier, later in pairs]
-    made = rig(folder, ", ".join([f"{chain[0]}.in_x: knob", *ends]), instances)
+    made = read_rig(folder, ", ".join([f"{chain[0]}.in_x: knob", *ends]), instances)
     assert list(made.order) == chain
 
 
@@ -175,7 +179,7 @@ def test_a_circle_through_a_continuous_automaton_is_none(folder: Path) -> None:
     faster = FILTER.replace("filter", "driver").replace("outputs: [x", "outputs: [v, x")
     faster = faster.replace("{fine: run}", "{fine: run, v: x / 1 s}")
     project_of(folder, driver=faster)
-    made = rig(folder, spun, "p: {of: plant}, f: {of: driver}")
+    made = read_rig(folder, spun, "p: {of: plant}, f: {of: driver}")
     assert made.order == ("p", "f")
 
 
@@ -190,7 +194,7 @@ def test_a_circle_through_a_continuous_automaton_is_none(folder: Path) -> None:
 def test_a_circle_of_sampled_automata_is_refused(
     folder: Path, connections: str, chain: str
 ) -> None:
-    (label,) = lines(folder, connections, THREE)
+    (label,) = system_problem_lines(folder, connections, THREE)
     assert label == f"instances read each other at the same instant: {chain}"
 
 
@@ -198,4 +202,6 @@ def test_two_continuous_automata_are_not_joined(folder: Path) -> None:
     faster = PLANT.replace("plant", "mover").replace("[x, phi", "[w, x, phi")
     project_of(folder, mover=faster.replace("{far:", "{w: k * x, far:"))
     instances = "p: {of: plant}, q: {of: mover}"
-    assert lines(folder, "p.u: q.w, q.u: speed", instances) == ["`q` and `p` are both continuous"]
+    assert system_problem_lines(folder, "p.u: q.w, q.u: speed", instances) == [
+        "`q` and `p` are both continuous"
+    ]

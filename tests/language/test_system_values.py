@@ -10,8 +10,8 @@ import pytest
 from language.experiment import System
 from language.project import read_document
 from language.system import read_system
-from tests.language.making import SHIPPED, project_of, refusal, scalar
-from tests.language.test_system import FILTER, JOINED, PAIR, PLANT, lines, rig
+from tests.language.making import SHIPPED, project_of, raised_problems, scalar
+from tests.language.test_system import FILTER, JOINED, PAIR, PLANT, read_rig, system_problem_lines
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_instance_has_values_of_its_own(folder: Path) -> None:
-    made = rig(folder, JOINED, "p: {of: plant, values: {k: 7 1/s}}, f: {of: filter}")
+    made = read_rig(folder, JOINED, "p: {of: plant, values: {k: 7 1/s}}, f: {of: filter}")
     assert made.instances["p"].automaton.parameters["k"].value == 7
     assert made.instances["f"].automaton.parameters["k"].value == Fraction(1, 2)
 
@@ -43,13 +43,15 @@ def test_an_instance_has_values_of_its_own(folder: Path) -> None:
 def test_an_instance_that_is_wrong_is_refused(
     folder: Path, instance: str, label: str | None
 ) -> None:
-    found = lines(folder, JOINED, f"p: {{of: plant}}, {instance}")
+    found = system_problem_lines(folder, JOINED, f"p: {{of: plant}}, {instance}")
     assert found
     assert label is None or label in found
 
 
 def test_a_derived_parameter_is_not_set(folder: Path) -> None:
-    found = lines(folder, JOINED, "p: {of: plant, values: {derived_one: 1 1/s}}, f: {of: filter}")
+    found = system_problem_lines(
+        folder, JOINED, "p: {of: plant, values: {derived_one: 1 1/s}}, f: {of: filter}"
+    )
     assert found == ["`derived_one` is derived: its value follows from others"]
 
 
@@ -84,7 +86,7 @@ def test_what_is_no_real_has_values_of_its_own(tmp_path: Path) -> None:
     for made in (inside, outside):
         parameters = made.instances["chg"].automaton.parameters
         assert [parameters[name].value for name in ("retries", "key", "hot")] == [2, 1, 1]
-    told = refusal(lambda: charger(tmp_path, retries="2 V"))
+    told = raised_problems(lambda: charger(tmp_path, retries="2 V"))
     assert [(one.span.source.name, one.label) for one in told] == [
         (
             "--set",
@@ -94,14 +96,14 @@ def test_what_is_no_real_has_values_of_its_own(tmp_path: Path) -> None:
 
 
 def test_an_offset_is_a_time(folder: Path) -> None:
-    made = rig(folder, JOINED, "p: {of: plant}, f: {of: filter, offset: 2.5 ms}")
+    made = read_rig(folder, JOINED, "p: {of: plant}, f: {of: filter, offset: 2.5 ms}")
     assert made.instances["f"].offset == Fraction(25, 10**4)
-    assert rig(folder).instances["f"].offset == 0
+    assert read_rig(folder).instances["f"].offset == 0
 
 
 def overridden(folder: Path, instances: str = PAIR, **texts: str) -> System:
     values = {name.replace("__", "."): scalar(text) for name, text in texts.items()}
-    return rig(folder, JOINED, instances, "", values)
+    return read_rig(folder, JOINED, instances, "", values)
 
 
 def k_of(made: System, instance: str) -> object:
@@ -140,7 +142,7 @@ def test_the_value_of_one_instance_goes_before_that_of_all(folder: Path) -> None
 
 @pytest.mark.parametrize("name", ["kk", "p__own", "q__k", "p__kk"])
 def test_a_value_for_what_no_instance_has_is_refused(folder: Path, name: str) -> None:
-    problems = refusal(lambda: overridden(folder, **{name: "9"}))
+    problems = raised_problems(lambda: overridden(folder, **{name: "9"}))
     shown = name.replace("__", ".")
     assert problems[0].label in (
         f"no instance has a parameter `{shown}`",
@@ -150,7 +152,7 @@ def test_a_value_for_what_no_instance_has_is_refused(folder: Path, name: str) ->
 
 @pytest.mark.parametrize("text", ["9 s", "", "x + 1", "fast"])
 def test_a_value_that_does_not_fit_is_refused_where_it_is_given(folder: Path, text: str) -> None:
-    (problem, *_) = refusal(lambda: overridden(folder, p__k=text))
+    (problem, *_) = raised_problems(lambda: overridden(folder, p__k=text))
     assert problem.span.source.name == "here"
 
 

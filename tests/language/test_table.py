@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
 from language.interpolation import Interpolation
-from tests.language.making import automaton, program, told
+from tests.language.making import automaton, problem_lines, program
 
 SPEC = """language: 1
 automaton: derating
@@ -80,11 +80,13 @@ def test_a_tunable_table_is_an_array_of_calibrations_with_fixed_axes() -> None:
 
 def test_a_scenario_does_not_set_a_table_by_one_value() -> None:
     label = "this parameter is a table: its values are `{points: {...}}`"
-    assert told(lambda: automaton(SPEC, lim="3 kW")) == [f"1:1 {label}"]
+    assert problem_lines(lambda: automaton(SPEC, lim="3 kW")) == [f"1:1 {label}"]
 
 
 def test_points_that_are_one_in_float32_are_refused() -> None:
     near = SPEC.replace("90: 1", "60.0000001: 1")
-    assert told(lambda: program(near)) == []
+    assert problem_lines(lambda: program(near)) == []
     single = near.replace("float64", "float32")
-    assert told(lambda: program(single)) == ["6:3 two points of the axis `temp` are one in float32"]
+    assert problem_lines(lambda: program(single)) == [
+        "6:3 two points of the axis `temp` are one in float32"
+    ]

@@ -10,21 +10,21 @@ import pint
 import pytest
 from hypothesis import given, strategies as st
 
-from language.symbols import BASE_SYMBOLS, OFTEN_WRITTEN, SYMBOLS
+from language.symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
 from language.units import (
     NO_UNIT,
     Dimension,
     UnitError,
-    common,
-    fits,
+    are_compatible,
+    common_dimension,
+    dimension_power,
+    dimension_product,
+    dimension_sqrt,
+    display_unit,
     parse_unit,
-    power,
-    product,
-    root,
-    shown_unit,
     unit_hint,
 )
-from tests.language.making import automaton, si
+from tests.language.making import automaton, si_value
 from tests.language.unit_meaning import MEANING
 
 TURNING = {"deg": ("pi / 180", 0), "rev": ("2 * pi", 0), "rpm": ("2 * pi / 60", -1)}
@@ -85,11 +85,11 @@ def test_factors_and_powers_are_exactly_those_of_pint(
     assert found == {name: power for name, power in zip(bases, powers, strict=True) if power}
 
 
-@pytest.mark.parametrize("written", sorted(OFTEN_WRITTEN))
+@pytest.mark.parametrize("written", sorted(MISSPELLED_UNITS))
 def test_a_unit_as_people_write_it_is_proposed_as_it_is_written_here(written: str) -> None:
     with pytest.raises(UnitError):
         parse_unit(written)
-    assert parse_unit(OFTEN_WRITTEN[written]).text in unit_hint(written)
+    assert parse_unit(MISSPELLED_UNITS[written]).text in unit_hint(written)
 
 
 def test_a_symbol_inside_a_unit_is_repaired_inside_it() -> None:
@@ -184,38 +184,38 @@ def test_a_degree_celsius_in_a_product_is_a_kelvin() -> None:
 
 @given(dimensions, dimensions)
 def test_a_quotient_undoes_a_product(a: Dimension, b: Dimension) -> None:
-    assert product(product(a, b), b, -1).powers == a.powers
-    assert fits(product(a, b), product(b, a))
+    assert dimension_product(dimension_product(a, b), b, -1).powers == a.powers
+    assert are_compatible(dimension_product(a, b), dimension_product(b, a))
 
 
 @given(dimensions)
 def test_a_square_has_the_root_that_it_is_of(a: Dimension) -> None:
-    squared = root(power(a, 2))
+    squared = dimension_sqrt(dimension_power(a, 2))
     assert squared is not None
     assert squared.powers == a.powers
-    assert fits(squared, a)
+    assert are_compatible(squared, a)
 
 
 @given(dimensions, st.integers(2, 8))
 def test_a_power_is_a_repeated_product(a: Dimension, n: int) -> None:
     repeated = a
     for _ in range(n - 1):
-        repeated = product(repeated, a)
-    assert power(a, n).powers == repeated.powers
-    assert fits(power(a, n), repeated)
+        repeated = dimension_product(repeated, a)
+    assert dimension_power(a, n).powers == repeated.powers
+    assert are_compatible(dimension_power(a, n), repeated)
 
 
 def test_an_odd_power_has_no_root() -> None:
-    assert root(parse_unit("m").dimension) is None
-    assert root(parse_unit("rad").dimension) is None
-    assert root(Dimension((2, 0, 0, 0, 0), None)) == Dimension((1, 0, 0, 0, 0), None)
+    assert dimension_sqrt(parse_unit("m").dimension) is None
+    assert dimension_sqrt(parse_unit("rad").dimension) is None
+    assert dimension_sqrt(Dimension((2, 0, 0, 0, 0), None)) == Dimension((1, 0, 0, 0, 0), None)
 
 
 @given(dimensions, dimensions)
 def test_fitting_is_mutual_and_a_sum_has_the_exact_angle(a: Dimension, b: Dimension) -> None:
-    assert fits(a, b) == fits(b, a)
-    if fits(a, b):
-        together = common(a, b)
+    assert are_compatible(a, b) == are_compatible(b, a)
+    if are_compatible(a, b):
+        together = common_dimension(a, b)
         assert together.powers == a.powers
         assert together.angle == (b.angle if a.angle is None else a.angle)
 
@@ -243,7 +243,7 @@ modes: {only: {}}
     assert values["v"] == 10
     assert made.parameters["v"].range == bounds(0, 20)
     assert math.isclose(values["f"] or 0, 2 * math.pi)
-    assert made.parameters["f"].range == bounds(0, si("2 rev/s"))
+    assert made.parameters["f"].range == bounds(0, si_value("2 rev/s"))
     assert values["T"] == Fraction(29315, 100)
     assert made.parameters["T"].range == (Fraction(26315, 100), Fraction(31315, 100))
     assert values["c"] == values["d"] == Fraction(26315, 100)
@@ -254,4 +254,4 @@ modes: {only: {}}
 
 @pytest.mark.parametrize("text", ["V", "ohm", "N/m", "A*s/V", "V*s/A", "K/W", "N*m", "W", "Pa"])
 def test_a_dimension_is_shown_by_its_common_name(text: str) -> None:
-    assert shown_unit(str(parse_unit(text).dimension)) == shown_unit(text) == text
+    assert display_unit(str(parse_unit(text).dimension)) == display_unit(text) == text

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from language.load import load_automaton
-from language.page import pages_of
+from language.page import parse_pages
 from language.project import read_document
 from language.system import read_system
-from tests.language.making import project_of, told
+from tests.language.making import problem_lines, project_of
 
 PLANT = """language: 1
 automaton: plant
@@ -53,15 +53,15 @@ connections: {w.u: u}
 def test_a_parameter_of_the_model_is_no_tunable_wait(tmp_path: Path) -> None:
     """The model would divide by ticks."""
     project = project_of(tmp_path, plant=PLANT, rider=RIDER)
-    (line,) = told(lambda: load_automaton("rider", project))
+    (line,) = problem_lines(lambda: load_automaton("rider", project))
     assert line.endswith("`tau` is a parameter of the model `plant`")
 
 
 def test_no_page_changes_a_wait_while_a_system_runs(tmp_path: Path) -> None:
     project = project_of(tmp_path, waiter=WAITER, rig=RIG)
     system = read_system(read_document(project.path_of("rig")), project)
-    assert pages_of(["2 ms: w.low = 2 m"], system)
-    (line,) = told(lambda: pages_of(["2 ms: t_on = 2 ms"], system))
-    (named,) = told(lambda: pages_of(["2 ms: w.t_on = 2 ms"], system))
+    assert parse_pages(["2 ms: w.low = 2 m"], system)
+    (line,) = problem_lines(lambda: parse_pages(["2 ms: t_on = 2 ms"], system))
+    (named,) = problem_lines(lambda: parse_pages(["2 ms: w.t_on = 2 ms"], system))
     for text in (line, named):
         assert text.endswith("`w.t_on` is a wait: it stays as it is while a system runs")

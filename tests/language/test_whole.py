@@ -7,17 +7,17 @@ from collections.abc import Callable
 
 import pytest
 
-from language.dimension import DimensionCheck
+from language.dimension import TypeChecker
 from language.evaluate import evaluate
-from language.kind import Whole
-from language.lower import expression
+from language.kind import IntType
+from language.lower import lower_expression
 from language.operation import Ref
 from language.problem import Problems
-from language.scope import Scope
-from language.units import NUMBER
+from language.scope import NameEnvironment
+from language.units import PURE_NUMBER
 from tests.language.making import tree
 
-RANGES = {"i": Whole(-3, 2), "j": Whole(1, 4), "k": Whole(-1, 5)}
+RANGES = {"i": IntType(-3, 2), "j": IntType(1, 4), "k": IntType(-1, 5)}
 FUNCTIONS: dict[str, Callable[[int, int, int], int]] = {
     "abs(i)": lambda i, j, k: abs(i),
     "abs(j)": lambda i, j, k: abs(j),
@@ -32,26 +32,30 @@ FUNCTIONS: dict[str, Callable[[int, int, int], int]] = {
 
 @pytest.mark.parametrize("text", FUNCTIONS)
 def test_a_function_of_whole_numbers_is_whole_with_the_range_of_its_values(text: str) -> None:
-    check = DimensionCheck(Scope(dict(RANGES)), Problems())
-    written = expression(tree(text), {name: Ref(f"discrete.{name}", True) for name in RANGES})
+    check = TypeChecker(NameEnvironment(dict(RANGES)), Problems())
+    written = lower_expression(tree(text), {name: Ref(f"discrete.{name}", True) for name in RANGES})
     values = []
     for point in itertools.product(*(range(w.low, w.high + 1) for w in RANGES.values())):
         at = {f"discrete.{name}": value for name, value in zip(RANGES, point, strict=True)}
         values.append(FUNCTIONS[text](*point))
         found = evaluate(written, at)
         assert (found, type(found)) == (values[-1], int)
-    assert check.kind(tree(text)) == Whole(min(values), max(values))
+    assert check.infer_type(tree(text)) == IntType(min(values), max(values))
 
 
 def test_beside_a_real_they_are_reals() -> None:
-    check = DimensionCheck(Scope(dict(RANGES)), Problems())
-    assert check.kind(tree("min(j, 2.5)")) == check.kind(tree("max(j / 2, k)")) == NUMBER
-    assert check.problems.found == []
+    check = TypeChecker(NameEnvironment(dict(RANGES)), Problems())
+    assert (
+        check.infer_type(tree("min(j, 2.5)"))
+        == check.infer_type(tree("max(j / 2, k)"))
+        == PURE_NUMBER
+    )
+    assert check.problems.reported == []
 
 
 def test_few_stand_inside_each_other_for_each_holds_copies() -> None:
-    check = DimensionCheck(Scope(dict(RANGES)), Problems())
-    assert check.kind(tree("min(abs(max(abs(k), 1)), 4)")) == Whole(1, 4)
-    assert check.kind(tree("abs(min(abs(max(abs(k), 1)), 4))")) is None
-    (problem,) = check.problems.found
+    check = TypeChecker(NameEnvironment(dict(RANGES)), Problems())
+    assert check.infer_type(tree("min(abs(max(abs(k), 1)), 4)")) == IntType(1, 4)
+    assert check.infer_type(tree("abs(min(abs(max(abs(k), 1)), 4))")) is None
+    (problem,) = check.problems.reported
     assert problem.label == "`abs` of whole numbers is nested too deeply"

@@ -14,22 +14,22 @@ from language.operation import (
     Binary,
     Branch,
     Call,
-    Choose,
     Compare,
     Item,
     Loop,
     Ref,
-    Run,
+    RunBlock,
     Select,
     Store,
+    Switch,
     Unary,
     Value,
     real,
 )
 from language.program import Program
-from language.traversal import expr_names, reads, walk
-from language.wiring import finished
-from tests.language.making import program, shipped, stepper
+from language.traversal import expr_names, names_used, walk_ops
+from language.wiring import finalise_program
+from tests.language.making import load_shipped, program, stepper
 
 TEXT = """language: 1
 automaton: machine
@@ -125,17 +125,17 @@ def test_a_function_comes_with_those_that_it_calls() -> None:
     plain = re.sub(r", bend: .*}", "}", TEXT)
     assert program(plain).functions == ()
     made = program(TEXT)
-    called = {name for name in reads(made.blocks.values()) if name.startswith("call ")}
+    called = {name for name in names_used(made.blocks.values()) if name.startswith("call ")}
     assert "call sin" in called
-    inner = {n for f in made.functions for n in reads([f.body]) if n.startswith("call ")}
+    inner = {n for f in made.functions for n in names_used([f.body]) if n.startswith("call ")}
     wanted = {name.removeprefix("call ") for name in called | inner} & set(FUNCTIONS)
     assert {function.name for function in made.functions} == wanted
 
 
 @pytest.mark.parametrize("name", ["estimator", "driveline", "estimator_simple"])
 def test_a_shipped_program_has_every_name_that_it_uses_and_uses_every_name(name: str) -> None:
-    made = program_of(shipped(name))
-    used = {name for name in reads(made.blocks.values()) if not name.startswith("call ")}
+    made = program_of(load_shipped(name))
+    used = {name for name in names_used(made.blocks.values()) if not name.startswith("call ")}
     used |= {wire.source for wire in made.outputs}
     known = {v.name for v in made.variables} | {c.name for c in made.constants}
     assert used <= known | {"memory.faults"}
@@ -146,14 +146,14 @@ def test_a_shipped_program_has_every_name_that_it_uses_and_uses_every_name(name:
 
 def test_blocks_that_no_entry_reaches_are_left_out() -> None:
     made = program(TEXT)
-    blocks = {**made.blocks, "lost": (Run("lost_too"),), "lost_too": ()}
-    again = finished(dataclasses.replace(made, blocks=blocks), ("init", "derive", "step"))
+    blocks = {**made.blocks, "lost": (RunBlock("lost_too"),), "lost_too": ()}
+    again = finalise_program(dataclasses.replace(made, blocks=blocks), ("init", "derive", "step"))
     assert again.blocks == made.blocks
 
 
 def test_finishing_twice_changes_nothing() -> None:
     made = program(TEXT)
-    assert finished(made, ("init", "derive", "step")) == made
+    assert finalise_program(made, ("init", "derive", "step")) == made
 
 
 X, Y, K = Ref("state.x"), Ref("state.y"), Ref("work.k")
@@ -181,9 +181,9 @@ def test_every_operation_is_walked_parents_first() -> None:
     stored = Store("work.list", K, Y)
     loop = Loop(3, "work.k", (stored,))
     branch = Branch(Compare(">", X, Y), (inner,), (loop,))
-    choose = Choose("memory.mode", ((1, (branch,)), (2, (Run("b"),))))
-    assert list(walk((choose,))) == [choose, branch, inner, loop, stored, Run("b")]
-    assert reads([(choose,)]) >= {
+    choose = Switch("memory.mode", ((1, (branch,)), (2, (RunBlock("b"),))))
+    assert list(walk_ops((choose,))) == [choose, branch, inner, loop, stored, RunBlock("b")]
+    assert names_used([(choose,)]) >= {
         "memory.mode",
         "state.x",
         "state.y",

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.evaluate import evaluate
-from language.inquiry import Inquiry, Witness
-from language.lower import expression
+from language.inquiry import QueryEngine, Witness
+from language.lower import lower_expression
 from language.model import Automaton
-from language.moment import Moment
+from language.moment import GuardSnapshot
 from language.operation import Expr, Value
-from tests.language.making import SHIPPED, automaton, refusal, told, tree
+from tests.language.making import SHIPPED, automaton, problem_lines, raised_problems, tree
 
 STOP = """language: 1
 automaton: stop
@@ -48,11 +48,11 @@ def both(p: str, q: str) -> str:
 
 def together(made: Automaton) -> Mapping[str, float]:
     """Return values at which all guards of the free mode hold."""
-    inquiry, moment = Inquiry(made), Moment(made, made.modes["free"])
-    guards = [moment.expression(way.when.tree) for way in made.modes["free"].transitions]
-    found = inquiry.answer(inquiry.question(moment.story, guards))
+    inquiry, moment = QueryEngine(made), GuardSnapshot(made, made.modes["free"])
+    guards = [moment.lower_expression(way.when.tree) for way in made.modes["free"].transitions]
+    found = inquiry.answer(inquiry.build_query(moment.path, guards))
     assert isinstance(found, Witness)
-    return found.point
+    return found.valuation
 
 
 def holds(guard: str, values: dict[str, float], made: Automaton) -> bool:
@@ -61,7 +61,7 @@ def holds(guard: str, values: dict[str, float], made: Automaton) -> bool:
     limit = float(made.parameters["limit"].value or 0)
     known["limit"] = Value(limit)
     known["far"] = Value(values.get("x", 0.0) - limit)
-    return bool(evaluate(expression(tree(guard), known), {}))
+    return bool(evaluate(lower_expression(tree(guard), known), {}))
 
 
 # Guards that fire for ever.
@@ -77,14 +77,14 @@ def holds(guard: str, values: dict[str, float], made: Automaton) -> bool:
     ],
 )
 def test_a_guard_with_its_direction_of_motion_is_accepted(guard: str) -> None:
-    assert told(lambda: automaton(stop(arrive(guard)))) == []
+    assert problem_lines(lambda: automaton(stop(arrive(guard)))) == []
 
 
 @pytest.mark.parametrize(
     "guard", ["x >= limit", "far >= 0", "not (x < limit)", "x >= limit and F > 0", "true"]
 )
 def test_a_bare_guard_is_refused(guard: str) -> None:
-    (problem,) = refusal(lambda: automaton(stop(arrive(guard))))
+    (problem,) = raised_problems(lambda: automaton(stop(arrive(guard))))
     path = "`free` -> `stopped` -> `free`"
     assert problem.label == f"this fires again at the same instant, for ever: {path}"
     assert "write the direction of motion too" in problem.help
@@ -92,7 +92,7 @@ def test_a_bare_guard_is_refused(guard: str) -> None:
 
 def test_the_bare_guard_is_the_one_that_is_pointed_at() -> None:
     text = stop(arrive("x >= limit"))
-    (problem,) = refusal(lambda: automaton(text))
+    (problem,) = raised_problems(lambda: automaton(text))
     assert text.splitlines()[problem.span.line - 1][problem.span.column - 1 :].startswith(
         "x >= limit"
     )
@@ -101,7 +101,7 @@ def test_the_bare_guard_is_the_one_that_is_pointed_at() -> None:
 @pytest.mark.parametrize("guard", ["x >= limit", "far >= 0"])
 def test_the_witness_of_a_bare_guard_makes_both_guards_true(guard: str) -> None:
     text = stop(arrive(guard))
-    (problem,) = refusal(lambda: automaton(text))
+    (problem,) = raised_problems(lambda: automaton(text))
     values = shown_values(problem.help)
     made = automaton(stop(arrive(guard + " and v > 0 m/s")))
     assert holds(guard, values, made)
@@ -110,22 +110,30 @@ def test_the_witness_of_a_bare_guard_makes_both_guards_true(guard: str) -> None:
 
 def test_a_wait_breaks_an_instantaneous_circle() -> None:
     assert (
-        told(lambda: automaton(stop(arrive("x >= limit"), "free: {when: v < 0, wait: 1 ms}"))) == []
+        problem_lines(
+            lambda: automaton(stop(arrive("x >= limit"), "free: {when: v < 0, wait: 1 ms}"))
+        )
+        == []
     )
 
 
 def test_a_reset_that_leaves_the_guard_breaks_it_too() -> None:
-    assert told(lambda: automaton(stop(arrive("x >= limit", "{x: limit - 0.1 m}")))) == []
+    assert problem_lines(lambda: automaton(stop(arrive("x >= limit", "{x: limit - 0.1 m}")))) == []
 
 
 def test_a_hysteresis_is_accepted() -> None:
     assert (
-        told(lambda: automaton(stop("stopped: {when: x > 0.2 m}", "free: {when: x < 0.1 m}"))) == []
+        problem_lines(
+            lambda: automaton(stop("stopped: {when: x > 0.2 m}", "free: {when: x < 0.1 m}"))
+        )
+        == []
     )
 
 
 def test_two_guards_that_are_true_together_are_refused_without_a_boundary() -> None:
-    assert told(lambda: automaton(stop("stopped: {when: x > 0.1 m}", "free: {when: x < 0.2 m}")))
+    assert problem_lines(
+        lambda: automaton(stop("stopped: {when: x > 0.1 m}", "free: {when: x < 0.2 m}"))
+    )
 
 
 @pytest.mark.parametrize(("reset", "fine"), [("{z: 0 m}", False), ("{z: 0 m, v: -0.8 * v}", False)])
@@ -133,10 +141,10 @@ def test_a_self_transition_that_stays_enabled_is_refused(reset: str, fine: bool)
     bounce = STOP.replace("x", "z").format(
         free=f"bounce: {{to: free, when: z <= 0 m, reset: {reset}}}", stopped="", limit="1 m"
     )
-    assert (told(lambda: automaton(bounce)) == []) == fine
+    assert (problem_lines(lambda: automaton(bounce)) == []) == fine
     aimed = bounce.replace("z <= 0 m", "z <= 0 m and v < 0 m/s")
     moving = reset.replace("{z: 0 m}", "{z: 0 m, v: 0 m/s}")
-    assert told(lambda: automaton(aimed.replace(reset, moving))) == []
+    assert problem_lines(lambda: automaton(aimed.replace(reset, moving))) == []
 
 
 def test_the_shipped_plant_is_accepted_and_without_its_direction_of_motion_refused() -> None:
@@ -145,7 +153,7 @@ def test_the_shipped_plant_is_accepted_and_without_its_direction_of_motion_refus
     for side, sign in (("theta_b >= alpha", ">"), ("theta_b <= -alpha", "<")):
         bare = text.replace(f"{side} and w_free {sign} 0 rad/s", side)
         assert bare != text
-        labels = [problem.label for problem in refusal(lambda bare=bare: automaton(bare))]  # type: ignore[misc]
+        labels = [problem.label for problem in raised_problems(lambda bare=bare: automaton(bare))]  # type: ignore[misc]
         assert any(label.startswith("this fires again") for label in labels)
 
 
@@ -177,7 +185,7 @@ def test_both_guards_hold_at_the_values_of_a_witness(p: str, q: str) -> None:
 @pytest.mark.parametrize(("p", "q"), PAIRS)
 def test_both_guards_hold_at_the_values_that_are_shown(p: str, q: str) -> None:
     text = stop(f"p: {{to: stopped, when: {p}}}, q: {{to: stopped, when: {q}}}", "")
-    (problem,) = refusal(lambda: automaton(text))
+    (problem,) = raised_problems(lambda: automaton(text))
     values = shown_values(problem.label)
     made = automaton(stop(""))
     assert set(values) <= {"x", "v", "F"}
@@ -190,7 +198,7 @@ def test_both_guards_hold_at_the_values_that_are_shown_on_an_uneven_boundary() -
         "",
         "0.123441 m",
     )
-    (problem,) = refusal(lambda: automaton(text))
+    (problem,) = raised_problems(lambda: automaton(text))
     values = shown_values(problem.label)
     made = automaton(stop("", limit="0.123441 m"))
     assert holds("x >= limit", values, made) and holds("x <= limit", values, made)
@@ -216,11 +224,11 @@ def test_two_truth_inputs_are_searched_apart() -> None:
     text = stop(arrive("x >= limit and p and not q")).replace(
         "inputs: {", "inputs: {p: {type: bool}, q: {type: bool}, "
     )
-    assert told(lambda: automaton(text))
+    assert problem_lines(lambda: automaton(text))
 
 
 def test_a_sampled_automaton_may_come_back_in_the_next_tick() -> None:
     text = stop(arrive("x >= limit"))
-    assert told(lambda: automaton(text))
+    assert problem_lines(lambda: automaton(text))
     text = re.sub(r"flow: .*\n", "period: 1 ms\nnumbers: float64\n", text)
-    assert told(lambda: automaton(text)) == []
+    assert problem_lines(lambda: automaton(text)) == []

@@ -33,7 +33,7 @@ GUARDS = (
 )
 
 
-def large_chart(modes: int = 30, ways: int = 6) -> str:
+def large_chart(modes: int = 30, transitions: int = 6) -> str:
     """Return a continuous automaton with so many modes and transitions out of each.
 
     Half of the guards have no priority: each pair of them has to be proven disjoint.
@@ -41,7 +41,7 @@ def large_chart(modes: int = 30, ways: int = 6) -> str:
     lines = [HEAD]
     for mode in range(modes):
         lines.append(f"  m_{mode}:\n    transitions:\n")
-        for way in range(ways):
+        for way in range(transitions):
             target = (mode + 1 + way * way + way) % modes
             numbers = (10 + (mode * 7 + way) % 60, 1 + (mode + way) % 3, 5 + mode, 100 + mode)
             guard = GUARDS[way % len(GUARDS)].format(*numbers)

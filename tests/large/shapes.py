@@ -53,7 +53,7 @@ def chain(length: int) -> str:
     return "".join([HEAD, "equations:\n", *equations, flow, "outputs: [w, a]\n"])
 
 
-def backwards(length: int) -> str:
+def reversed_equations(length: int) -> str:
     """The same chain written from its end."""
     head, start, rest = chain(length).partition("equations:\n")
     equations, flow, tail = rest.partition("flow:")
@@ -127,7 +127,7 @@ def table(rows: int, columns: int) -> str:
     return text + FLOW.replace("T_in", "T_in + lookup(lim, a, w)") + "outputs: [w, a]\n"
 
 
-def remembering(count: int) -> str:
+def equations_with_memory(count: int) -> str:
     """A sampled automaton whose equations read values of earlier ticks."""
     lines = [HEAD, TICK, "equations:\n"]
     for k in range(count):

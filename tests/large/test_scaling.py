@@ -10,7 +10,7 @@ from types import FrameType
 import pytest
 
 import modewright as mw
-from language.check_size import MOST_HELD, MOST_WAYS
+from language.check_size import MAX_EQUATIONS, MAX_TRANSITIONS
 from language.problem import Problem, Problems, Source, Span, SpecError
 from tests.large import shapes
 
@@ -20,13 +20,13 @@ PLACE = Span(Source("large.yaml"), 1, 1)
 SHAPES: dict[str, Callable[[int], str]] = {
     "modes": lambda n: shapes.modes_of_equations(n, 3),
     "equations of modes": lambda n: shapes.modes_of_equations(2, 2 * n, sampled=True),
-    "a chain from its end": lambda n: shapes.backwards(3 * n),
+    "a chain from its end": lambda n: shapes.reversed_equations(3 * n),
     "parameters": lambda n: shapes.parameters(6 * n),
     "terms": lambda n: shapes.long_expressions(n // 2),
     "transitions": lambda n: shapes.transitions(n, 3),
     "transitions of ticks": lambda n: shapes.transitions(n, 3, sampled=True),
     "rows of a table": lambda n: shapes.table(4 * n, 4),
-    "values of earlier ticks": lambda n: shapes.remembering(2 * n),
+    "values of earlier ticks": lambda n: shapes.equations_with_memory(2 * n),
 }
 
 
@@ -78,7 +78,7 @@ def test_a_mistake_in_each_of_many_instances_is_told_once_for_each(tmp_path: Pat
 
 
 def test_what_stands_at_the_root_counts_in_each_mode(tmp_path: Path) -> None:
-    modes = MOST_HELD // 500 + 1
+    modes = MAX_EQUATIONS // 500 + 1
     equations = "".join(f"  e_{n}: T_in\n" for n in range(498))
     ways = "".join(f"  m_{n}: {{}}\n" for n in range(modes))
     text = f"{shapes.HEAD}equations:\n{equations}{shapes.FLOW}initial: m_0\nmodes:\n{ways}"
@@ -88,9 +88,9 @@ def test_what_stands_at_the_root_counts_in_each_mode(tmp_path: Path) -> None:
 
 
 def test_a_mode_has_so_many_transitions_and_no_more(tmp_path: Path) -> None:
-    assert checked(tmp_path, _ways(MOST_WAYS)) == []
-    (problem,) = checked(tmp_path, _ways(MOST_WAYS + 1))
-    assert problem.label == f"mode `m_0` has {MOST_WAYS + 1} transitions"
+    assert checked(tmp_path, _ways(MAX_TRANSITIONS)) == []
+    (problem,) = checked(tmp_path, _ways(MAX_TRANSITIONS + 1))
+    assert problem.label == f"mode `m_0` has {MAX_TRANSITIONS + 1} transitions"
 
 
 def _ways(count: int) -> str:
@@ -112,8 +112,8 @@ def test_problems_that_a_stage_repeats_are_taken_once() -> None:
     problems = Problems()
     problems.error("name", PLACE, "first")
     for _ in range(30):
-        with problems.collecting():
-            problems.stop_if_any()
-    with problems.collecting():
+        with problems.collect_errors():
+            problems.raise_if_errors()
+    with problems.collect_errors():
         raise SpecError([Problem("name", PLACE, "second")])
     assert [problem.label for problem in problems.found] == ["first", "second"]

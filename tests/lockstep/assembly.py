@@ -10,24 +10,24 @@ from language.operation import (
     Assign,
     Block,
     Branch,
-    Choose,
     Compare,
     FaultBit,
     Ref,
-    Run,
+    RunBlock,
+    Switch,
     Value,
-    whole,
+    integer,
 )
 from language.program import (
     Constant,
     ModeInfo,
+    OutputWire,
     Program,
     TransitionInfo,
     ValueType,
     Variable,
-    Wire,
 )
-from language.wiring import finished
+from language.wiring import finalise_program
 
 PERIOD = Fraction(1, 100)
 MODES = ("rest", "move", "stop")
@@ -39,7 +39,7 @@ SIZE = 4
 """Length of the array `work.list`."""
 
 
-def assembled(
+def assemble_program(
     blocks: dict[str, Block],
     values: tuple[float, float, float],
     number: NumberType = "float64",
@@ -47,15 +47,15 @@ def assembled(
     """Return the Program of some blocks, without the variables that they do not use."""
     program = Program(
         name="random",
-        number=number,
+        number_type=number,
         period=PERIOD,
         major_step=PERIOD,
         constants=_constants(*values),
         variables=_variables(),
         outputs=(
-            Wire("mode", "memory.mode", "whole", "1"),
-            Wire("r0", "equation.r0", "real", "1"),
-            Wire("q0", "equation.q0", "truth", "1"),
+            OutputWire("mode", "memory.mode", "whole", "1"),
+            OutputWire("r0", "equation.r0", "real", "1"),
+            OutputWire("q0", "equation.q0", "truth", "1"),
         ),
         modes=tuple(ModeInfo(mode, number) for number, mode in enumerate(MODES)),
         transitions=tuple(_transitions()),
@@ -63,7 +63,7 @@ def assembled(
         functions=(),
         blocks={**blocks, "init": _init(), "step": _step(blocks)},
     )
-    return finished(program, entries=("init", "derive", "step"))
+    return finalise_program(program, entries=("init", "derive", "step"))
 
 
 def _constants(a: float, b: float, p: float) -> tuple[Constant, ...]:
@@ -112,8 +112,8 @@ def _init() -> Block:
     stale = Compare("!=", Ref("calibration.p"), Ref("solved.stamp_p"))
     return (
         Assign("memory.started", Value(False)),
-        Assign("memory.mode", whole(0)),
-        Assign("memory.faults", whole(0)),
+        Assign("memory.mode", integer(0)),
+        Assign("memory.faults", integer(0)),
         Branch(stale, (FaultBit("stale_calibration"),)),
     )
 
@@ -121,18 +121,19 @@ def _init() -> Block:
 def _step(blocks: dict[str, Block]) -> Block:
     """Advance, jump and update, as language/sampled.py prints them."""
 
-    def each(verb: str) -> Choose:
+    def each(verb: str) -> Switch:
         names = [(number, f"{verb}_{mode}") for number, mode in enumerate(MODES)]
-        return Choose(
-            "memory.mode", tuple((number, (Run(name),)) for number, name in names if name in blocks)
+        return Switch(
+            "memory.mode",
+            tuple((number, (RunBlock(name),)) for number, name in names if name in blocks),
         )
 
     return (
-        Assign("memory.fired", whole(0)),
-        Branch(Ref("memory.started"), (each("advance"),), (Run("start"),)),
+        Assign("memory.fired", integer(0)),
+        Branch(Ref("memory.started"), (each("advance"),), (RunBlock("start"),)),
         each("equations"),
         each("jump"),
-        Branch(Compare("!=", Ref("memory.fired"), whole(0)), (each("equations"),)),
+        Branch(Compare("!=", Ref("memory.fired"), integer(0)), (each("equations"),)),
         each("update"),
-        Run("remember"),
+        RunBlock("remember"),
     )

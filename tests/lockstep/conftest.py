@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from tests.lockstep.chance.healthy import Healthy, healthy
+from tests.lockstep.chance.healthy import ReferenceRun, run_reference_specs
 
 COUNT = 12
 TICKS = 200
 
 
 @pytest.fixture(scope="session")
-def random_specs(tmp_path_factory: pytest.TempPathFactory) -> list[Healthy]:
+def random_specs(tmp_path_factory: pytest.TempPathFactory) -> list[ReferenceRun]:
     """Return some random specs that interpreter and C have run."""
-    return healthy(COUNT, TICKS, tmp_path_factory.mktemp("random_specs"))
+    return run_reference_specs(COUNT, TICKS, tmp_path_factory.mktemp("random_specs"))

@@ -9,7 +9,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from language.elementary import nearest
+from language.elementary import round_to_nearest
 from language.operation import (
     Binary,
     Call,
@@ -19,10 +19,10 @@ from language.operation import (
     Unary,
     Value,
     add,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
@@ -62,7 +62,7 @@ class Scope:
     truths: tuple[Expr, ...] = ()
     counters: tuple[tuple[Expr, int], ...] = ()
 
-    def plus(self, *reals: Expr) -> Scope:
+    def with_reals(self, *reals: Expr) -> Scope:
         """Return the scope with more real values to read."""
         return Scope((*self.reals, *reals), self.truths, self.counters)
 
@@ -97,7 +97,7 @@ def reals(draw: Draw, scope: Scope, depth: int) -> Expr:
         case "pow2":
             # A whole number within its domain, as the functions of ha_math call it; NaN is low.
             bounded = Call("clip", (part(), real(-1022.0), real(1023.0)))
-            return Call(kind, (nearest(bounded),))
+            return Call(kind, (round_to_nearest(bounded),))
         case "rounded":
             return Call("real", (Call("whole", (Call("floor", (part(),)),)),))
         case "count":
@@ -122,7 +122,7 @@ def truths(draw: Draw, scope: Scope, depth: int) -> Expr:
         case "whole" if scope.counters:
             counter, largest = draw(st.sampled_from(scope.counters))
             relation = draw(st.sampled_from(RELATIONS))
-            return Compare(relation, counter, whole(draw(st.integers(1, largest))))
+            return Compare(relation, counter, integer(draw(st.integers(1, largest))))
         case "same" if len(scope.truths) > 1:
             # A C compiler warns of `q == q`, and of comparisons with true and false.
             sides = draw(st.permutations(scope.truths))[:2]
@@ -141,10 +141,10 @@ def truths(draw: Draw, scope: Scope, depth: int) -> Expr:
 @st.composite
 def wholes(draw: Draw, scope: Scope) -> Expr:
     """Return a whole number: a counter times a literal, plus or minus a literal."""
-    number = whole(draw(st.integers(-1000, 1000)))
+    number = integer(draw(st.integers(-1000, 1000)))
     if not scope.counters:
         return number
     counter, _ = draw(st.sampled_from(scope.counters))
     combine = draw(st.sampled_from([add, subtract]))
-    result: Expr = combine(multiply(counter, whole(draw(st.integers(-30, 30)))), number)
+    result: Expr = combine(multiply(counter, integer(draw(st.integers(-30, 30)))), number)
     return result

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from language.program import Program
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from modewright.api import program
-from tests.lockstep.programs import Tick, taped
+from tests.lockstep.programs import Tick, record_ticks
 
 SPEC = Path(__file__).parents[1] / "codegen" / "golden" / "heater.yaml"
 PERIOD = 0.1
@@ -25,16 +25,16 @@ def temperature(tick: int) -> float:
     return 320.0 + 0.9 * (tick % ROUND)
 
 
-def heater_tape() -> Tape:
+def heater_tape() -> TickLog:
     """Return two rounds."""
     inputs: list[Tick] = [
         {"input.T": temperature(tick), "input.request": tick % ROUND != 6}
         for tick in range(2 * ROUND)
     ]
-    return taped(heater(), inputs)
+    return record_ticks(heater(), inputs)
 
 
-def column(tape: Tape, name: str) -> list[float | int]:
+def column(tape: TickLog, name: str) -> list[float | int]:
     """Return the values of one variable, tick by tick."""
     position = tape.names.index(name)
     return [tape.unpack(record)[position] for record in tape.values]

@@ -25,17 +25,25 @@ from language.operation import (
     Loop,
     Op,
     Ref,
-    Run,
+    RunBlock,
     Store,
     Value,
+    integer,
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.program import Program
-from lockstep.compare import Tape
-from tests.lockstep.assembly import CONDITIONS, EQUATIONS, INPUTS, MODES, SIZE, STATES, assembled
+from lockstep.compare import TickLog
+from tests.lockstep.assembly import (
+    CONDITIONS,
+    EQUATIONS,
+    INPUTS,
+    MODES,
+    SIZE,
+    STATES,
+    assemble_program,
+)
 from tests.lockstep.expressions import ANY, FINITE, Draw, Scope, reals, truths
 
 DEPTH = 3
@@ -96,7 +104,7 @@ def programs(draw: Draw, number: NumberType = "float64") -> Program:
     made["start"] = blocks.start()
     made["derive"] = blocks.derive()
     a, b, p = (narrowed(draw(FINITE), number) for _ in range(3))
-    return assembled(
+    return assemble_program(
         {name: narrowed(block, number) for name, block in made.items()}, (a, b, p), number
     )
 
@@ -112,14 +120,14 @@ def ticks(draw: Draw, count: int = 6) -> list[Tick]:
     return found
 
 
-def taped(program: Program, inputs: list[Tick]) -> Tape:
+def record_ticks(program: Program, inputs: list[Tick]) -> TickLog:
     """Return what the interpreter does with some inputs."""
-    stepper, tape = Interpreter(program), Tape(program, program.name)
+    stepper, tape = Interpreter(program), TickLog(program, program.name)
     for tick in inputs:
         for name, value in tick.items():
             stepper.set(name, value)
         stepper.run("step")
-        tape.record(stepper)
+        tape.record_tick(stepper)
     return tape
 
 
@@ -140,14 +148,14 @@ class _Blocks:
     def derive(self) -> Block:
         return (
             Assign("derived.c", multiply(Ref("calibration.p"), self.some(TUNED))),
-            Assign("derived.d", self.some(TUNED.plus(Ref("derived.c")))),
+            Assign("derived.d", self.some(TUNED.with_reals(Ref("derived.c")))),
         )
 
     def start(self) -> Block:
-        known = TUNED.plus(Ref("input.u"), Ref("derived.c"))
+        known = TUNED.with_reals(Ref("input.u"), Ref("derived.c"))
         return (
             *(Assign(f"state.{name}", self.some(known)) for name in STATES),
-            Assign("memory.mode", whole(0)),
+            Assign("memory.mode", integer(0)),
             Assign("memory.started", Value(True)),
         )
 
@@ -159,18 +167,18 @@ class _Blocks:
         """Fill an array, change it by its other end, add it up by a loop within a loop."""
         row, turn = Ref("work.row"), Ref("work.turn")
         counted = Scope(PLACE.reals, PLACE.truths, ((row, SIZE - 1), *PLACE.counters))
-        local, item = Ref("work.local"), Item("work.list", subtract(whole(SIZE - 1), row))
+        local, item = Ref("work.local"), Item("work.list", subtract(integer(SIZE - 1), row))
         inner = Scope((*PLACE.reals, Ref("work.sum"), Item("work.list", turn)), PLACE.truths)
-        change = Store("work.list", row, self.some(counted.plus(local)))
+        change = Store("work.list", row, self.some(counted.with_reals(local)))
         add_up = Loop(SIZE, "work.turn", (Assign("work.sum", self.some(inner)),))
-        seldom = Assign("equation.row", self.some(counted.plus(item)))
+        seldom = Assign("equation.row", self.some(counted.with_reals(item)))
         return (
             Loop(SIZE, "work.row", (Store("work.list", row, self.some(counted)),)),
             Loop(
                 SIZE,
                 "work.row",
                 (
-                    Assign("work.local", self.some(counted.plus(item))),
+                    Assign("work.local", self.some(counted.with_reals(item))),
                     Branch(self.either(counted), (change,)),
                 ),
             ),
@@ -185,20 +193,22 @@ class _Blocks:
             Assign("work.local", self.some()),
             Assign("work.flag", self.either()),
         )
-        known = PLACE.plus(Ref("work.local"), Item("work.list", whole(1)), Ref("equation.total"))
+        known = PLACE.with_reals(
+            Ref("work.local"), Item("work.list", integer(1)), Ref("equation.total")
+        )
         known = Scope(known.reals, (*known.truths, Ref("work.flag")), known.counters)
         reals_ = [Assign(f"equation.r{k}", self.some(known), f"r{k}") for k in range(EQUATIONS)]
         truths_ = [Assign(f"equation.q{k}", self.either(known), f"q{k}") for k in range(CONDITIONS)]
-        return (Run("table"), *locals_, *reals_, *truths_)
+        return (RunBlock("table"), *locals_, *reals_, *truths_)
 
     def equations(self, number: int) -> Block:
         own: list[Op] = [Assign(f"equation.m{k}", self.some(WIDE)) for k in range(2)]
-        return (Run("mix"), *own) if number else (*own, Run("mix"))
+        return (RunBlock("mix"), *own) if number else (*own, RunBlock("mix"))
 
     def jump(self, number: int) -> Block:
         """A wait with resets first, then a jump at once; each leads to another mode."""
         timer, limit = f"timer.{MODES[number]}", self.draw(st.integers(2, 4))
-        waited = Compare(">", Ref(timer), whole(limit - 1))
+        waited = Compare(">", Ref(timer), integer(limit - 1))
         first = (*self.together("reset"), *_leave(number, timer, 1))
         second = Branch(self.either(WIDE), _leave(number, timer, 2))
         return (Count(timer, self.either(WIDE), limit), Branch(waited, first, (second,)))
@@ -211,7 +221,7 @@ class _Blocks:
 
 def _leave(number: int, timer: str, way: int) -> Block:
     return (
-        Assign(timer, whole(0)),
-        Assign("memory.mode", whole((number + way) % len(MODES))),
-        Assign("memory.fired", whole(2 * number + way)),
+        Assign(timer, integer(0)),
+        Assign("memory.mode", integer((number + way) % len(MODES))),
+        Assign("memory.fired", integer(2 * number + way)),
     )

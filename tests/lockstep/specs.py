@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from hypothesis import strategies as st
 
-from language.number import NUMBERS
+from language.number import NUMBER_TYPES
 from tests.lockstep.expressions import Draw
 
 PERIOD_MS = 10
@@ -54,7 +54,7 @@ def specs(draw: Draw) -> Specs:
         "language: 1",
         "automaton: chance",
         f"period: {PERIOD_MS} ms",
-        f"numbers: {draw(st.sampled_from(NUMBERS))}",
+        f"numbers: {draw(st.sampled_from(NUMBER_TYPES))}",
         "parameters:",
         f"  a: {{value: {draw(numbers())}}}",
         f"  b: {{value: {draw(numbers())}, tunable: true}}",

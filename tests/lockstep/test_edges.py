@@ -12,7 +12,7 @@ from language.program import Program
 from lockstep.compare import Verdict, compare
 from modewright.api import program
 from tests.lockstep.heater import column
-from tests.lockstep.programs import Tick, taped
+from tests.lockstep.programs import Tick, record_ticks
 
 HEAD = """\
 language: 1
@@ -36,7 +36,7 @@ def verdict(used: Program) -> Verdict:
         {v.name: {"truth": value > 0.3, "whole": whole}.get(v.type, value) for v in used.inputs}
         for value, whole in zip(VALUES, itertools.cycle(WHOLES), strict=False)
     ]
-    found = compare(taped(used, inputs))
+    found = compare(record_ticks(used, inputs))
     assert found.ticks == len(VALUES)
     return found
 
@@ -233,6 +233,6 @@ def test_a_calibration_that_does_not_fit_the_solved_numbers_is_a_fault_in_both()
     stale = dataclasses.replace(used, constants=other)
     bit = 1 << used.faults.index("stale_calibration")
     for tried, wanted in ((used, 0), (stale, bit)):
-        tape = taped(tried, [{}])
+        tape = record_ticks(tried, [{}])
         assert column(tape, "memory.faults") == [wanted]
         assert compare(tape).is_equal

@@ -17,17 +17,17 @@ from codegen.build import (
     WARNINGS,
     BuildError,
     compile_program,
-    compiler,
-    optimised,
+    find_compiler,
+    flags_at_level,
 )
 from codegen.harness import write_harness
-from codegen.source import c_files
-from language.number import NUMBERS, NumberType, decimal
-from language.system import in_numbers
+from codegen.source import emit_c_files
+from language.number import NUMBER_TYPES, NumberType, shortest_decimal
+from language.system import with_number_type
 from lockstep import taping
-from lockstep.compare import Tape, compare
+from lockstep.compare import TickLog, compare
 from modewright.api import load, program
-from tests.lockstep.programs import taped
+from tests.lockstep.programs import record_ticks
 
 LEVELS = ("-O0", "-O2", "-O3", "-Os", "-O3 -march=native")
 """The optimisations that must not change a bit; the last one may use fused operations."""
@@ -51,24 +51,24 @@ outputs: [rest]
 """
 
 
-@pytest.fixture(scope="module", params=NUMBERS)
-def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
+@pytest.fixture(scope="module", params=NUMBER_TYPES)
+def tapes(request: pytest.FixtureRequest) -> dict[str, TickLog]:
     """Both estimators through the first gaps of a tip-out; the plant stays in float64."""
     loaded = load("ev_driveline", "tip_out")
-    narrow = in_numbers(loaded.system, request.param).instances
+    narrow = with_number_type(loaded.system, request.param).instances
     instances = {**narrow, "plant": loaded.system.instances["plant"]}
     system = dataclasses.replace(loaded.system, instances=instances)
     scenario = dataclasses.replace(loaded.scenario, horizon=Fraction(9, 10))
-    return {tape.program.name: tape for tape in taping.taped(system, scenario)[1].values()}
+    return {tape.program.name: tape for tape in taping.record_ticks(system, scenario)[1].values()}
 
 
-@pytest.fixture(params=NUMBERS)
-def product(tmp_path: Path, request: pytest.FixtureRequest) -> Tape:
+@pytest.fixture(params=NUMBER_TYPES)
+def product(tmp_path: Path, request: pytest.FixtureRequest) -> TickLog:
     """u * u - v where the product is rounded to v: 0, or the rounding error if contracted."""
     spec = tmp_path / "product.yaml"
     spec.write_text(PRODUCT.replace("float64", request.param))
     tiny = TINY[request.param]
-    return taped(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
+    return record_ticks(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
 
 
 def has_fused_operations() -> bool:
@@ -83,7 +83,7 @@ def has_fused_operations() -> bool:
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", ["estimator", "estimator_simple"])
 def test_optimisation_keeps_every_bit_of_a_tip_out(
-    tapes: dict[str, Tape], name: str, level: str
+    tapes: dict[str, TickLog], name: str, level: str
 ) -> None:
     flags = [flag for flag in FLAGS if flag != "-O2"] + level.split()
     verdict = compare(tapes[name], flags)
@@ -92,7 +92,7 @@ def test_optimisation_keeps_every_bit_of_a_tip_out(
     assert verdict.ticks in (901, 91)
 
 
-def test_contraction_is_forbidden_and_would_be_found(product: Tape) -> None:
+def test_contraction_is_forbidden_and_would_be_found(product: TickLog) -> None:
     assert "-ffp-contract=off" in FLAGS
     assert {"-std=c99", "-fno-fast-math"} <= {*FLAGS}
     assert compare(product, (*FLAGS, "-march=native")).is_equal
@@ -100,34 +100,34 @@ def test_contraction_is_forbidden_and_would_be_found(product: Tape) -> None:
     assert verdict.is_equal == (not has_fused_operations())
     if verdict.first:
         assert verdict.first.signal == "rest"
-        number = product.program.number
-        lost = decimal(TINY[number] ** 2, number)
+        number = product.program.number_type
+        lost = shortest_decimal(TINY[number] ** 2, number)
         assert verdict.first.engine == f"0.0 ({NOTHING[number]})"
         assert verdict.first.compiled == f"{lost} ({LOST[number]})"
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("named", ["gcc", "clang-19"])
-def test_every_compiler_gives_the_same_bits(tapes: dict[str, Tape], named: str) -> None:
+def test_every_compiler_gives_the_same_bits(tapes: dict[str, TickLog], named: str) -> None:
     if shutil.which(named) is None:
         pytest.skip(f"{named} is not installed: make system-packages")
     for level in ("O0", "O2", "O3"):
-        verdict = compare(tapes["estimator"], optimised(level), named)
+        verdict = compare(tapes["estimator"], flags_at_level(level), named)
         assert verdict.is_equal, f"-{level}: {verdict.first}"
 
 
 @pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast"])
-def test_generated_code_refuses_fast_math(product: Tape, flag: str) -> None:
+def test_generated_code_refuses_fast_math(product: TickLog, flag: str) -> None:
     with pytest.raises(BuildError, match="exact only without fast-math"):
         compare(product, ("-std=c99", "-O2", flag))
 
 
-def test_generated_code_refuses_excess_precision(product: Tape) -> None:
+def test_generated_code_refuses_excess_precision(product: TickLog) -> None:
     """The x87 unit computes with 64 bits; elsewhere the header must give the same answer."""
     if platform.machine() == "x86_64":
         with pytest.raises(BuildError, match="without excess precision"):
             compare(product, (*FLAGS, "-mfpmath=387"))
-    text = c_files(product.program)["product.c"]
+    text = emit_c_files(product.program)["product.c"]
     assert "#if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)\n#error" in text
 
 
@@ -157,7 +157,7 @@ def test_no_fused_operation_even_where_the_cpu_has_them(name: str, tmp_path: Pat
         assert not FUSED.search(output("objdump", "--disassemble", str(found)))
 
 
-def test_the_search_for_fused_operations_finds_them(product: Tape, tmp_path: Path) -> None:
+def test_the_search_for_fused_operations_finds_them(product: TickLog, tmp_path: Path) -> None:
     flags = ("-std=c99", "-O2", "-march=native", "-ffp-contract=fast")
     folder = tmp_path / "c"
     folder.mkdir()
@@ -177,7 +177,7 @@ def objects(name: str, folder: Path, flags: tuple[str, ...]) -> list[Path]:
 
 def compiled(source: Path, flags: tuple[str, ...]) -> Path:
     target = source.with_suffix(".o")
-    output(*compiler(), *flags, "-c", str(source), "-o", str(target))
+    output(*find_compiler(), *flags, "-c", str(source), "-o", str(target))
     return target
 
 

@@ -8,18 +8,24 @@ import shutil
 
 import pytest
 
-from codegen.fuzzing import ABSOLUTE, FUZZER, WORDS, values_of, words
-from codegen.harness import fed
-from codegen.source import c_files
-from language.program import Program, short
+from codegen.fuzzing import (
+    ABSOLUTE_WORDS,
+    FUZZER_COMPILER,
+    WORDS_PER_INPUT,
+    decode_sequence,
+    word_table,
+)
+from codegen.harness import tick_inputs
+from codegen.source import emit_c_files
+from language.program import Program, unqualified_name
 from lockstep.fuzzing import fuzz
 from modewright import code
 from modewright.api import program
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 needs_fuzzer = pytest.mark.skipif(
-    not shutil.which(FUZZER), reason="no clang-19: make system-packages"
+    not shutil.which(FUZZER_COMPILER), reason="no clang-19: make system-packages"
 )
 RUNS = 400
 
@@ -75,7 +81,7 @@ def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) 
     """Let the C of an automaton be another one."""
 
     def torn(made: Program) -> dict[str, str]:
-        files = c_files(made)
+        files = emit_c_files(made)
         text = files[f"{name}.c"]
         assert right in text
         return {**files, f"{name}.c": text.replace(right, wrong)}
@@ -85,25 +91,27 @@ def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) 
 
 def test_bytes_are_values_and_changes() -> None:
     used = program("supervisor")
-    table = words(used, {short(v.name): (0.0, 500.0) for v in fed(used)})
-    assert all(len(own) == WORDS for own in table)
-    names = [v.name for v in fed(used)]
+    table = word_table(used, {unqualified_name(v.name): (0.0, 500.0) for v in tick_inputs(used)})
+    assert all(len(own) == WORDS_PER_INPUT for own in table)
+    names = [v.name for v in tick_inputs(used)]
     volts, key = names.index("input.U_dc"), names.index("input.key")
     assert table[volts][0] == 0.0 and table[volts][63] == 500.0
-    assert any(math.isnan(word) for word in table[volts][:ABSOLUTE])
+    assert any(math.isnan(word) for word in table[volts][:ABSOLUTE_WORDS])
     assert {0.0, 1.0, 2.0, 3.0, 255.0} <= set(table[key])
     ticks = [bytearray(len(table)) for _ in range(3)]
-    ticks[0][volts], ticks[1][volts], ticks[2][volts] = 63, ABSOLUTE + 2, 255
-    found = [list(tick) for tick in values_of(used, table, b"".join(map(bytes, ticks)) + b"\0")]
+    ticks[0][volts], ticks[1][volts], ticks[2][volts] = 63, ABSOLUTE_WORDS + 2, 255
+    found = [
+        list(tick) for tick in decode_sequence(used, table, b"".join(map(bytes, ticks)) + b"\0")
+    ]
     assert [tick[volts] for tick in found] == [500.0, *[500.0 + 500.0 * 2**-0.5] * 2]
 
 
 @needs_fuzzer
 def test_the_command_tells_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
     words_of = ["fuzz", "contactor", "--runs", "300"]
-    assert exit_code(lambda: app(words_of, standalone_mode=False)) == 0
+    assert run_with_exit_code(lambda: app(words_of, standalone_mode=False)) == 0
     assert "0 sequences differ from the engine" in capsys.readouterr().out
-    assert exit_code(lambda: app([*words_of, "--json"], standalone_mode=False)) == 0
+    assert run_with_exit_code(lambda: app([*words_of, "--json"], standalone_mode=False)) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["clean"] and found["modes"] == ["open", "shut"] and found["first"] is None
 
@@ -111,5 +119,5 @@ def test_the_command_tells_what_was_tried(capsys: pytest.CaptureFixture[str]) ->
 def test_a_continuous_automaton_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ValueError, match="driveline is continuous"):
         code.fuzz("driveline", 10)
-    assert exit_code(lambda: app(["fuzz", "driveline"], standalone_mode=False)) == 2
+    assert run_with_exit_code(lambda: app(["fuzz", "driveline"], standalone_mode=False)) == 2
     assert "is continuous" in capsys.readouterr().err

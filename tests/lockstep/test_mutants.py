@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.lockstep.chance.generator_mutants import GENERATOR
-from tests.lockstep.chance.healthy import Healthy, killed_by
+from tests.lockstep.chance.healthy import ReferenceRun, find_killing_spec
 from tests.lockstep.chance.mutant import Mutant
 from tests.lockstep.chance.mutants import INTERPRETER
 from tests.lockstep.conftest import TICKS
@@ -17,9 +17,12 @@ MUTANTS = (*INTERPRETER, *GENERATOR)
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=[mutant.name for mutant in MUTANTS])
 def test_a_mutant_is_killed(
-    mutant: Mutant, random_specs: list[Healthy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    mutant: Mutant,
+    random_specs: list[ReferenceRun],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
-    assert killed_by(mutant, random_specs, TICKS, monkeypatch, tmp_path)
+    assert find_killing_spec(mutant, random_specs, TICKS, monkeypatch, tmp_path)
 
 
 def test_no_mutant_is_alive_twice() -> None:
@@ -28,8 +31,8 @@ def test_no_mutant_is_alive_twice() -> None:
 
 @pytest.mark.parametrize("side", ["interpreter", "generator"])
 def test_what_is_no_mutant_lives(
-    side: str, random_specs: list[Healthy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    side: str, random_specs: list[ReferenceRun], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The comparison that kills mutants finds nothing where nothing is wrong."""
     none = Mutant("none", "interpreter" if side == "interpreter" else "generator")
-    assert not killed_by(none, random_specs[:4], TICKS, monkeypatch, tmp_path)
+    assert not find_killing_spec(none, random_specs[:4], TICKS, monkeypatch, tmp_path)

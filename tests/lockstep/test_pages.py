@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.source import c_files
+from codegen.source import emit_c_files
 from engine.simulate import simulate
-from language.number import NUMBERS, NumberType, rounded
-from language.page import pages_of
+from language.number import NUMBER_TYPES, NumberType, round_to_type
+from language.page import parse_pages
 from language.problem import SpecError
 from language.program import Program
-from language.system import in_numbers
-from lockstep.compare import Tape, compare
-from lockstep.taping import taped
+from language.system import with_number_type
+from lockstep.compare import TickLog, compare
+from lockstep.taping import record_ticks
 from modewright.api import load, lockstep
 from tests.lockstep.heater import column
 
@@ -25,15 +25,15 @@ TURNED = 517
 TUNED = {"J_em": 0.051, "k_hs": 5000.0, "c_hs": 16.0, "sd_em": 0.25, "q_w": 31.0}
 
 
-def estimator(number: NumberType) -> Tape:
+def estimator(number: NumberType) -> TickLog:
     """Return the estimator's tape in a number type."""
     loaded = load("tuned", "retuned", root=ROOT)
-    run, tapes = taped(in_numbers(loaded.system, number), loaded.scenario)
+    run, tapes = record_ticks(with_number_type(loaded.system, number), loaded.scenario)
     assert run.stopped is None
     return tapes["est"]
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 def test_both_sides_turn_the_page_at_the_same_tick(number: NumberType) -> None:
     tape = estimator(number)
     verdict = compare(tape)
@@ -47,22 +47,22 @@ def test_both_sides_turn_the_page_at_the_same_tick(number: NumberType) -> None:
     assert sorted(names) == sorted(f"calibration.{name}" for name in TUNED)
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 def test_what_follows_is_derived_anew_and_stale_numbers_set_their_fault(number: NumberType) -> None:
     tape = estimator(number)
     derived = column(tape, "equation.w_free"), column(tape, "state.theta_d")
     twist = zip(*derived, column(tape, "state.theta_b"), strict=True)
     for tick, (free, theta_d, theta_b) in enumerate(twist):
         k_hs, c_hs = (4800.0, 14.0) if tick < TURNED else (TUNED["k_hs"], TUNED["c_hs"])
-        ratio = rounded(k_hs / c_hs, number)
-        assert free == rounded(ratio * rounded(theta_d - theta_b, number), number)
+        ratio = round_to_type(k_hs / c_hs, number)
+        assert free == round_to_type(ratio * round_to_type(theta_d - theta_b, number), number)
     faults = column(tape, "memory.faults")
     stale = 1 << tape.program.faults.index("stale_calibration")
     assert [fault & stale for fault in map(int, faults)] == [0] * TURNED + [stale] * (701 - TURNED)
 
 
 def test_c_that_does_not_compare_stamps_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = c_files
+    plain = emit_c_files
 
     def without(program: Program) -> dict[str, str]:
         files = plain(program)
@@ -82,7 +82,7 @@ def test_the_command_line_gives_pages_too() -> None:
     assert all(verdict.is_equal for verdict in verdicts)
     assert {verdict.name: verdict.ticks for verdict in verdicts}["est"] == 701
     system = load("tuned", "retuned", root=ROOT).system
-    (page,) = pages_of(changes, system)
+    (page,) = parse_pages(changes, system)
     assert page.values.keys() == {("est", "k_hs"), ("est", "sd_em")}
 
 
@@ -99,7 +99,7 @@ def test_the_command_line_gives_pages_too() -> None:
 def test_a_change_that_cannot_be_made_is_refused(text: str, message: str) -> None:
     system = load("tuned", "retuned", root=ROOT).system
     with pytest.raises(SpecError) as refused:
-        pages_of([text], system)
+        parse_pages([text], system)
     assert message in [problem.label for problem in refused.value.problems]
 
 
@@ -107,7 +107,7 @@ def test_a_plant_takes_a_new_calibration_at_its_time() -> None:
     """J_em is tunable in the plant too: `J_em` without an instance is all of them."""
     loaded = load("tuned", "retuned", root=ROOT)
     run = simulate(loaded.system, loaded.scenario)
-    other = simulate(loaded.system, dataclasses.replace(loaded.scenario, pages=()))
+    other = simulate(loaded.system, dataclasses.replace(loaded.scenario, calibrations=()))
     speeds, before = run.signals["plant.w_em"], other.signals["plant.w_em"]
     same = [bool(a == b) for a, b in zip(speeds, before, strict=True)]
     assert all(same[:517]) and not any(same[518:])

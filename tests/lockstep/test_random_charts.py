@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.verify.random_charts import part, programs
+from tests.verify.random_charts import measure_part, programs
 
 COUNT, TICKS = 6, 150
 
 
 def test_random_charts_are_in_lockstep_and_do_what_the_rules_are_about(tmp_path: Path) -> None:
     """`make verify` has 300 of 500 ticks, and asks for each of the rules 20 times."""
-    found = part(programs(range(COUNT), tmp_path), tmp_path, TICKS)
+    found = measure_part(programs(range(COUNT), tmp_path), tmp_path, TICKS)
     assert found["bits"]["differing"] == 0
     assert found["bits"]["ticks"] == COUNT * TICKS
     assert found["bits"]["moving"] == COUNT

@@ -6,15 +6,15 @@ from typing import get_args
 
 from hypothesis import HealthCheck, Phase, given, note, settings, strategies as st
 
-from language.evaluate import ELEMENTARY, OPERATIONS
+from language.evaluate import BINARY_OPERATIONS, ELEMENTARY
 from language.functions import FUNCTIONS
-from language.number import NUMBERS
+from language.number import NUMBER_TYPES
 from language.operation import Assign, Expr, Op
-from language.printing import expr_text
+from language.printing import format_expr
 from language.program import Program
-from language.traversal import reads, walk
+from language.traversal import names_used, walk_ops
 from lockstep.compare import compare
-from tests.lockstep.programs import Tick, programs, taped, ticks
+from tests.lockstep.programs import Tick, programs, record_ticks, ticks
 
 SHARE = 2
 """A program has some fifty expressions: it needs fewer examples than other properties."""
@@ -22,17 +22,17 @@ LARGE = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_bas
 
 
 def operations(program: Program) -> list[Op]:
-    return [op for block in program.blocks.values() for op in walk(block)]
+    return [op for block in program.blocks.values() for op in walk_ops(block)]
 
 
 @settings(max_examples=settings().max_examples // SHARE, suppress_health_check=LARGE)
-@given(st.sampled_from(NUMBERS).flatmap(programs), ticks())
+@given(st.sampled_from(NUMBER_TYPES).flatmap(programs), ticks())
 def test_interpreter_and_c_agree_on_every_bit(program: Program, inputs: list[Tick]) -> None:
-    verdict = compare(taped(program, inputs))
+    verdict = compare(record_ticks(program, inputs))
     signal = verdict.first.signal if verdict.first else None
     for op in operations(program):
         if isinstance(op, Assign) and op.target.partition(".")[2] == signal:
-            note(f"{op.target} := {expr_text(op.value)}")
+            note(f"{op.target} := {format_expr(op.value)}")
     assert verdict.is_equal, str(verdict.first)
     assert verdict.ticks == len(inputs)
 
@@ -52,11 +52,11 @@ def test_random_programs_hold_every_kind_of_operation() -> None:
     def look(program: Program) -> None:
         text = repr(program.blocks)
         kinds.update(kind.__name__ for kind in get_args(Op) + get_args(Expr) if kind_in(kind, text))
-        kinds.update(operator for operator in OPERATIONS if f"operator='{operator}'" in text)
-        kinds.update(reads(program.blocks.values()))
+        kinds.update(operator for operator in BINARY_OPERATIONS if f"operator='{operator}'" in text)
+        kinds.update(names_used(program.blocks.values()))
 
     look()
-    wanted = {kind.__name__ for kind in get_args(Op) + get_args(Expr)} | {*OPERATIONS}
+    wanted = {kind.__name__ for kind in get_args(Op) + get_args(Expr)} | {*BINARY_OPERATIONS}
     wanted |= {f"call {name}" for name in (*ELEMENTARY, *FUNCTIONS) if "lookup" not in name}
     assert wanted <= kinds, wanted - kinds
 

@@ -8,13 +8,13 @@ from tempfile import TemporaryDirectory
 
 from hypothesis import HealthCheck, given, note, settings, strategies as st
 
-from language.number import NUMBERS, NumberType
+from language.number import NUMBER_TYPES, NumberType
 from lockstep.compare import compare
 from tests.lockstep.chance.batch import FLAGS
-from tests.lockstep.chance.healthy import Healthy
+from tests.lockstep.chance.healthy import ReferenceRun
 from tests.lockstep.chance.kinds import random_spec
-from tests.lockstep.chance.quality import Quality, measured
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.quality import Quality, measure_quality
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import program
 from tests.lockstep.conftest import TICKS
 
@@ -22,7 +22,7 @@ SHARE = 25
 """An example costs two compilations."""
 
 
-def test_random_specs_are_in_lockstep(random_specs: list[Healthy]) -> None:
+def test_random_specs_are_in_lockstep(random_specs: list[ReferenceRun]) -> None:
     for one in random_specs:
         assert one.verdict.is_equal, f"{one.verdict.first}\n{one.spec.text}"
         assert one.verdict.ticks == TICKS
@@ -32,23 +32,23 @@ def test_random_specs_are_in_lockstep(random_specs: list[Healthy]) -> None:
     max_examples=max(1, settings().max_examples // SHARE),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
-@given(st.randoms(use_true_random=False), st.sampled_from(NUMBERS))
+@given(st.randoms(use_true_random=False), st.sampled_from(NUMBER_TYPES))
 def test_a_random_spec_is_in_lockstep(draw: Random, number: NumberType) -> None:
     """As above, one by one: hypothesis shrinks what it finds."""
     spec = random_spec(draw, "found")
     note(spec.text)
     with TemporaryDirectory() as folder:
         made = program(spec, number, Path(folder))
-    verdict = compare(taped(spec, made, 60), FLAGS)
+    verdict = compare(record_ticks(spec, made, 60), FLAGS)
     assert verdict.is_equal, str(verdict.first)
 
 
-def test_random_specs_do_what_the_rules_are_about(random_specs: list[Healthy]) -> None:
+def test_random_specs_do_what_the_rules_are_about(random_specs: list[ReferenceRun]) -> None:
     """What they never do, their agreement says nothing about; `make verify` asks for 20 times."""
     quality = Quality()
     for one in random_specs:
-        if one.program.number == "float64":
-            tape, found = measured(one.spec, one.program, TICKS)
+        if one.program.number_type == "float64":
+            tape, found = measure_quality(one.spec, one.program, TICKS)
             assert tape.values == one.tape.values, "what is counted changes what is done"
             quality.add(found)
-    assert not quality.lacking(least=1), quality.table()
+    assert not quality.missing_coverage(least=1), quality.table()

@@ -8,8 +8,8 @@ import struct
 import pytest
 
 from engine.interpreter import Interpreter
-from language.number import NumberType, rounded
-from lockstep.compare import Tape, compare
+from language.number import NumberType, round_to_type
+from lockstep.compare import TickLog, compare
 from modewright.api import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick
@@ -116,22 +116,22 @@ def ticks() -> list[Tick]:
 
 
 @pytest.fixture(scope="module", params=["float64", "float32"])
-def tape(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Tape:
+def tape(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> TickLog:
     path = tmp_path_factory.mktemp("ranges") / "ranges.yaml"
     numbers: NumberType = request.param
     spec = SPEC if numbers == "float64" else SPEC.replace("1.0e300", "1.0e38")
     path.write_text(spec.format(numbers=numbers))
     made = program(str(path))
-    stepper, tape = Interpreter(made), Tape(made, "ranges")
+    stepper, tape = Interpreter(made), TickLog(made, "ranges")
     for tick in ticks():
         for name, value in tick.items():
             stepper.set(name, value)
         stepper.run("step")
-        tape.record(stepper)
+        tape.record_tick(stepper)
     return tape
 
 
-def test_engine_and_c_do_the_same(tape: Tape) -> None:
+def test_engine_and_c_do_the_same(tape: TickLog) -> None:
     verdict = compare(tape)
     assert verdict.ticks == len(ticks())
     assert verdict.transitions > 4
@@ -139,40 +139,42 @@ def test_engine_and_c_do_the_same(tape: Tape) -> None:
 
 
 @pytest.mark.parametrize("name", list(BOUNDS))
-def test_an_input_is_what_rule_18_says(tape: Tape, name: str) -> None:
-    number = tape.program.number
+def test_an_input_is_what_rule_18_says(tape: TickLog, name: str) -> None:
+    number = tape.program.number_type
     last = 1.0 if name == "f" else 0.0
     for tick, found in zip(ticks(), column(tape, f"latched.{name}"), strict=True):
-        given = rounded(float(tick[f"input.{name}"]), number)
+        given = round_to_type(float(tick[f"input.{name}"]), number)
         last = held(name, given, last)
         assert bits(found) == bits(last), (given, found, last)
 
 
-def test_a_whole_number_takes_the_nearest_bound_and_a_name_its_fallback(tape: Tape) -> None:
+def test_a_whole_number_takes_the_nearest_bound_and_a_name_its_fallback(tape: TickLog) -> None:
     wanted = [min(max(int(tick["input.k"]), -3), 5) for tick in ticks()]
     assert column(tape, "latched.k") == wanted
     names = [int(tick["input.g"]) for tick in ticks()]
     assert column(tape, "latched.g") == [name if name in (0, 1) else 1 for name in names]
 
 
-def test_the_bit_is_set_in_the_same_tick_and_cleared_where_it_is_not_latched(tape: Tape) -> None:
+def test_the_bit_is_set_in_the_same_tick_and_cleared_where_it_is_not_latched(tape: TickLog) -> None:
     bit = {fault: 1 << place for place, fault in enumerate(tape.program.faults)}
     words = [int(word) for word in column(tape, "memory.faults")]
-    number, latched = tape.program.number, False
+    number, latched = tape.program.number_type, False
     for tick, word in zip(ticks(), words, strict=True):
-        inside = {n: LOW <= rounded(float(tick[f"input.{n}"]), number) <= HIGH for n in "abcdef"}
+        inside = {
+            n: LOW <= round_to_type(float(tick[f"input.{n}"]), number) <= HIGH for n in "abcdef"
+        }
         assert bool(word & bit["loose"]) == (not (inside["c"] and inside["e"]))
         latched = latched or not inside["a"]
         assert bool(word & bit["range_a"]) == latched
 
 
-def test_no_state_leaves_its_range_and_nothing_is_not_finite(tape: Tape) -> None:
+def test_no_state_leaves_its_range_and_nothing_is_not_finite(tape: TickLog) -> None:
     for name, limit in (("state.x", 4), ("state.z", 4), ("discrete.w", 4), ("discrete.i", 7)):
         assert all(-limit <= value <= limit for value in column(tape, name)), name
     assert {0, 1} == set(column(tape, "discrete.r"))
 
 
-def test_the_floor_of_a_real_is_held_in_the_range_of_its_target(tape: Tape) -> None:
+def test_the_floor_of_a_real_is_held_in_the_range_of_its_target(tape: TickLog) -> None:
     active = tape.program.modes[0].number
     for mode, a, i in zip(
         column(tape, "memory.mode"),

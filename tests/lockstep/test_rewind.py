@@ -10,10 +10,10 @@ import pytest
 
 from engine.interpreter import Interpreter
 from language.load import load_automaton, program_of
-from language.number import NUMBERS
+from language.number import NUMBER_TYPES
 from language.program import Program
 from language.project import Project
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from tests.language.making import ROOT
 from tests.lockstep.chance.batch import Batch
 from tests.lockstep.programs import Tick
@@ -148,7 +148,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Program]:
         (home / "spec" / f"{name}.yaml").write_text(text)
     for name, root in (*((name, home) for name in SPECS), ("hko", ROOT)):
         automaton = load_automaton(name, Project(root))
-        for number in NUMBERS:
+        for number in NUMBER_TYPES:
             made = program_of(dataclasses.replace(automaton, numbers=number))
             found[f"{name}_{number}"] = dataclasses.replace(made, name=f"{name}_{number}")
     return found
@@ -159,16 +159,16 @@ def batch(programs: dict[str, Program], tmp_path_factory: pytest.TempPathFactory
     return Batch(list(programs.values()), tmp_path_factory.mktemp("batch"))
 
 
-def taped(program: Program, ticks: list[Tick]) -> tuple[Tape, Counter[str]]:
+def taped(program: Program, ticks: list[Tick]) -> tuple[TickLog, Counter[str]]:
     """Return the tape, and how often a transition went back how."""
-    stepper, tape, seen = Interpreter(program), Tape(program, program.name), Counter[str]()
-    back = {info.number for info in program.transitions if info.rewind}
+    stepper, tape, seen = Interpreter(program), TickLog(program, program.name), Counter[str]()
+    back = {info.number for info in program.transitions if info.rewind_ticks}
     for tick in ticks:
         for name, value in tick.items():
             if stepper.has(name):
                 stepper.set(name, value)
         stepper.run("step")
-        tape.record(stepper)
+        tape.record_tick(stepper)
         if stepper.get("memory.fired") in back:
             count = stepper.get("work.back")
             seen["limit" if not count else "one tick" if count == 1 else "more ticks"] += 1
@@ -177,7 +177,7 @@ def taped(program: Program, ticks: list[Tick]) -> tuple[Tape, Counter[str]]:
     return tape, seen
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 @pytest.mark.parametrize("name", [*SPECS, "hko"])
 def test_what_goes_back_is_equal_in_c(
     programs: dict[str, Program], batch: Batch, name: str, number: str

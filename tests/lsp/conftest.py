@@ -9,17 +9,17 @@ from pathlib import Path
 import pytest
 
 from tests.lsp.heating import HEATER, ROOT
-from tests.lsp.talk import Talk
+from tests.lsp.talk import LspClient
 
 
 @pytest.fixture(scope="module")
-def talk() -> Iterator[Talk]:
-    with Talk(("utf-8", "utf-16")) as made:
+def talk() -> Iterator[LspClient]:
+    with LspClient(("utf-8", "utf-16")) as made:
         yield made
 
 
 @pytest.fixture
-def heater(talk: Talk, tmp_path: Path) -> Path:
+def heater(talk: LspClient, tmp_path: Path) -> Path:
     path = tmp_path / "spec" / "heater.yaml"
     path.parent.mkdir()
     path.write_text("language: 1\nautomaton: heater\n")  # the editor's text counts, not this
@@ -29,7 +29,7 @@ def heater(talk: Talk, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def driveline(talk: Talk, tmp_path: Path) -> Path:
+def driveline(talk: LspClient, tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "spec" / "ev_driveline", tmp_path / "spec")
     path = tmp_path / "spec" / "plant.yaml"
     assert talk.open(path, path.read_text()) == []

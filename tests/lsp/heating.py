@@ -6,7 +6,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from tests.lsp.talk import Message, Talk
+from tests.lsp.talk import LspClient, Message
 
 ROOT = Path(__file__).parent.parent.parent
 HEATER = """\
@@ -33,27 +33,27 @@ outputs: [P, mode]
 """
 
 
-def where(text: str, part: str, inside: int = 0) -> tuple[int, int]:
+def position_of(text: str, part: str, inside: int = 0) -> tuple[int, int]:
     """Return line (from 1) and column (from 0) of the first place of a part of a text."""
     before = text[: text.index(part) + inside]
     return before.count("\n") + 1, len(before.rpartition("\n")[2])
 
 
-def labels(talk: Talk, path: Path, text: str) -> list[str]:
+def completion_labels(talk: LspClient, path: Path, text: str) -> list[str]:
     """Return what is offered at the sign `|` of a text."""
     before, _, after = text.partition("|")
     talk.begin_change(path, before + after)
     place = (before.count("\n") + 1, len(before.rpartition("\n")[2]))
-    found = talk.ask("textDocument/completion", talk.at(path, *place))
+    found = talk.request("textDocument/completion", talk.at(path, *place))
     return [item["label"] for item in found["items"]]
 
 
-def hover(talk: Talk, path: Path, place: tuple[int, int]) -> str:
-    told: Message | None = talk.ask("textDocument/hover", talk.at(path, *place))
+def hover(talk: LspClient, path: Path, place: tuple[int, int]) -> str:
+    told: Message | None = talk.request("textDocument/hover", talk.at(path, *place))
     return told["contents"]["value"] if told else ""
 
 
-def applied(text: str, edits: list[dict[str, Any]]) -> str:
+def apply_edits(text: str, edits: list[dict[str, Any]]) -> str:
     lines = text.split("\n")
     places = ((e["range"]["start"]["line"], e["range"]["start"]["character"]) for e in edits)
     for _, edit in sorted(zip(places, edits, strict=True), key=itemgetter(0), reverse=True):

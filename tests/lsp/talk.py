@@ -16,7 +16,7 @@ LONGEST_SECONDS = 240.0
 Message = dict[str, Any]
 
 
-class Talk:
+class LspClient:
     """One running server; a context that shuts it down."""
 
     def __init__(self, encodings: tuple[str, ...] = ("utf-16",)) -> None:
@@ -34,10 +34,10 @@ class Talk:
         general = {"positionEncodings": list(encodings)}
         capabilities = {"general": general}
         start = {"processId": None, "rootUri": None, "capabilities": capabilities}
-        self.capabilities = self.ask("initialize", start)["capabilities"]
-        self.say("initialized", {})
+        self.capabilities = self.request("initialize", start)["capabilities"]
+        self.notify("initialized", {})
 
-    def __enter__(self) -> Talk:
+    def __enter__(self) -> LspClient:
         return self
 
     def __exit__(
@@ -47,22 +47,22 @@ class Talk:
         trace: TracebackType | None,
     ) -> None:
         if kind is None:
-            self.ask("shutdown", None)
-            self.say("exit", None)
+            self.request("shutdown", None)
+            self.notify("exit", None)
             assert self.process.wait(10) == 0
         self.watchdog.cancel()
         self.process.kill()
         self.process.communicate()
 
-    def say(self, method: str, params: Any) -> None:
+    def notify(self, method: str, params: Any) -> None:
         self._send({"jsonrpc": "2.0", "method": method, "params": params})
 
-    def ask(self, method: str, params: Any) -> Any:
-        answer = self.answer(method, params)
+    def request(self, method: str, params: Any) -> Any:
+        answer = self.request_raw(method, params)
         assert "error" not in answer, answer["error"]
         return answer["result"]
 
-    def answer(self, method: str, params: Any) -> Message:
+    def request_raw(self, method: str, params: Any) -> Message:
         self.number += 1
         self._send({"jsonrpc": "2.0", "id": self.number, "method": method, "params": params})
         while (message := self._receive()).get("id") != self.number or "method" in message:
@@ -74,7 +74,7 @@ class Talk:
         uri = path.as_uri()
         self.versions[uri] = 1
         item = {"uri": uri, "languageId": "yaml", "version": 1, "text": text}
-        self.say("textDocument/didOpen", {"textDocument": item})
+        self.notify("textDocument/didOpen", {"textDocument": item})
         return self.problems(path)
 
     def change(self, path: Path, text: str) -> list[Message]:
@@ -87,7 +87,7 @@ class Talk:
         self.versions[uri] += 1
         document = {"uri": uri, "version": self.versions[uri]}
         change = {"textDocument": document, "contentChanges": [{"text": text}]}
-        self.say("textDocument/didChange", change)
+        self.notify("textDocument/didChange", change)
 
     def problems(self, path: Path) -> list[Message]:
         """Wait for the problems of the newest version of a text."""
@@ -129,7 +129,7 @@ class Talk:
         return message
 
 
-def seconds_of_edit(talk: Talk, path: Path, text: str) -> float:
+def seconds_of_edit(talk: LspClient, path: Path, text: str) -> float:
     """Return the time from an edit to its problems [s]."""
     start = time.perf_counter()
     talk.change(path, text)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from tests.lsp.heating import applied, where
-from tests.lsp.talk import Talk
+from tests.lsp.heating import apply_edits, position_of
+from tests.lsp.talk import LspClient
 
 LONE = """\
 language: 1
@@ -76,7 +76,12 @@ BARE = """\
 )
 @pytest.mark.parametrize("of", ["lone", "car"])
 def test_tests_are_followed_of_an_automaton_and_of_a_system(
-    talk: Talk, tmp_path: Path, of: str, part: str, lines: dict[str, list[int]], bare: list[int]
+    talk: LspClient,
+    tmp_path: Path,
+    of: str,
+    part: str,
+    lines: dict[str, list[int]],
+    bare: list[int],
 ) -> None:
     is_alone = of == "lone"
     texts = {
@@ -89,8 +94,8 @@ def test_tests_are_followed_of_an_automaton_and_of_a_system(
     for name, text in (texts | {"car": CAR}).items():
         (folder / f"{name}.yaml").write_text(text)
     talk.open(folder / "lone.yaml", LONE)
-    asked = {**talk.at(folder / "lone.yaml", *where(LONE, part)), "newName": "zz"}
-    changes = talk.ask("textDocument/rename", asked)["changes"]
+    asked = {**talk.at(folder / "lone.yaml", *position_of(LONE, part)), "newName": "zz"}
+    changes = talk.request("textDocument/rename", asked)["changes"]
     found = {
         Path(uri).stem: sorted(each["range"]["start"]["line"] + 1 for each in edits)
         for uri, edits in changes.items()
@@ -98,22 +103,22 @@ def test_tests_are_followed_of_an_automaton_and_of_a_system(
     assert found == lines | {"looked": lines["looked"] + bare * is_alone}
     for uri, edits in changes.items():
         file = folder / Path(uri).name
-        file.write_text(applied(file.read_text(), edits))
+        file.write_text(apply_edits(file.read_text(), edits))
     for file in folder.glob("*.yaml"):
         errors = [p for p in mw.check(str(file), tmp_path) if p.severity == "error"]
         assert errors == [], mw.render_all(errors)
 
 
 def test_an_automaton_that_runs_alone_is_renamed_as_its_own_instance(
-    talk: Talk, tmp_path: Path
+    talk: LspClient, tmp_path: Path
 ) -> None:
     folder = tmp_path / "spec"
     folder.mkdir()
     for name, text in {"lone": LONE, "looked": TEST, "run": RUN}.items():
         (folder / f"{name}.yaml").write_text(text)
     talk.open(folder / "lone.yaml", LONE)
-    asked = {**talk.at(folder / "lone.yaml", *where(LONE, "lone\n")), "newName": "zz"}
-    changes = talk.ask("textDocument/rename", asked)["changes"]
+    asked = {**talk.at(folder / "lone.yaml", *position_of(LONE, "lone\n")), "newName": "zz"}
+    changes = talk.request("textDocument/rename", asked)["changes"]
     assert {Path(uri).stem: len(edits) for uri, edits in changes.items()} == {
         "lone": 1, "run": 1, "looked": 6,
     }  # fmt: skip

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.lsp.heating import labels
-from tests.lsp.talk import Talk
+from tests.lsp.heating import completion_labels
+from tests.lsp.talk import LspClient
 from tests.lsp.test_alone import LONE, RUN, TEST
 
 CHART = LONE.replace(
@@ -38,13 +38,13 @@ HEAT = ["heat.off_", "heat.warm"]
     ],
 )
 def test_a_chart_is_offered_what_alone_fits(
-    talk: Talk, tmp_path: Path, old: str, new: str, expected: list[str]
+    talk: LspClient, tmp_path: Path, old: str, new: str, expected: list[str]
 ) -> None:
     path = tmp_path / "spec" / "lone.yaml"
     path.parent.mkdir()
     talk.open(path, CHART)
     assert old in CHART
-    assert labels(talk, path, CHART.replace(old, new)) == expected
+    assert completion_labels(talk, path, CHART.replace(old, new)) == expected
 
 
 @pytest.mark.parametrize(
@@ -55,13 +55,13 @@ def test_a_chart_is_offered_what_alone_fits(
     ],
 )
 def test_a_scenario_is_offered_the_words_of_an_input(
-    talk: Talk, tmp_path: Path, old: str, new: str, expected: list[str]
+    talk: LspClient, tmp_path: Path, old: str, new: str, expected: list[str]
 ) -> None:
     path = tmp_path / "spec" / "run.yaml"
     path.parent.mkdir()
     path.with_name("lone.yaml").write_text(LONE)
     talk.open(path, RUN)
-    assert labels(talk, path, RUN.replace(old, new)) == expected
+    assert completion_labels(talk, path, RUN.replace(old, new)) == expected
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_a_scenario_is_offered_the_words_of_an_input(
     ],
 )
 def test_a_test_is_offered_the_modes_of_a_region_and_faults(
-    talk: Talk, tmp_path: Path, new: str, expected: list[str]
+    talk: LspClient, tmp_path: Path, new: str, expected: list[str]
 ) -> None:
     path = tmp_path / "spec" / "looked.yaml"
     path.parent.mkdir()
@@ -82,19 +82,19 @@ def test_a_test_is_offered_the_modes_of_a_region_and_faults(
     path.with_name("run.yaml").write_text(RUN)
     talk.open(path, TEST)
     text = TEST.replace("lone.charge == idle, before", f"{new}, before")
-    assert sorted(labels(talk, path, text)) == sorted(expected)
+    assert sorted(completion_labels(talk, path, text)) == sorted(expected)
     listed = TEST.replace("modes: [idle]", "modes: [idle, |]")
-    assert labels(talk, path, listed) == ["idle", "session.cc", "session.cv"]
+    assert completion_labels(talk, path, listed) == ["idle", "session.cc", "session.cv"]
 
 
-def test_a_dotted_name_is_replaced_as_a_whole(talk: Talk, tmp_path: Path) -> None:
+def test_a_dotted_name_is_replaced_as_a_whole(talk: LspClient, tmp_path: Path) -> None:
     path = tmp_path / "spec" / "lone.yaml"
     path.parent.mkdir()
     text = LONE.replace("in(charge.session.cc)", "in(charge.se)")
     talk.open(path, text)
     line = text[: text.index("in(charge.se)")].count("\n")
     start = text.split("\n")[line].index("charge.se")
-    found = talk.ask("textDocument/completion", talk.at(path, line + 1, start + 9))
+    found = talk.request("textDocument/completion", talk.at(path, line + 1, start + 9))
     edits = {item["label"]: item["textEdit"] for item in found["items"]}
     assert edits["charge.session.cv"]["newText"] == "charge.session.cv"
     ends = edits["charge.session.cv"]["range"]
@@ -109,11 +109,11 @@ def shown(symbol: dict[str, Any]) -> Any:
     return {symbol["name"]: [shown(each) for each in inner]} if inner else symbol["name"]
 
 
-def test_an_outline_shows_sections_and_modes_inside_modes(talk: Talk, tmp_path: Path) -> None:
+def test_an_outline_shows_sections_and_modes_inside_modes(talk: LspClient, tmp_path: Path) -> None:
     path = tmp_path / "spec" / "lone.yaml"
     path.parent.mkdir()
     talk.open(path, LONE)
-    (whole,) = talk.ask("textDocument/documentSymbol", {"textDocument": {"uri": path.as_uri()}})
+    (whole,) = talk.request("textDocument/documentSymbol", {"textDocument": {"uri": path.as_uri()}})
     inner = [{"cc": ["cv"]}, "cv"]
     charge = {"charge": [{"idle": ["session"]}, {"session": inner}]}
     heat = {"heat": [{"off_": ["warm"]}, "warm"]}

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from language.missing import ToolMissing
+from language.missing import MissingToolError
 from modewright.commands.lsp import lsp
-from modewright.lsp.mention import mentions_of
-from modewright.lsp.namespace import namespace
-from modewright.lsp.world import World
+from modewright.lsp.mention import references_to
+from modewright.lsp.namespace import load_symbol_table
+from modewright.lsp.world import Workspace
 
 SPECS = {
     "contactor": """\
@@ -84,11 +84,11 @@ def test_a_name_is_followed_through_instances_variants_and_calibrations(
     (tmp_path / "spec").mkdir()
     for file, text in SPECS.items():
         (tmp_path / "spec" / f"{file}.yaml").write_text(text)
-    world = World(tmp_path)
-    space = namespace(world, tmp_path / "spec" / "contactor.yaml")
+    world = Workspace(tmp_path)
+    space = load_symbol_table(world, tmp_path / "spec" / "contactor.yaml")
     assert space
     found: dict[str, int] = {}
-    for mention in mentions_of(world, space.names[group, name]):
+    for mention in references_to(world, space.names[group, name]):
         file = Path(mention.span.source.name).stem
         found[file] = found.get(file, 0) + 1
     assert found == places
@@ -98,5 +98,5 @@ def test_what_the_server_needs_is_told_where_it_is_absent(monkeypatch: pytest.Mo
     monkeypatch.delitem(sys.modules, "modewright.lsp.server", raising=False)
     monkeypatch.setitem(sys.modules, "pygls", None)
     monkeypatch.setitem(sys.modules, "pygls.exceptions", None)
-    with pytest.raises(ToolMissing, match=r"pip install 'modewright\[lsp\]'"):
+    with pytest.raises(MissingToolError, match=r"pip install 'modewright\[lsp\]'"):
         lsp()

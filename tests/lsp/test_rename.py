@@ -9,13 +9,13 @@ import pytest
 from lsprotocol import types
 
 import modewright as mw
-from modewright.lsp.mention import Mention, mentions_of
-from modewright.lsp.namespace import Declared
+from modewright.lsp.mention import Reference, references_to
+from modewright.lsp.namespace import Symbol
 from modewright.lsp.rename import rename
 from modewright.lsp.renamed import RenameRefused
-from modewright.lsp.world import World
-from tests.lsp.heating import applied, where
-from tests.lsp.talk import Talk
+from modewright.lsp.world import Workspace
+from tests.lsp.heating import apply_edits, position_of
+from tests.lsp.talk import LspClient
 
 CHART = """\
 language: 1
@@ -37,7 +37,7 @@ outputs: [mode]
 """
 
 
-def test_a_definition_is_found_in_another_file(talk: Talk, driveline: Path) -> None:
+def test_a_definition_is_found_in_another_file(talk: LspClient, driveline: Path) -> None:
     estimator = driveline.with_name("estimator.yaml")
     text = estimator.read_text()
     talk.open(estimator, text)
@@ -46,26 +46,26 @@ def test_a_definition_is_found_in_another_file(talk: Talk, driveline: Path) -> N
         ("in(driveline.no_contact)", 16, "  no_contact:\n    number"),
         ("in(driveline.no_contact)", 5, "driveline\n"),
     ):
-        place = where(text, part, inside)
-        (found,) = talk.ask("textDocument/definition", talk.at(estimator, *place))
+        place = position_of(text, part, inside)
+        (found,) = talk.request("textDocument/definition", talk.at(estimator, *place))
         assert found["uri"] == driveline.as_uri()
-        line = where(driveline.read_text(), target)[0]
+        line = position_of(driveline.read_text(), target)[0]
         assert found["range"]["start"]["line"] in (line - 1, line)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("old", ["k_hs:", "no_contact:\n"])
 def test_a_rename_reaches_all_files_of_the_project_and_changes_no_meaning(
-    talk: Talk, driveline: Path, old: str
+    talk: LspClient, driveline: Path, old: str
 ) -> None:
     files = sorted(driveline.parent.glob("*.yaml"))
     name = old.strip(":\n")
     text = driveline.read_text()
-    asked = {**talk.at(driveline, *where(text, f"  {old}", 3)), "newName": "renamed"}
-    changes = talk.ask("textDocument/rename", asked)["changes"]
+    asked = {**talk.at(driveline, *position_of(text, f"  {old}", 3)), "newName": "renamed"}
+    changes = talk.request("textDocument/rename", asked)["changes"]
     assert len(changes) > 3
     for path in files:
-        path.write_text(applied(path.read_text(), changes.get(path.as_uri(), [])))
+        path.write_text(apply_edits(path.read_text(), changes.get(path.as_uri(), [])))
     root = driveline.parent.parent
     for checked in ("ev_driveline", "hko", "estimator_written", "study_tip_out"):
         path = next(p for p in files if p.stem == checked or f": {checked}\n" in p.read_text())
@@ -75,21 +75,23 @@ def test_a_rename_reaches_all_files_of_the_project_and_changes_no_meaning(
 
 
 def test_a_name_that_cannot_be_given_is_refused_with_the_reason(
-    talk: Talk, driveline: Path
+    talk: LspClient, driveline: Path
 ) -> None:
-    place = where(driveline.read_text(), "  k_hs:", 3)
+    place = position_of(driveline.read_text(), "  k_hs:", 3)
     for name, reason in (
         ("c_hs", "is a name already"),
         ("while", "word of C"),
         ("1k", "not a name"),
     ):
-        answer = talk.answer("textDocument/rename", {**talk.at(driveline, *place), "newName": name})
+        answer = talk.request_raw(
+            "textDocument/rename", {**talk.at(driveline, *place), "newName": name}
+        )
         assert reason in answer["error"]["message"]
     outside = driveline.with_name("worn.yaml")
     text = "language: 1\nvariant: worn\nextends: emps\nparameters: {M: {value: 1 kg}}\n"
     talk.open(outside, text)
-    asked = {**talk.at(outside, *where(text, "M:")), "newName": "mass"}
-    assert "not here" in talk.answer("textDocument/rename", asked)["error"]["message"]
+    asked = {**talk.at(outside, *position_of(text, "M:")), "newName": "mass"}
+    assert "not here" in talk.request_raw("textDocument/rename", asked)["error"]["message"]
 
 
 @pytest.mark.parametrize(
@@ -101,14 +103,14 @@ def test_a_name_that_cannot_be_given_is_refused_with_the_reason(
     ],
 )
 def test_events_columns_and_rows_of_tables_are_renamed(
-    talk: Talk, tmp_path: Path, part: str, new: str, changed: list[tuple[str, str]]
+    talk: LspClient, tmp_path: Path, part: str, new: str, changed: list[tuple[str, str]]
 ) -> None:
     path = tmp_path / "spec" / "chart.yaml"
     path.parent.mkdir()
     errors = [each for each in talk.open(path, CHART) if each["severity"] == 1]
     assert errors == []
-    asked = {**talk.at(path, *where(CHART, part, 1)), "newName": new}
-    (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
+    asked = {**talk.at(path, *position_of(CHART, part, 1)), "newName": new}
+    (edits,) = talk.request("textDocument/rename", asked)["changes"].values()
     wanted = CHART
     for old, text in changed:
         wanted = wanted.replace(old, text)
@@ -116,7 +118,7 @@ def test_events_columns_and_rows_of_tables_are_renamed(
         before, sign, after = wanted.partition("  other:")
         wanted = before.replace("initial: idle", "initial: rest").replace("{idle: {}", "{rest: {}")
         wanted += sign + after
-    assert applied(CHART, edits) == wanted
+    assert apply_edits(CHART, edits) == wanted
 
 
 QUOTED = """\
@@ -133,14 +135,16 @@ outputs: ["x"]
 
 
 @pytest.mark.parametrize("part", ["'quoted'", '"lim"', '"up"', "'down'", '"x"'])
-def test_what_is_quoted_is_renamed_inside_its_quotes(talk: Talk, tmp_path: Path, part: str) -> None:
+def test_what_is_quoted_is_renamed_inside_its_quotes(
+    talk: LspClient, tmp_path: Path, part: str
+) -> None:
     path = tmp_path / "spec" / "quoted.yaml"
     path.parent.mkdir()
     assert [each for each in talk.open(path, QUOTED) if each["severity"] == 1] == []
     name = part.strip("\"'")
-    asked = {**talk.at(path, *where(QUOTED, part, 1)), "newName": "other"}
-    (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
-    assert applied(QUOTED, edits) == re.sub(rf"\b{name}\b", "other", QUOTED)
+    asked = {**talk.at(path, *position_of(QUOTED, part, 1)), "newName": "other"}
+    (edits,) = talk.request("textDocument/rename", asked)["changes"].values()
+    assert apply_edits(QUOTED, edits) == re.sub(rf"\b{name}\b", "other", QUOTED)
 
 
 NESTED = """\
@@ -164,19 +168,19 @@ outputs: [n, mode]
 """
 
 
-def test_a_mode_inside_a_mode_is_found_and_renamed(talk: Talk, tmp_path: Path) -> None:
+def test_a_mode_inside_a_mode_is_found_and_renamed(talk: LspClient, tmp_path: Path) -> None:
     path = tmp_path / "spec" / "nested.yaml"
     path.parent.mkdir()
     talk.open(path, NESTED)
-    place = where(NESTED, "      slow:", 7)
-    found = talk.ask(
+    place = position_of(NESTED, "      slow:", 7)
+    found = talk.request(
         "textDocument/references",
         {**talk.at(path, *place), "context": {"includeDeclaration": True}},
     )
     assert [each["range"]["start"]["line"] + 1 for each in found] == [10, 13, 14, 16]
     asked = {**talk.at(path, *place), "newName": "low"}
-    (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
-    renamed = applied(NESTED, edits)
+    (edits,) = talk.request("textDocument/rename", asked)["changes"].values()
+    renamed = apply_edits(NESTED, edits)
     assert renamed == NESTED.replace("slow", "low").replace("low: {to: busy", "slow: {to: busy")
 
 
@@ -223,7 +227,7 @@ expect:
 
 
 @pytest.fixture
-def deep(talk: Talk, tmp_path: Path) -> Path:
+def deep(talk: LspClient, tmp_path: Path) -> Path:
     path = tmp_path / "spec" / "deep.yaml"
     path.parent.mkdir()
     for name, text in (("around", AROUND), ("seen", SEEN), ("deep", DEEP)):
@@ -243,10 +247,10 @@ def deep(talk: Talk, tmp_path: Path) -> Path:
     ],
 )
 def test_what_has_something_inside_is_renamed_in_paths_tables_systems_and_tests(
-    talk: Talk, deep: Path, part: str, inside: int, old: str, lines: dict[str, list[int]]
+    talk: LspClient, deep: Path, part: str, inside: int, old: str, lines: dict[str, list[int]]
 ) -> None:
-    asked = {**talk.at(deep, *where(DEEP, part, inside)), "newName": "zz"}
-    changes = talk.ask("textDocument/rename", asked)["changes"]
+    asked = {**talk.at(deep, *position_of(DEEP, part, inside)), "newName": "zz"}
+    changes = talk.request("textDocument/rename", asked)["changes"]
     found = {
         Path(uri).stem: sorted(each["range"]["start"]["line"] + 1 for each in edits)
         for uri, edits in changes.items()
@@ -254,7 +258,7 @@ def test_what_has_something_inside_is_renamed_in_paths_tables_systems_and_tests(
     assert found == lines
     for uri, edits in changes.items():
         file = deep.with_name(Path(uri).name)
-        file.write_text(applied(file.read_text(), edits))
+        file.write_text(apply_edits(file.read_text(), edits))
     for file in deep.parent.glob("*.yaml"):
         errors = [p for p in mw.check(str(file), deep.parent.parent) if p.severity == "error"]
         assert errors == [], mw.render_all(errors)
@@ -269,21 +273,21 @@ def test_what_has_something_inside_is_renamed_in_paths_tables_systems_and_tests(
     ],
 )
 def test_a_rename_that_changes_a_meaning_is_refused(
-    talk: Talk, deep: Path, part: str, name: str, reason: str
+    talk: LspClient, deep: Path, part: str, name: str, reason: str
 ) -> None:
-    asked = {**talk.at(deep, *where(DEEP, part)), "newName": name}
-    assert reason in talk.answer("textDocument/rename", asked)["error"]["message"]
+    asked = {**talk.at(deep, *position_of(DEEP, part)), "newName": name}
+    assert reason in talk.request_raw("textDocument/rename", asked)["error"]["message"]
 
 
 def test_a_rename_that_leaves_an_old_name_behind_is_refused(
     deep: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def without_tables(world: World, declared: Declared) -> list[Mention]:
-        return [each for each in mentions_of(world, declared) if each.path[0] != "tables"]
+    def without_tables(world: Workspace, declared: Symbol) -> list[Reference]:
+        return [each for each in references_to(world, declared) if each.path[0] != "tables"]
 
     monkeypatch.setattr("modewright.lsp.rename.mentions_of", without_tables)
     monkeypatch.setattr("modewright.lsp.renamed.mentions_of", without_tables)
-    line, column = where(DEEP, "x: {unit")
-    world = World(deep.parent.parent)
+    line, column = position_of(DEEP, "x: {unit")
+    world = Workspace(deep.parent.parent)
     with pytest.raises(RenameRefused, match=r"not followed: .*deep.yaml:9:"):
         rename(world, deep, types.Position(line - 1, column), "zz")

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from codegen.comment import comment
-from engine.plot import Line, Panel, picture
+from codegen.comment import sanitise_comment
+from engine.plot import Panel, PlotLine, draw_picture
 from engine.trajectory import Trajectory
-from language.problem import Problem, Source, Span, render
-from language.project import document_of
+from language.problem import Problem, Source, Span, render_problem
+from language.project import parse_document
 from modewright.checking import problem_json
 from modewright.diagram import diagram_of
 
@@ -38,12 +38,14 @@ HOSTILE: Mapping[str, str] = {
 
 
 def c_comment(text: str) -> str:
-    return f"/* {comment(text)} */"
+    return f"/* {sanitise_comment(text)} */"
 
 
 def problem(text: str) -> str:
     source = Source(text[:200], (f"about: {text}",))
-    return render(Problem("form", Span(source, 1, 8, 5), f"`{text}` is wrong", f"not `{text}`"))
+    return render_problem(
+        Problem("form", Span(source, 1, 8, 5), f"`{text}` is wrong", f"not `{text}`")
+    )
 
 
 def as_json(text: str) -> str:
@@ -64,19 +66,19 @@ modes:
 
 def mermaid(text: str) -> str:
     spec = _diagram(text)
-    return diagram_of(document_of(Source("drawn", tuple(spec.split("\n"))), spec)).mermaid()
+    return diagram_of(parse_document(Source("drawn", tuple(spec.split("\n"))), spec)).mermaid()
 
 
 def svg(text: str) -> str:
     spec = _diagram(text)
-    return diagram_of(document_of(Source("drawn", tuple(spec.split("\n"))), spec)).svg()
+    return diagram_of(parse_document(Source("drawn", tuple(spec.split("\n"))), spec)).svg()
 
 
 def title_of_a_plot(text: str) -> str:
     times = np.linspace(0.0, 1.0, 5)
     run = Trajectory("run", times, {"a.x": times}, {"a.x": "m"}, {}, ())
-    panel = Panel(text[:20], [Line("a.x", "x")])
-    return picture([run], [panel], [], text[:200]).data("svg").decode()
+    panel = Panel(text[:20], [PlotLine("a.x", "x")])
+    return draw_picture([run], [panel], [], text[:200]).data("svg").decode()
 
 
 PRINTERS: Mapping[str, Callable[[str], str]] = {

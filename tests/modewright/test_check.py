@@ -11,7 +11,7 @@ import pytest
 
 from language.problem import Problem, Source, Span
 from modewright.annotations import annotation_lines
-from modewright.sarif import sarif
+from modewright.sarif import to_sarif
 
 ROOT = Path(__file__).parent.parent.parent
 SPOILED = """language: 1
@@ -97,4 +97,4 @@ def test_an_annotation_has_no_sign_that_would_end_it() -> None:
 
 
 def test_sarif_of_a_fine_spec_has_no_results() -> None:
-    assert sarif([])["runs"][0]["results"] == []
+    assert to_sarif([])["runs"][0]["results"] == []

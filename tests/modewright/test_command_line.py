@@ -12,8 +12,8 @@ import pytest
 import typer
 
 import modewright as mw
-from modewright.cli import COMMANDS, app, application
-from modewright.exits import exit_code
+from modewright.cli import COMMANDS, app, build_application
+from modewright.exits import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 HEAVY = ("scipy", "matplotlib", "numpy", "networkx", "pint", "lark", "jinja2", "rich.console")
@@ -32,7 +32,7 @@ def tip_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(list(arguments), standalone_mode=False))
+    return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
 def test_help_loads_no_heavy_module() -> None:
@@ -75,7 +75,7 @@ def test_numbers_that_a_command_takes_by_default_are_those_of_its_function() -> 
 
 def params_of(name: str, *words: str) -> list[object]:
     """Return the parameters (but --help) of a command of the application made for some words."""
-    group = typer.main.get_command(application(words))
+    group = typer.main.get_command(build_application(words))
     return [p for p in group.commands[name].params if p.name != "help"]  # type: ignore[attr-defined]
 
 

@@ -16,8 +16,8 @@ def test_a_log_is_told_now_and_then_how_far_a_work_is(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(console, "EVERY", every)
-    with console.counting("sweep tip_outs", "variants") as tell:
+    monkeypatch.setattr(console, "REPORT_INTERVAL", every)
+    with console.progress_bar("sweep tip_outs", "variants") as tell:
         for done in (10, 20, 30):
             tell(done, 5, 200)
     told = capsys.readouterr().err.splitlines()

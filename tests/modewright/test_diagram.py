@@ -12,11 +12,11 @@ from hypothesis import given, strategies as st
 
 import modewright as mw
 from language.problem import Source, SpecError
-from language.project import document_of
+from language.project import parse_document
 from modewright.cli import app
 from modewright.diagram import Diagram, diagram_of
-from modewright.exits import exit_code
-from modewright.layers import Edge, layout
+from modewright.exits import run_with_exit_code
+from modewright.layers import Edge, compute_layout
 
 ROOT = Path(__file__).parent.parent.parent
 NESTED = """\
@@ -42,7 +42,7 @@ regions:
 
 
 def nested() -> Diagram:
-    return diagram_of(document_of(Source("nested.yaml"), NESTED))
+    return diagram_of(parse_document(Source("nested.yaml"), NESTED))
 
 
 def test_mermaid_of_the_driveline_is_what_a_reviewer_would_write(update: bool) -> None:
@@ -88,13 +88,13 @@ def test_a_transition_with_several_targets_has_an_arrow_to_each_one_without_stay
         "run: {event: clear, when: ok}", "on_both: {to: [run, run.fast], event: e}"
     )
     text = text.replace("slow: {when: v < 2 m/s}", "slow: {to: [], when: v < 2 m/s}")
-    arrows = {(a.source, a.target) for a in diagram_of(document_of(Source("a"), text)).arrows}
+    arrows = {(a.source, a.target) for a in diagram_of(parse_document(Source("a"), text)).arrows}
     both = {(("fault",), ("run",)), (("fault",), ("run", "fast"))}
     ends = {tuple(tuple(p for p in path if p != "chart") for path in pair) for pair in arrows}
     assert both <= ends
     assert (("run", "fast"), ("run", "slow")) not in ends
     stays = "chart__run__fast --> chart__run__fast : v < 2 m/s<br/>/ stays"
-    assert stays in diagram_of(document_of(Source("a"), text)).mermaid()
+    assert stays in diagram_of(parse_document(Source("a"), text)).mermaid()
 
 
 def test_what_a_mode_takes_from_a_template_is_shown() -> None:
@@ -107,7 +107,7 @@ modes:
   drive: {like: contact}
   gap: {transitions: {drive: {when: "T > 0 N*m"}}}
 """
-    lines = diagram_of(document_of(Source("x"), text)).mermaid().splitlines()
+    lines = diagram_of(parse_document(Source("x"), text)).mermaid().splitlines()
     assert '    state "drive<br/>w = 0 rad/s" as drive' in lines
     assert "    drive --> gap : T < 0 N*m" in lines
 
@@ -118,7 +118,7 @@ def test_the_same_spec_gives_the_same_bytes() -> None:
 
 def test_no_label_holds_a_character_that_ends_it_in_mermaid() -> None:
     text = NESTED.replace("when: ok}", 'when: ok, memory: continue, about: "a;b"}')
-    for line in diagram_of(document_of(Source("x"), text)).mermaid().splitlines()[2:]:
+    for line in diagram_of(parse_document(Source("x"), text)).mermaid().splitlines()[2:]:
         label = re.sub(r"#\d+;", "", line.partition(" : ")[2])
         assert ";" not in label and ":" not in label
 
@@ -135,7 +135,10 @@ def test_the_command_writes_by_the_ending(
     monkeypatch.chdir(ROOT)
     out = tmp_path / f"graph.{ending}"
     assert (
-        exit_code(lambda: app(["graph", "driveline", "-o", str(out)], standalone_mode=False)) == 0
+        run_with_exit_code(
+            lambda: app(["graph", "driveline", "-o", str(out)], standalone_mode=False)
+        )
+        == 0
     )
     starts = {"svg": "<svg ", "mmd": "stateDiagram-v2\n", "md": "```mermaid\nstateDiagram-v2\n"}
     assert out.read_text().startswith(starts[ending])
@@ -157,7 +160,7 @@ def test_no_box_and_no_label_lies_on_another(
     graph: tuple[list[tuple[float, float]], list[Edge]],
 ) -> None:
     boxes, edges = graph
-    placed = layout(boxes, edges)
+    placed = compute_layout(boxes, edges)
     rectangles = [(x, y, w, h) for (x, y), (w, h) in zip(placed.boxes, boxes, strict=True)]
     rectangles += [
         (*route.label, *edge.label) for route, edge in zip(placed.routes, edges, strict=True)
@@ -174,7 +177,7 @@ def test_every_arrow_starts_at_its_source_and_ends_at_its_target(
     graph: tuple[list[tuple[float, float]], list[Edge]],
 ) -> None:
     boxes, edges = graph
-    placed = layout(boxes, edges)
+    placed = compute_layout(boxes, edges)
     for edge, route in zip(edges, placed.routes, strict=True):
         for node, (px, py) in (
             (edge.source, route.pieces[0][0]),
@@ -212,7 +215,7 @@ transition_table:
 
 
 def test_transitions_of_tables_are_drawn_and_modes_that_are_none() -> None:
-    drawn = diagram_of(document_of(Source("chart.yaml"), CHART))
+    drawn = diagram_of(parse_document(Source("chart.yaml"), CHART))
     lines = [line.strip() for line in drawn.mermaid().splitlines()]
     for line in (
         "run --> idle : u > 5<br/>for 30 ms",

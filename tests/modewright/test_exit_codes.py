@@ -14,7 +14,7 @@ import pytest
 
 from modewright import explaining
 from modewright.cli import app
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 TRACE = ROOT / "tests" / "data" / "paper" / "est_paper_tip_out_1kHz.csv.gz"
@@ -27,7 +27,7 @@ def _in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(list(arguments), standalone_mode=False))
+    return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
 def test_a_check_without_problems_is_0() -> None:
@@ -143,7 +143,7 @@ def test_a_defect_of_ours_is_4_with_a_report(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("seven")
 
-    monkeypatch.setattr(explaining, "explained", broken)
+    monkeypatch.setattr(explaining, "explain_spec", broken)
     assert run("explain", "estimator") == 4
     first, second = capsys.readouterr().err.splitlines()
     assert first == "error: a defect of modewright: ZeroDivisionError: seven"

@@ -12,7 +12,7 @@ from language.load import load_automaton, program_of
 from language.printing import digest
 from language.project import Project
 from modewright.cli import app
-from modewright.explaining import compared, compared_json, explained, explained_json
+from modewright.explaining import compare_specs, explain_spec, spec_differences_json, spec_json
 from tests.language.making import ROOT, SHIPPED, project_of
 
 CALM = """language: 1
@@ -32,12 +32,12 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Project:
 
 
 def values(spec: str) -> dict[str, dict[str, Any]]:
-    return {row["path"]: row for row in explained_json(spec)["values"]}
+    return {row["path"]: row for row in spec_json(spec)["values"]}
 
 
 @pytest.mark.parametrize("name", ["driveline", "estimator", "estimator_simple", "driveline_load"])
 def test_what_is_printed_can_be_read_again(name: str, tmp_path: Path) -> None:
-    printed = explained(name, "document", {}, ROOT)
+    printed = explain_spec(name, "document", {}, ROOT)
     (tmp_path / "spec").mkdir()
     (tmp_path / "spec" / "again.yaml").write_text(printed, "utf-8")
     again = program_of(load_automaton(name, Project(tmp_path)))
@@ -72,35 +72,35 @@ def test_a_rewritten_value_says_by_what(project: Project) -> None:
 
 
 def test_the_difference_of_two_is_by_key_path(project: Project) -> None:
-    found = {d["path"]: d for d in compared_json("calm", "wild")["differences"]}
+    found = {d["path"]: d for d in spec_differences_json("calm", "wild")["differences"]}
     assert set(found) == {"automaton", "parameters.J_em.value"}
     assert found["parameters.J_em.value"]["old"]["value"] == "0.06 kg*m^2"
-    text = compared("calm", "wild", "document", {})
+    text = compare_specs("calm", "wild", "document", {})
     assert "- parameters.J_em.value: 0.06 kg*m^2" in text
     assert "# spec/wild.yaml:4 (variant wild)" in text
-    assert compared("calm", "calm", "document", {}) == ""
+    assert compare_specs("calm", "calm", "document", {}) == ""
 
 
 def test_what_one_of_two_has_is_told(project: Project) -> None:
-    found = {d["path"]: d for d in compared_json("driveline", "calm")["differences"]}
+    found = {d["path"]: d for d in spec_differences_json("driveline", "calm")["differences"]}
     assert found["terms.w_w.tyre_vehicle"]["old"] is None
     assert found["terms.w_w.tyre_vehicle"]["new"]["value"] == "-T_t_vehicle"
 
 
 def test_the_later_passes_are_printed_and_compared(project: Project) -> None:
-    model = explained("calm", "model", {})
+    model = explain_spec("calm", "model", {})
     assert "initial: w_w" in model
     assert "value: 50000" in model
-    assert explained("calm", "program", {}).startswith("program calm\n")
-    text = compared("calm", "wild", "model", {})
+    assert explain_spec("calm", "program", {}).startswith("program calm\n")
+    text = compare_specs("calm", "wild", "model", {})
     assert "-      value: 0.06" in text and "+      value: 0.07" in text
-    text = compared("calm", "wild", "program", {})
+    text = compare_specs("calm", "wild", "program", {})
     assert "+calibration.J_em = 0.07" in text
 
 
 def test_a_system_a_scenario_and_a_map_are_explained() -> None:
     for name in ("ev_driveline", "tip_out", "reference_trace"):
-        assert "(" in explained(name, "document", {}, ROOT)
+        assert "(" in explain_spec(name, "document", {}, ROOT)
 
 
 def test_the_command_prints_one_or_two(
@@ -118,7 +118,7 @@ def test_the_command_prints_one_or_two(
 
 def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
     """K of a run, |A h|, its work; Phi, Gamma and L of an observer, as they stand in the C."""
-    text = explained("estimator", "numbers", {}, ROOT)
+    text = explain_spec("estimator", "numbers", {}, ROOT)
     assert "method exponential, step 0.001 s, K = " in text
     assert "mode no_contact: |A h| = 2.9" in text
     assert "work: at most 4 events per substep, " in text
@@ -131,10 +131,10 @@ def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
 
 def test_what_a_rewind_does_at_most_is_printed() -> None:
     """3 ticks back: one look at each and now, one at the end of a step, 24 halvings."""
-    text = explained("hko", "numbers", {}, ROOT)
+    text = explain_spec("hko", "numbers", {}, ROOT)
     assert "rewind drive -> gap: at most 29 looks at `until` and 3 runs" in text
     assert "longest tick: at most 31570 operations" in text
-    assert "transition 1 gap: 1 -> 0 rewind 3 ticks" in explained("hko", "program", {}, ROOT)
+    assert "transition 1 gap: 1 -> 0 rewind 3 ticks" in explain_spec("hko", "program", {}, ROOT)
 
 
 def test_the_largest_stable_step_is_printed_where_it_holds(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from modewright.files import OutputError, require_calibration, require_writable, write_files
+from modewright.files import OutputError, require_calibration_output, require_writable, write_files
 
 KILLED = """
 import os, signal, sys
@@ -87,9 +87,9 @@ def test_an_output_replaces_no_spec(tmp_path: Path) -> None:
         with pytest.raises(OutputError, match="this is a spec"):
             require_writable(path)
     with pytest.raises(OutputError, match="this is no calibration"):
-        require_calibration(spec)
-    require_calibration(fitted)
-    require_calibration(tmp_path / "new.yaml")
+        require_calibration_output(spec)
+    require_calibration_output(fitted)
+    require_calibration_output(tmp_path / "new.yaml")
 
 
 def test_a_socket_is_no_place_for_an_output(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from modewright.garbage import YOUNG_OBJECTS, rarely_looked
+from modewright.garbage import GENERATION_0_THRESHOLD, infrequent_gc
 
 
 @pytest.fixture(autouse=True)
@@ -19,17 +19,21 @@ def _as_before() -> Iterator[None]:
 
 @pytest.mark.parametrize(
     ("before", "within"),
-    [(700, YOUNG_OBJECTS), (2 * YOUNG_OBJECTS, 2 * YOUNG_OBJECTS), (0, 0)],
+    [
+        (700, GENERATION_0_THRESHOLD),
+        (2 * GENERATION_0_THRESHOLD, 2 * GENERATION_0_THRESHOLD),
+        (0, 0),
+    ],
 )
 def test_it_is_looked_for_as_rarely_as_can_be(before: int, within: int) -> None:
     gc.set_threshold(before, 11, 12)
-    with rarely_looked():
+    with infrequent_gc():
         assert gc.get_threshold() == (within, 11, 12)
     assert gc.get_threshold() == (before, 11, 12)
 
 
 def test_an_error_leaves_it_as_it_was() -> None:
     gc.set_threshold(700, 10, 10)
-    with pytest.raises(ValueError, match="this"), rarely_looked():
+    with pytest.raises(ValueError, match="this"), infrequent_gc():
         raise ValueError("this")
     assert gc.get_threshold() == (700, 10, 10)

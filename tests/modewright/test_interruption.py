@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from modewright import interruption
-from modewright.interruption import interrupted_once
+from modewright.interruption import debounce_interrupts
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -29,7 +29,7 @@ def press() -> None:
 
 def test_six_interruptions_are_one() -> None:
     ended = []
-    with interrupted_once(), pytest.raises(KeyboardInterrupt):
+    with debounce_interrupts(), pytest.raises(KeyboardInterrupt):
         try:
             press()
         finally:
@@ -41,8 +41,8 @@ def test_six_interruptions_are_one() -> None:
 
 
 def test_a_work_that_does_not_end_is_interrupted_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interruption, "PATIENCE", 0.0)
-    with interrupted_once():
+    monkeypatch.setattr(interruption, "GRACE_PERIOD", 0.0)
+    with debounce_interrupts():
         for _ in range(2):
             with pytest.raises(KeyboardInterrupt):
                 press()
@@ -51,7 +51,7 @@ def test_a_work_that_does_not_end_is_interrupted_again(monkeypatch: pytest.Monke
 def test_who_ignores_ctrl_c_or_takes_it_otherwise_is_left_alone() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with interrupted_once():
+        with debounce_interrupts():
             assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)

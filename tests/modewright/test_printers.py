@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.comment import LONGEST
-from language.text import UNSEEN
+from codegen.comment import MAX_COMMENT_LENGTH
+from language.text import INVISIBLE_CATEGORIES
 from tests.modewright.printers import HOSTILE, PRINTERS
 
 TEXTS = [pytest.param(text, id=name) for name, text in HOSTILE.items()]
@@ -23,7 +23,7 @@ TEXTS = [pytest.param(text, id=name) for name, text in HOSTILE.items()]
 @pytest.mark.parametrize("text", TEXTS)
 def test_nothing_unseen_is_printed(printer: str, text: str) -> None:
     printed = PRINTERS[printer](text)
-    unseen = {c for c in printed if unicodedata.category(c) in UNSEEN}
+    unseen = {c for c in printed if unicodedata.category(c) in INVISIBLE_CATEGORIES}
     assert unseen <= {"\n", "\t"}
     assert printed.encode("utf-8")
 
@@ -35,7 +35,7 @@ def test_a_comment_of_c_is_one_short_line_that_ends_where_it_ends(text: str) -> 
     assert printed.isascii() and "\n" not in printed
     assert not {"*/", "/*", "//", "??"} & {a + b for a, b in itertools.pairwise(inside)}
     assert not inside.endswith("\\")
-    assert len(inside) <= 2 * LONGEST
+    assert len(inside) <= 2 * MAX_COMMENT_LENGTH
 
 
 @pytest.mark.parametrize("text", TEXTS)

@@ -12,7 +12,7 @@ import pytest
 
 from modewright.cli import app
 from modewright.console import console
-from modewright.exits import exit_code
+from modewright.exits import run_with_exit_code
 from tests.diagnosis.driving import MAP, SPEC, Values, tip_in
 
 
@@ -44,7 +44,9 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(*arguments: str) -> int:
-    return exit_code(partial(app, ["recording", "check", *arguments], standalone_mode=False))
+    return run_with_exit_code(
+        partial(app, ["recording", "check", *arguments], standalone_mode=False)
+    )
 
 
 def test_a_good_recording_with_the_map_of_the_spec(

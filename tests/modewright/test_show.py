@@ -7,7 +7,7 @@ from typing import Literal
 from rich.console import Console
 
 from engine.trajectory import Event
-from modewright.show import MOST_EVENTS, events_table
+from modewright.show import MAX_EVENTS, events_table
 
 Kind = Literal["transition", "range"]
 HEADS = ["time [s]", "automaton", "transition", "from", "to"]
@@ -36,19 +36,19 @@ def test_what_is_no_transition_is_told_with_its_message() -> None:
 
 
 def test_a_long_table_has_its_first_and_its_last_events_and_says_what_is_between() -> None:
-    lines = printed([event(float(i)) for i in range(MOST_EVENTS + 2)])
-    half = MOST_EVENTS // 2
+    lines = printed([event(float(i)) for i in range(MAX_EVENTS + 2)])
+    half = MAX_EVENTS // 2
     assert lines[half + 1].split() == ["...", "2", "more"]
     del lines[half + 1]
     shown = [float(line.split()[0]) for line in lines[1:]]
-    assert shown == [*range(half), *range(half + 2, MOST_EVENTS + 2)]
-    assert len(printed([event(float(i)) for i in range(MOST_EVENTS)])) == MOST_EVENTS + 1
+    assert shown == [*range(half), *range(half + 2, MAX_EVENTS + 2)]
+    assert len(printed([event(float(i)) for i in range(MAX_EVENTS)])) == MAX_EVENTS + 1
 
 
 def test_what_is_no_transition_is_shown_in_the_middle_of_a_long_table() -> None:
-    events = [event(float(i)) for i in range(MOST_EVENTS + 5)]
-    events[MOST_EVENTS // 2 + 1] = event(MOST_EVENTS // 2 + 1.0, "range")
-    rows = [line.split()[:3] for line in printed(events)[MOST_EVENTS // 2 + 1 :][:4]]
+    events = [event(float(i)) for i in range(MAX_EVENTS + 5)]
+    events[MAX_EVENTS // 2 + 1] = event(MAX_EVENTS // 2 + 1.0, "range")
+    rows = [line.split()[:3] for line in printed(events)[MAX_EVENTS // 2 + 1 :][:4]]
     assert rows == [
         ["...", "1", "more"],
         ["21.000000000", "keeper", "trip"],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from modewright.spread import spread
+from modewright.spread import expand_arguments
 
 
 @pytest.mark.parametrize(
@@ -23,4 +23,4 @@ from modewright.spread import spread
     ],
 )
 def test_each_value_has_its_option(line: str, wanted: str) -> None:
-    assert spread(line.split()) == wanted.split()
+    assert expand_arguments(line.split()) == wanted.split()

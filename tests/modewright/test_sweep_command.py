@@ -12,23 +12,23 @@ import pytest
 from engine.batch import Batch, BatchResult
 from modewright import studies
 from modewright.cli import app
-from modewright.console import counting
-from modewright.exits import exit_code
+from modewright.console import progress_bar
+from modewright.exits import run_with_exit_code
 from sweep import store as store_module
 from sweep.cluster_error import ClusterError
 from sweep.store import read_store
-from tests.sweep.laying import STUDIES, quick
+from tests.sweep.laying import STUDIES, quick_results
 
 
 @pytest.fixture(autouse=True)
 def _quick_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(STUDIES)
-    monkeypatch.setattr(studies, "run_block", quick)
+    monkeypatch.setattr(studies, "run_block", quick_results)
 
 
 def run(*arguments: str) -> int:
     one = [] if "--summary" in arguments else ["-j", "1"]
-    return exit_code(lambda: app(["sweep", *arguments, *one], standalone_mode=False))
+    return run_with_exit_code(lambda: app(["sweep", *arguments, *one], standalone_mode=False))
 
 
 def test_a_study_is_run_summed_up_and_drawn(
@@ -58,7 +58,7 @@ def test_what_was_interrupted_is_kept_and_gone_on_with(
         batches.append(batch)
         if len(batches) == 6:
             raise KeyboardInterrupt
-        return quick(batch)
+        return quick_results(batch)
 
     monkeypatch.setattr(studies, "run_block", interrupted)
     assert run("grid", "--out", out, "--block", "4") == 130
@@ -72,7 +72,7 @@ def test_a_full_disk_says_what_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The write itself fails in tests/sweep/test_study_run.py; here what the user is told."""
-    write = store_module.write_whole
+    write = store_module.write_atomically
 
     def filling(path: Path, data: bytes) -> None:
         if path.name.startswith("0000000012"):
@@ -80,7 +80,7 @@ def test_a_full_disk_says_what_is_kept(
         write(path, data)
 
     out = str(tmp_path / "out")
-    monkeypatch.setattr(store_module, "write_whole", filling)
+    monkeypatch.setattr(store_module, "write_atomically", filling)
     assert run("grid", "--out", out, "--block", "4") == 1
     told = capsys.readouterr().err
     assert "No space left on device; 12 of 60 variants are kept" in told
@@ -191,13 +191,13 @@ def test_samples_and_seed_of_the_command_line_replace_those_of_the_study(
 def test_progress_has_a_rate_on_a_terminal_and_nothing_elsewhere(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with counting("sweep", "variants") as tell:
+    with progress_bar("sweep", "variants") as tell:
         tell(3, 0, 10)
     assert capsys.readouterr().err == ""
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "120")
-    with counting("sweep", "variants") as tell:
+    with progress_bar("sweep", "variants") as tell:
         tell(2, 2, 10)
         tell(5, 2, 10)
     shown = capsys.readouterr().err
@@ -221,7 +221,7 @@ def test_a_cluster_that_cannot_be_is_told_and_nothing_is_stored(
 ) -> None:  # fmt: skip
     out = tmp_path / "out"
     given = ["sweep", "alone", "--out", str(out), *arguments]
-    assert exit_code(lambda: app(given, standalone_mode=False)) == code
+    assert run_with_exit_code(lambda: app(given, standalone_mode=False)) == code
     assert told in " ".join(capsys.readouterr().err.replace("│", " ").split())
     assert not out.exists()
 
@@ -232,10 +232,10 @@ def test_a_connection_that_others_can_read_is_warned_of(
     def refuse(*arguments: object) -> None:
         raise ClusterError("nobody answers")
 
-    monkeypatch.setattr(studies, "_on_cluster", refuse)
+    monkeypatch.setattr(studies, "_cluster_executor", refuse)
     for cluster, is_open in (("tcp://head:8786", True), ("tcp://127.0.0.1:8786", False)):
         given = ["sweep", "alone", "--out", str(tmp_path / "out"), "--cluster", cluster]
-        assert exit_code(lambda: app(given, standalone_mode=False)) == 1  # noqa: B023
+        assert run_with_exit_code(lambda: app(given, standalone_mode=False)) == 1  # noqa: B023
         told = capsys.readouterr().err
         assert ("is not encrypted" in told) == is_open
         assert "error: nobody answers" in told

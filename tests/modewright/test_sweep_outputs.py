@@ -11,22 +11,22 @@ import pytest
 from modewright import studies
 from modewright.cli import app
 from modewright.commands.sweep import PLOTS
-from modewright.exits import exit_code
-from modewright.files import RESULTS, RUN, OutputError
-from sweep.manifest import MANIFEST, seal_of
-from sweep.store import BLOCKS, LOCK
-from tests.sweep.laying import STUDIES, quick
+from modewright.exits import run_with_exit_code
+from modewright.files import RESULT_NAMES, STUDY_FOLDER_NAMES, OutputError
+from sweep.manifest import MANIFEST_NAME, seal_of
+from sweep.store import BLOCKS_FOLDER, LOCK_NAME
+from tests.sweep.laying import STUDIES, quick_results
 
 
 @pytest.fixture(autouse=True)
 def _quick_in_a_copy_of_the_project(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     shutil.copytree(STUDIES / "spec", tmp_path / "spec")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(studies, "run_block", quick)
+    monkeypatch.setattr(studies, "run_block", quick_results)
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(["sweep", *arguments], standalone_mode=False))
+    return run_with_exit_code(lambda: app(["sweep", *arguments], standalone_mode=False))
 
 
 def ran(*arguments: str) -> int:
@@ -58,7 +58,7 @@ def test_outputs_replace_neither_specs_nor_results_nor_each_other(
         assert everything() == before
     assert ran("--summary", "o", "--csv", "o/plots/matters.svg") == 1
     assert ran("alone", "--out", "p", "--csv", "p/study.json") == 1
-    assert exit_code(lambda: app(["sensitivity", "o", "--csv", "o/study.json"])) == 1
+    assert run_with_exit_code(lambda: app(["sensitivity", "o", "--csv", "o/study.json"])) == 1
     assert "a part of the results" in capsys.readouterr().err
     assert everything() == before
 
@@ -131,7 +131,7 @@ def test_pictures_that_cannot_be_written_are_told_beside_the_summary(
 
 def test_names_of_a_store_reach_the_terminal_harmless(capsys: pytest.CaptureFixture[str]) -> None:
     assert ran("alone", "--out", "o") == 0
-    path = Path("o") / MANIFEST
+    path = Path("o") / MANIFEST_NAME
     data = json.loads(path.read_text())
     data["study"] = "\x1b[2Jevil"
     data["seal"] = seal_of(data)
@@ -143,5 +143,5 @@ def test_names_of_a_store_reach_the_terminal_harmless(capsys: pytest.CaptureFixt
 
 
 def test_what_results_are_called_here_is_what_a_store_calls_them() -> None:
-    assert RESULTS == (MANIFEST, BLOCKS)
-    assert {PLOTS, LOCK} == set(RUN) - set(RESULTS)
+    assert RESULT_NAMES == (MANIFEST_NAME, BLOCKS_FOLDER)
+    assert {PLOTS, LOCK_NAME} == set(STUDY_FOLDER_NAMES) - set(RESULT_NAMES)

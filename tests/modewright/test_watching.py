@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from modewright.commands import check as command
-from modewright.watching import changes, folders_of
+from modewright.watching import spec_folders, watch_changes
 
 GOOD = """language: 1
 automaton: slide
@@ -44,15 +44,15 @@ def test_each_change_is_seen_once(tmp_path: Path) -> None:
     )
     seen = []
     with pytest.raises(KeyboardInterrupt):
-        for changed in changes([tmp_path], edits):
+        for changed in watch_changes([tmp_path], edits):
             seen.append(changed)
     assert seen == [[first], [second], [first]]
 
 
 def test_the_projects_specs_and_the_folders_of_named_files_are_watched() -> None:
-    assert folders_of([]) == [Path("spec")]
-    assert folders_of(["plant", "spec/a/b.yaml"]) == [Path("spec")]
-    assert folders_of(["spec/b.yaml", "../c/d.yaml", "e.yaml"]) == [
+    assert spec_folders([]) == [Path("spec")]
+    assert spec_folders(["plant", "spec/a/b.yaml"]) == [Path("spec")]
+    assert spec_folders(["spec/b.yaml", "../c/d.yaml", "e.yaml"]) == [
         Path("spec"),
         Path(),
         Path("../c"),
@@ -68,7 +68,7 @@ def test_a_watched_check_tells_what_an_edit_breaks_and_mends(
     monkeypatch.chdir(tmp_path)
     broken = GOOD.replace("1 m/s", "1 m")
     edits = Edits(lambda: spec.write_text(broken), lambda: spec.write_text(GOOD))
-    monkeypatch.setattr("modewright.watching.pause", edits)
+    monkeypatch.setattr("modewright.watching.wait_for_poll", edits)
     with pytest.raises(KeyboardInterrupt):
         command.check([], every=True, watch=True)
     told = capsys.readouterr()

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.open_generator.case import RATES, courses, drawn
-from tests.open_generator.label import FORMAT, label
-from tests.open_generator.library import LIBRARY, wanted
+from tests.open_generator.case import RATES, draw_case, simulate_cases
+from tests.open_generator.label import FORMAT, case_label
+from tests.open_generator.library import LIBRARY, parse_effects
 from tests.open_generator.recording import write_case
 
 SIDE_BY_SIDE = 12
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code."""
     given = _parser().parse_args(arguments)
     try:
-        cases = wanted(given.effects, given.count)
+        cases = parse_effects(given.effects, given.count)
     except ValueError as error:
         return _refused(str(error))
     if min(given.seed, given.strength) < 0 or min(given.count, given.jobs) < 1:
@@ -66,10 +66,10 @@ def write_batch(
     out: Path, seed: int, numbered: NUMBERS, strength: float, rate: int | None
 ) -> dict[str, Any]:
     """Simulate and write some cases; return their labels by folder name."""
-    cases = [drawn(seed, number, effects, strength, rate) for number, effects in numbered]
-    for case, recordings in zip(cases, courses(cases), strict=True):
+    cases = [draw_case(seed, number, effects, strength, rate) for number, effects in numbered]
+    for case, recordings in zip(cases, simulate_cases(cases), strict=True):
         write_case(out / f"case_{case.number:03d}", case, recordings)
-    return {f"case_{case.number:03d}": label(case, strength) for case in cases}
+    return {f"case_{case.number:03d}": case_label(case, strength) for case in cases}
 
 
 def _parser() -> argparse.ArgumentParser:

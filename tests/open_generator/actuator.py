@@ -13,15 +13,15 @@ from tests.open_generator.effect import (
     Floats,
     Parameters,
     Signals,
-    either_sign,
+    draw_sign,
     with_torque,
 )
-from tests.open_generator.motion import ANGLE_EM, W_EM, Middle, Part, Parts
+from tests.open_generator.motion import ANGLE_EM, W_EM, Part, Parts, StepMidpoint
 
 PLACE = "inputs.T_em"
 
 
-def lagged(values: Floats, tau: float, step: float) -> Floats:
+def apply_lag(values: Floats, tau: float, step: float) -> Floats:
     """Return values after a first-order lag [s] (bilinear), settled at the first row."""
     if tau == 0.0:
         return values
@@ -31,7 +31,7 @@ def lagged(values: Floats, tau: float, step: float) -> Floats:
     return np.asarray(filtered)
 
 
-def delayed(values: Floats, delay: float, step: float) -> Floats:
+def apply_delay(values: Floats, delay: float, step: float) -> Floats:
     """Return values as they were `delay` [s] ago, linear in between, held before the start."""
     count = values.shape[0]
     index = np.clip(np.arange(count) - delay / step, 0.0, count - 1.0)
@@ -42,12 +42,12 @@ def delayed(values: Floats, delay: float, step: float) -> Floats:
 
 def _lag(signals: Signals, p: Parameters, generator: np.random.Generator) -> Signals:
     """Current control as a first-order lag (Leonhard 2001, Control of Electrical Drives)."""
-    return with_torque(signals, lagged(signals.torque, p["tau_s"], signals.step))
+    return with_torque(signals, apply_lag(signals.torque, p["tau_s"], signals.step))
 
 
 def _delay(signals: Signals, p: Parameters, generator: np.random.Generator) -> Signals:
     """Dead time of bus and inverter."""
-    return with_torque(signals, delayed(signals.torque, p["delay_s"], signals.step))
+    return with_torque(signals, apply_delay(signals.torque, p["delay_s"], signals.step))
 
 
 def _rate_limit(signals: Signals, p: Parameters, generator: np.random.Generator) -> Signals:
@@ -77,7 +77,7 @@ def _derating(p: Parameters, driveline: Driveline) -> Parts:
     """Constant power above the corner speed (field weakening): abs(T*w) <= P."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def actuator(middle: Middle) -> None:
+        def actuator(middle: StepMidpoint) -> None:
             most = p["power_W"] / np.maximum(np.abs(middle.state[W_EM, columns]), 1.0)
             torque = middle.torque[columns]
             np.clip(torque, -most, most, out=torque)
@@ -91,7 +91,7 @@ def _ripple(p: Parameters, driveline: Driveline) -> Parts:
     """Torque over the rotor angle (Jahns, Soong 1996, IEEE Trans. Ind. Electron. 43, 321-330)."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def actuator(middle: Middle) -> None:
+        def actuator(middle: StepMidpoint) -> None:
             angle = p["order"] * middle.state[ANGLE_EM, columns] + p["phase_rad"]
             middle.torque[columns] += p["amplitude_Nm"] * np.sin(angle)
 
@@ -131,13 +131,13 @@ ACTUATOR = (
     Effect(
         "torque_gain",
         PLACE,
-        lambda g, s: {"gain": 1.0 + s * either_sign(g) * g.uniform(0.15, 0.30)},
+        lambda g, s: {"gain": 1.0 + s * draw_sign(g) * g.uniform(0.15, 0.30)},
         signals=_gain,
     ),
     Effect(
         "torque_offset",
         PLACE,
-        lambda g, s: {"offset_Nm": s * either_sign(g) * g.uniform(4.0, 10.0)},
+        lambda g, s: {"offset_Nm": s * draw_sign(g) * g.uniform(4.0, 10.0)},
         signals=_offset,
     ),
     Effect(

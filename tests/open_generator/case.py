@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.open_generator.driveline import NOMINAL, Driveline, columns_of, perturbed
-from tests.open_generator.effect import Floats, Parameters, Signals, Speeds, seen
+from tests.open_generator.driveline import NOMINAL, Driveline, columns_of, perturb_driveline
+from tests.open_generator.effect import Floats, Parameters, Signals, Speeds, sensor_speeds
 from tests.open_generator.library import LIBRARY
 from tests.open_generator.manoeuvre import HELD_OUT, SETTLING, TRAIN, Manoeuvre, manoeuvres
-from tests.open_generator.motion import STEP, Demand, Parts, moved
-from tests.open_generator.sensor import filtered
+from tests.open_generator.motion import STEP, Demand, Parts, integrate_motion
+from tests.open_generator.sensor import apply_sensor_filter
 
 RATES = (100, 200, 500, 1000)
 """Sampling rates [Hz]; every period is a multiple of the inner step."""
@@ -24,7 +24,7 @@ STREAMS = ("manoeuvres", "base", "effects", "course", "sensors", "noise")
 
 
 @dataclass(frozen=True)
-class Chosen:
+class DrawnEffect:
     """An effect of the library with its drawn parameters."""
 
     name: str
@@ -49,7 +49,7 @@ class Case:
     number: int
     rate: int
     driveline: Driveline
-    effects: tuple[Chosen, ...]
+    effects: tuple[DrawnEffect, ...]
     manoeuvres: tuple[Manoeuvre, ...]
     train: int
     sensors: Sensors
@@ -61,7 +61,7 @@ def stream(seed: int, number: int, name: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
 
 
-def drawn(
+def draw_case(
     seed: int, number: int, effects: Sequence[str], strength: float = 1.0, rate: int | None = None
 ) -> Case:
     """Draw a case; at strength 0 it has no effect. The rate [Hz] is drawn where none is given."""
@@ -71,7 +71,7 @@ def drawn(
     some_rate = int(sensors.choice(RATES))
     effect = stream(seed, number, "effects")
     chosen = tuple(
-        Chosen(name, LIBRARY[name].draw(effect, strength))
+        DrawnEffect(name, LIBRARY[name].draw(effect, strength))
         for name in LIBRARY
         if name in effects and strength > 0.0
     )
@@ -79,7 +79,7 @@ def drawn(
         seed,
         number,
         rate or some_rate,
-        perturbed(NOMINAL, stream(seed, number, "base")),
+        perturb_driveline(NOMINAL, stream(seed, number, "base")),
         chosen,
         tuple(plans),
         len(TRAIN),
@@ -98,7 +98,7 @@ def _sensors(generator: np.random.Generator) -> Sensors:
 
 
 @dataclass(frozen=True)
-class Course:
+class SimulatedRecording:
     """One recording on the inner steps from t = 0: torques [N*m], speeds [rad/s], (n_steps + 1,).
 
     The torques are those asked for, the wheel speed is that after the sensor's filter.
@@ -110,9 +110,9 @@ class Course:
     w_w: Floats
 
 
-def courses(
+def simulate_cases(
     cases: Sequence[Case], step: float = STEP, settling_time: float = SETTLING
-) -> list[list[Course]]:
+) -> list[list[SimulatedRecording]]:
     """Simulate the cases side by side; the number of cases at a time changes no value."""
     longest = max(m.duration for case in cases for m in case.manoeuvres)
     settling = round(settling_time / step)
@@ -137,9 +137,9 @@ def courses(
         np.array([m.wheel_speed for case in cases for m in case.manoeuvres]),
         np.concatenate([_angles(case) for case in cases]),
     )
-    motion = moved(columns_of(drivelines), demand, start, parts, step)
+    motion = integrate_motion(columns_of(drivelines), demand, start, parts, step)
     return [
-        _cut(case, seen(motion, own, step), settling)
+        _cut(case, sensor_speeds(motion, own, step), settling)
         for case, own in zip(cases, columns, strict=True)
     ]
 
@@ -170,18 +170,18 @@ def _changed(case: Case) -> Driveline:
     return driveline
 
 
-def _cut(case: Case, speeds: Speeds, settling: int) -> list[Course]:
+def _cut(case: Case, speeds: Speeds, settling: int) -> list[SimulatedRecording]:
     """Apply the sensors and cut each recording to its length."""
     for chosen in case.effects:
         speeds = LIBRARY[chosen.name].speeds(speeds, chosen.parameters)
-    speeds = filtered(speeds, case.driveline.tau_f)
-    cut: list[Course] = []
+    speeds = apply_sensor_filter(speeds, case.driveline.tau_f)
+    cut: list[SimulatedRecording] = []
     for column, manoeuvre in enumerate(case.manoeuvres):
         count = round(manoeuvre.duration / speeds.step) + 1
         rows = slice(settling, settling + count)
         time = np.asarray(np.arange(count) * speeds.step, dtype=np.float64)
         cut.append(
-            Course(
+            SimulatedRecording(
                 manoeuvre.torques(time),
                 manoeuvre.brakes(time),
                 speeds.w_em[rows, column].copy(),

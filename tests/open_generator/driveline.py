@@ -46,7 +46,7 @@ class Driveline:
 NOMINAL = Driveline()
 
 
-def perturbed(driveline: Driveline, generator: np.random.Generator) -> Driveline:
+def perturb_driveline(driveline: Driveline, generator: np.random.Generator) -> Driveline:
     """Return the driveline with each uncertain value 5 to 20 % too large or too small.
 
     How sharply forces change their sign at standstill is drawn as well: no data sheet tells it.

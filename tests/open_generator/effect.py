@@ -78,7 +78,7 @@ class Effect:
     speeds: Callable[[Speeds, Parameters], Speeds] = same_speeds
 
 
-def seen(motion: Motion, columns: slice, step: float) -> Speeds:
+def sensor_speeds(motion: Motion, columns: slice, step: float) -> Speeds:
     """Return the speeds of some columns of the motion."""
     rows = (motion.w_em[:, columns], motion.w_w[:, columns], motion.angle_w[:, columns])
     return Speeds(*rows, step)
@@ -89,6 +89,6 @@ def with_torque(signals: Signals, torque: Floats) -> Signals:
     return replace(signals, torque=torque)
 
 
-def either_sign(generator: np.random.Generator) -> float:
+def draw_sign(generator: np.random.Generator) -> float:
     """Return 1 or -1."""
     return float(generator.choice((-1.0, 1.0)))

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.open_generator.driveline import Driveline
-from tests.open_generator.effect import Effect, Parameters, Signals, either_sign
-from tests.open_generator.motion import W_EM, Middle, Part, Parts
+from tests.open_generator.effect import Effect, Parameters, Signals, draw_sign
+from tests.open_generator.motion import W_EM, Part, Parts, StepMidpoint
 
 CREEPING = 1.5
 """Motor speed over which friction changes its sign [rad/s]."""
@@ -24,7 +24,7 @@ def _coulomb(p: Parameters, driveline: Driveline) -> Parts:
     """
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def friction(middle: Middle) -> None:
+        def friction(middle: StepMidpoint) -> None:
             speed = middle.state[W_EM, columns]
             sense = np.tanh(speed / CREEPING)
             middle.friction[columns] += p["T_c_Nm"] * sense
@@ -41,7 +41,7 @@ def _load_loss(p: Parameters, driveline: Driveline) -> Parts:
     """Tooth friction takes a share of what the teeth transmit (Niemann, Winter 2003, vol. 2)."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def friction(middle: Middle) -> None:
+        def friction(middle: StepMidpoint) -> None:
             sense = np.tanh(middle.state[W_EM, columns] / CREEPING)
             load = np.abs(middle.reaction[columns]) / driveline.R
             middle.friction[columns] += p["share"] * load * sense
@@ -131,7 +131,7 @@ FRICTION = (
         "unknown_input",
         "flow.w_w",
         lambda g, s: {
-            "torque_Nm": s * either_sign(g) * g.uniform(200.0, 500.0),
+            "torque_Nm": s * draw_sign(g) * g.uniform(200.0, 500.0),
             "length_s": g.uniform(0.3, 0.9),
         },
         signals=_pulses,

@@ -11,7 +11,7 @@ from tests.open_generator.library import LIBRARY
 FORMAT = "open-generator-labels/1"
 
 
-def label(case: Case, strength: float) -> dict[str, Any]:
+def case_label(case: Case, strength: float) -> dict[str, Any]:
     """Return effects with places and parameters, true base values, sensors, manoeuvres."""
     effects = [
         {"id": chosen.name, "place": LIBRARY[chosen.name].place, "parameters": chosen.parameters}

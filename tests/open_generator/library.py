@@ -19,7 +19,7 @@ EXCLUSIVE = ({"added_inertia", "tyre_slip"},)
 """Each of these takes wheel and body apart in its own way."""
 
 
-def wanted(entries: str, count: int) -> list[tuple[str, ...]]:
+def parse_effects(entries: str, count: int) -> list[tuple[str, ...]]:
     """Read `a,b+c,all:3,none:30`: names of the effects of every case. Raises ValueError.
 
     An entry is an effect, two effects with a plus between, `all` (one case per effect) or `none`;

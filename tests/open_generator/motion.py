@@ -26,7 +26,7 @@ STAGES = ("actuator", "upstream", "shaft", "reaction", "friction", "memory", "ve
 
 
 @dataclass(frozen=True)
-class Middle:
+class StepMidpoint:
     """The middle of a step; rows are (n_columns,), parts write to their own columns."""
 
     state: Floats
@@ -57,7 +57,7 @@ class Middle:
     """Extra torque of the road [N*m]."""
 
 
-Part = Callable[[Middle], None]
+Part = Callable[[StepMidpoint], None]
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Motion:
     angle_w: Floats
 
 
-def moved(
+def integrate_motion(
     base: dict[str, Floats],
     demand: Demand,
     start: tuple[Floats, Floats],
@@ -134,13 +134,13 @@ def _prepared(
     return state, functions
 
 
-def _middle(base: dict[str, Floats], state: Floats, step: float) -> Middle:
+def _middle(base: dict[str, Floats], state: Floats, step: float) -> StepMidpoint:
     """Return a middle with room for everything, and zero rates."""
     rows = [np.zeros(state.shape[1]) for _ in range(10)]
-    return Middle(np.empty_like(state), np.zeros_like(state), state, base, step, *rows)
+    return StepMidpoint(np.empty_like(state), np.zeros_like(state), state, base, step, *rows)
 
 
-def _evaluate(middle: Middle, functions: dict[str, list[Part]]) -> None:
+def _evaluate(middle: StepMidpoint, functions: dict[str, list[Part]]) -> None:
     """Write the rates at the middle; effects take part at their stages."""
     base, state, rate, step = middle.base, middle.state, middle.rate, middle.step
     w_em, w_w = state[W_EM], state[W_W]
@@ -174,6 +174,6 @@ def _evaluate(middle: Middle, functions: dict[str, list[Part]]) -> None:
     _run(functions["vehicle"], middle)
 
 
-def _run(parts: list[Part], middle: Middle) -> None:
+def _run(parts: list[Part], middle: StepMidpoint) -> None:
     for part in parts:
         part(middle)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.open_generator.case import Case, Course, stream
+from tests.open_generator.case import Case, SimulatedRecording, stream
 from tests.open_generator.effect import Floats
 from tests.open_generator.motion import STEP
 
@@ -18,7 +18,9 @@ DAY = 1_700_000_000
 """Time stamp of all files [s], so that none tells in which order they were made."""
 
 
-def recorded(course: Course, case: Case, generator: np.random.Generator) -> Floats:
+def sample_recording(
+    course: SimulatedRecording, case: Case, generator: np.random.Generator
+) -> Floats:
     """Sample, add noise, quantise: time and the four columns, (n_samples, 5)."""
     stride = round(1.0 / (case.rate * STEP))
     columns = [
@@ -36,7 +38,7 @@ def recorded(course: Course, case: Case, generator: np.random.Generator) -> Floa
     return np.stack(rows, axis=1) + 0.0
 
 
-def write_case(folder: Path, case: Case, recordings: list[Course]) -> None:
+def write_case(folder: Path, case: Case, recordings: list[SimulatedRecording]) -> None:
     """Write `train/rec_00.csv ...` and `held_out/rec_00.csv ...` below the folder."""
     generator = stream(case.seed, case.number, "noise")
     for number, course in enumerate(recordings):
@@ -44,7 +46,7 @@ def write_case(folder: Path, case: Case, recordings: list[Course]) -> None:
         part = folder / ("held_out" if held_out else "train")
         part.mkdir(parents=True, exist_ok=True)
         path = part / f"rec_{number - case.train * held_out:02d}.csv"
-        table = recorded(course, case, generator)
+        table = sample_recording(course, case, generator)
         text = "\n".join(LINE % tuple(row) for row in table.tolist())
         path.write_text(f"{HEADER}\n{text}\n", encoding="ascii")
         os.utime(path, (DAY, DAY))

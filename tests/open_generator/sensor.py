@@ -6,25 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.open_generator.actuator import delayed, lagged
-from tests.open_generator.effect import Effect, Parameters, Speeds, either_sign
+from tests.open_generator.actuator import apply_delay, apply_lag
+from tests.open_generator.effect import Effect, Parameters, Speeds, draw_sign
 
 PLACE = "outputs.w_s"
 
 
-def filtered(speeds: Speeds, tau: float) -> Speeds:
+def apply_sensor_filter(speeds: Speeds, tau: float) -> Speeds:
     """Return the speeds with the wheel speed after the sensor's own filter [s]."""
-    return replace(speeds, w_w=lagged(speeds.w_w, tau, speeds.step))
+    return replace(speeds, w_w=apply_lag(speeds.w_w, tau, speeds.step))
 
 
 def _delay(speeds: Speeds, p: Parameters) -> Speeds:
     """Dead time of pulse counting and bus."""
-    return replace(speeds, w_w=delayed(speeds.w_w, p["delay_s"], speeds.step))
+    return replace(speeds, w_w=apply_delay(speeds.w_w, p["delay_s"], speeds.step))
 
 
 def _lag(speeds: Speeds, p: Parameters) -> Speeds:
     """A second filter behind the known one."""
-    return replace(speeds, w_w=lagged(speeds.w_w, p["tau_s"], speeds.step))
+    return replace(speeds, w_w=apply_lag(speeds.w_w, p["tau_s"], speeds.step))
 
 
 def _scale(speeds: Speeds, p: Parameters) -> Speeds:
@@ -51,7 +51,7 @@ SENSOR = (
     Effect(
         "sensor_scale",
         PLACE,
-        lambda g, s: {"scale": 1.0 + s * either_sign(g) * g.uniform(0.02, 0.06)},
+        lambda g, s: {"scale": 1.0 + s * draw_sign(g) * g.uniform(0.02, 0.06)},
         speeds=_scale,
     ),
     Effect("sensor_lag", PLACE, lambda g, s: {"tau_s": s * g.uniform(0.02, 0.05)}, speeds=_lag),
@@ -61,7 +61,7 @@ SENSOR = (
     Effect(
         "sensor_offset",
         PLACE,
-        lambda g, s: {"offset_radps": s * either_sign(g) * g.uniform(0.2, 0.6)},
+        lambda g, s: {"offset_radps": s * draw_sign(g) * g.uniform(0.2, 0.6)},
         speeds=_offset,
     ),
 )

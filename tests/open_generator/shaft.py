@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.open_generator.driveline import Driveline
-from tests.open_generator.effect import Effect, Floats, Parameters, either_sign
-from tests.open_generator.motion import ANGLE_W, GAP, TWIST, W_EM, W_W, Middle, Part, Parts
+from tests.open_generator.effect import Effect, Floats, Parameters, draw_sign
+from tests.open_generator.motion import ANGLE_W, GAP, TWIST, W_EM, W_W, Part, Parts, StepMidpoint
 
 PLACE = "elements.half_shaft"
 SLIDERS = (0.4, 1.0, 2.2)
@@ -19,7 +19,7 @@ def _nonlinear(p: Parameters, driveline: Driveline) -> Parts:
     """Harder, k*x*sqrt(1 + (x/x_1)^2), or softer, k*x/sqrt(1 + abs(x)/x_1); both are monotone."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def shaft(middle: Middle) -> None:
+        def shaft(middle: StepMidpoint) -> None:
             twist = middle.state[TWIST, columns] - middle.state[GAP, columns]
             if p["hardening"]:
                 factor = np.sqrt(1.0 + np.square(twist / p["x_1_rad"]))
@@ -36,7 +36,7 @@ def _positional(p: Parameters, driveline: Driveline) -> Parts:
     """Stiffness over the wheel angle: order 2 of a Hooke joint, 3 of a tripod (Seherr-Thoss)."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def shaft(middle: Middle) -> None:
+        def shaft(middle: StepMidpoint) -> None:
             angle = p["order"] * middle.state[ANGLE_W, columns] + p["phase_rad"]
             middle.stiffness[columns] *= 1.0 + p["share"] * np.sin(angle)
 
@@ -53,10 +53,10 @@ def _hysteresis(p: Parameters, driveline: Driveline) -> Parts:
     def bind(columns: slice, row: int) -> dict[str, Part]:
         rows = slice(row, row + len(SLIDERS))
 
-        def shaft(middle: Middle) -> None:
+        def shaft(middle: StepMidpoint) -> None:
             middle.remembered[columns] += middle.state[rows, columns].sum(axis=0)
 
-        def memory(middle: Middle) -> None:
+        def memory(middle: StepMidpoint) -> None:
             start, step = middle.start[rows, columns], middle.step
             speed = stiffness * middle.elastic[columns]
             middle.rate[rows, columns] = np.clip(
@@ -89,7 +89,7 @@ def _right_shaft(p: Parameters, driveline: Driveline) -> Parts:
     alpha = driveline.alpha * (1.0 + p["gap_inequality"]) / (1.0 - p["gap_inequality"])
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def reaction(middle: Middle) -> None:
+        def reaction(middle: StepMidpoint) -> None:
             step, gap = middle.step, middle.start[row, columns]
             speed = middle.upstream[columns] - middle.state[W_W, columns]
             spring = k * (middle.state[TWIST, columns] - gap)
@@ -121,17 +121,17 @@ def _second_gap(p: Parameters, driveline: Driveline) -> Parts:
         return np.asarray(np.sign(angle) * p["k_2_Nmprad"] * np.maximum(depth, 0.0) * damping)
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def upstream(middle: Middle) -> None:
+        def upstream(middle: StepMidpoint) -> None:
             middle.upstream[columns] = middle.state[row + 1, columns]
 
-        def reaction(middle: Middle) -> None:
+        def reaction(middle: StepMidpoint) -> None:
             speed = middle.state[W_EM, columns] / ratio - middle.state[row + 1, columns]
             torque = contact(middle.state[row, columns], speed)
             middle.rate[row, columns] = speed
             middle.rate[row + 1, columns] = (torque - middle.shaft[columns]) / inertia
             middle.reaction[columns] = torque
 
-        def memory(middle: Middle) -> None:
+        def memory(middle: StepMidpoint) -> None:
             middle.rate[W_EM, columns] *= driveline.J_em / rest
 
         return {"upstream": upstream, "reaction": reaction, "memory": memory}
@@ -143,10 +143,10 @@ def _mount(p: Parameters, driveline: Driveline) -> Parts:
     """The housing turns on its mounts against the shaft torque."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def upstream(middle: Middle) -> None:
+        def upstream(middle: StepMidpoint) -> None:
             middle.upstream[columns] += middle.state[row + 1, columns]
 
-        def reaction(middle: Middle) -> None:
+        def reaction(middle: StepMidpoint) -> None:
             angle, speed = middle.state[row, columns], middle.state[row + 1, columns]
             torque = p["k_m_Nmprad"] * angle + p["c_m_Nmsprad"] * speed
             middle.rate[row, columns] = speed
@@ -169,7 +169,7 @@ SHAFT = (
         "unequal_half_shafts",
         PLACE,
         lambda g, s: {
-            "inequality": s * either_sign(g) * g.uniform(0.15, 0.40),
+            "inequality": s * draw_sign(g) * g.uniform(0.15, 0.40),
             "gap_inequality": s * g.uniform(0.4, 0.8),
         },
         driveline=_left_shaft,

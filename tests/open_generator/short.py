@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.open_generator.case import Case, Course, drawn
+from tests.open_generator.case import Case, SimulatedRecording, draw_case
 from tests.open_generator.manoeuvre import Manoeuvre
 
 SECONDS = 1.2
@@ -27,13 +27,15 @@ FAST = Manoeuvre(
 SWEPT = Manoeuvre("sweep", SECONDS, 25.0, ([0.0], [40.0]), sweep=(20.0, 2.0, 14.0))
 
 
-def short(effects: Sequence[str], strength: float = 1.0, rate: int | None = None) -> Case:
+def short_case(effects: Sequence[str], strength: float = 1.0, rate: int | None = None) -> Case:
     """Return a case of seed 7 with the three short recordings, one of them held out."""
-    case = drawn(7, 0, effects, strength, rate)
+    case = draw_case(7, 0, effects, strength, rate)
     return replace(case, manoeuvres=(THROUGH_ZERO, FAST, SWEPT), train=2)
 
 
-def largest_change(courses: Sequence[Course], others: Sequence[Course]) -> float:
+def largest_change(
+    courses: Sequence[SimulatedRecording], others: Sequence[SimulatedRecording]
+) -> float:
     """Return the largest rms difference of a recorded speed over the noise of the worst sensor."""
     changes = [
         np.sqrt(np.mean(np.square(one - other))) / noise

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from tests.open_generator.__main__ import main
-from tests.open_generator.case import Case, Course, courses, drawn
-from tests.open_generator.driveline import NOMINAL, UNCERTAIN, perturbed
-from tests.open_generator.label import label
-from tests.open_generator.library import LIBRARY, wanted
+from tests.open_generator.case import Case, SimulatedRecording, draw_case, simulate_cases
+from tests.open_generator.driveline import NOMINAL, UNCERTAIN, perturb_driveline
+from tests.open_generator.label import case_label
+from tests.open_generator.library import LIBRARY, parse_effects
 from tests.open_generator.motion import STEP
 from tests.open_generator.recording import HEADER, write_case
-from tests.open_generator.short import largest_change, short
+from tests.open_generator.short import largest_change, short_case
 
 WEAK = 0.1
 NOISE_SHARE = 0.1
@@ -33,16 +33,16 @@ OWN_FLOORS = (
 )
 
 
-def ran(cases: Sequence[Case], step: float = STEP) -> list[list[Course]]:
+def ran(cases: Sequence[Case], step: float = STEP) -> list[list[SimulatedRecording]]:
     """Simulate short cases after little settling."""
-    return courses(cases, step, settling_time=0.3)
+    return simulate_cases(cases, step, settling_time=0.3)
 
 
 def test_effects_show_above_the_noise_and_fade_with_their_strength() -> None:
     """Fading is read off the moving recordings: at standstill little decides where the gap lies."""
     within = [name for name, effect in LIBRARY.items() if effect.parts is not None]
-    weak_cases = [short((name,), WEAK) for name in within]
-    base, *results = ran([short(()), *(short((name,)) for name in LIBRARY), *weak_cases])
+    weak_cases = [short_case((name,), WEAK) for name in within]
+    base, *results = ran([short_case(()), *(short_case((name,)) for name in LIBRARY), *weak_cases])
     plain = dict(zip(LIBRARY, results, strict=False))
     for name, recordings in plain.items():
         assert largest_change(recordings, base) > 1.0, name
@@ -53,19 +53,21 @@ def test_effects_show_above_the_noise_and_fade_with_their_strength() -> None:
 
 def test_at_strength_zero_nothing_is_left_of_an_effect() -> None:
     for name in LIBRARY:
-        assert short((name,), 0.0) == short(())
+        assert short_case((name,), 0.0) == short_case(())
 
 
 def test_twice_the_step_moves_no_speed_by_more_than_a_tenth_of_the_noise() -> None:
     names = ("second_gap", "stiffness_hysteresis", "tyre_slip", "mount_compliance")
-    cases = [short(()), *(short((name,)) for name in names)]
+    cases = [short_case(()), *(short_case((name,)) for name in names)]
     for case, coarse, fine in zip(cases, ran(cases, 2 * STEP), ran(cases), strict=True):
-        thinned = [Course(c.T_em[::2], c.T_br[::2], c.w_em[::2], c.w_w[::2]) for c in fine]
+        thinned = [
+            SimulatedRecording(c.T_em[::2], c.T_br[::2], c.w_em[::2], c.w_w[::2]) for c in fine
+        ]
         assert largest_change(coarse, thinned) < NOISE_SHARE, case.effects
 
 
 def test_a_case_is_the_same_alone_and_among_others() -> None:
-    case = short(("second_gap", "unknown_input", "brake_drag"))
+    case = short_case(("second_gap", "unknown_input", "brake_drag"))
     longer = replace(case, manoeuvres=(replace(case.manoeuvres[0], duration=1.4),))
     for one, other in zip(ran([case])[0], ran([longer, case])[1], strict=True):
         assert np.array_equal(one.w_em, other.w_em)
@@ -74,14 +76,16 @@ def test_a_case_is_the_same_alone_and_among_others() -> None:
 
 def test_two_effects_act_together() -> None:
     first, second = ("mount_compliance",), ("sensor_scale",)
-    neither, one, other, both = ran([short(e) for e in ((), first, second, second + first)])
+    neither, one, other, both = ran([short_case(e) for e in ((), first, second, second + first)])
     for recordings in (neither, one, other):
         assert largest_change(both, recordings) > 1.0
 
 
 def test_names_sizes_and_stamps_of_the_files_do_not_tell_the_effect(tmp_path: Path) -> None:
     shapes: list[list[tuple[str, int, float]]] = []
-    cases = [short(effects, rate=200) for effects in ((), ("torque_gain",), ("sensor_scale",), ())]
+    cases = [
+        short_case(effects, rate=200) for effects in ((), ("torque_gain",), ("sensor_scale",), ())
+    ]
     for number, recordings in enumerate(ran(cases)):
         folder = tmp_path / str(number)
         write_case(folder, cases[number], recordings)
@@ -106,18 +110,18 @@ def test_names_sizes_and_stamps_of_the_files_do_not_tell_the_effect(tmp_path: Pa
 
 def test_the_effect_changes_nothing_else_of_a_drawn_case() -> None:
     for number in range(5):
-        clean, other = drawn(3, number, ()), drawn(3, number, ("tyre_slip",))
+        clean, other = draw_case(3, number, ()), draw_case(3, number, ("tyre_slip",))
         assert (clean.driveline, clean.manoeuvres) == (other.driveline, other.manoeuvres)
         assert (clean.rate, clean.sensors) == (other.rate, other.sensors)
         lengths = [manoeuvre.duration for manoeuvre in clean.manoeuvres]
         assert sum(lengths[: clean.train]) >= 50.0
         assert sum(lengths[clean.train :]) >= 30.0
-    assert drawn(3, 0, ()) == drawn(3, 0, ())
-    assert drawn(3, 0, ()).driveline != drawn(4, 0, ()).driveline
+    assert draw_case(3, 0, ()) == draw_case(3, 0, ())
+    assert draw_case(3, 0, ()).driveline != draw_case(4, 0, ()).driveline
 
 
 def test_base_values_are_5_to_20_per_cent_off() -> None:
-    off = perturbed(NOMINAL, np.random.Generator(np.random.PCG64(0)))
+    off = perturb_driveline(NOMINAL, np.random.Generator(np.random.PCG64(0)))
     for name in UNCERTAIN:
         error = abs(getattr(off, name) / getattr(NOMINAL, name) - 1.0)
         assert 0.05 <= error <= 0.20
@@ -125,8 +129,8 @@ def test_base_values_are_5_to_20_per_cent_off() -> None:
 
 
 def test_a_label_holds_effect_place_and_parameters() -> None:
-    case = short(("sensor_delay", "actuator_lag"))
-    told = json.loads(json.dumps(label(case, 1.0)))
+    case = short_case(("sensor_delay", "actuator_lag"))
+    told = json.loads(json.dumps(case_label(case, 1.0)))
     assert [(e["id"], e["place"]) for e in told["effects"]] == [
         ("actuator_lag", "inputs.T_em"),
         ("sensor_delay", "outputs.w_s"),
@@ -136,19 +140,19 @@ def test_a_label_holds_effect_place_and_parameters() -> None:
 
 
 def test_entries_of_the_command_line_are_read() -> None:
-    assert wanted("none:2,sensor_lag+actuator_lag,tyre_slip", 1) == [
+    assert parse_effects("none:2,sensor_lag+actuator_lag,tyre_slip", 1) == [
         (),
         (),
         ("sensor_lag", "actuator_lag"),
         ("tyre_slip",),
     ]
-    assert len(wanted("all", 3)) == 3 * (len(LIBRARY) - 1)
+    assert len(parse_effects("all", 3)) == 3 * (len(LIBRARY) - 1)
 
 
 @pytest.mark.parametrize("entry", ["gremlins", "none:x", "tyre_slip+added_inertia", "none+none"])
 def test_an_unknown_entry_is_refused(entry: str) -> None:
     with pytest.raises(ValueError, match=r"none|known|together|number"):
-        wanted(entry, 1)
+        parse_effects(entry, 1)
 
 
 def test_the_command_line_refuses_what_would_give_labels_away_or_mix_cases(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.open_generator.driveline import NOMINAL, Driveline, columns_of
-from tests.open_generator.motion import STEP, Demand, Floats, Motion, moved
+from tests.open_generator.motion import STEP, Demand, Floats, Motion, integrate_motion
 
 TORQUE = 12.0
 WITHOUT_LOSSES = replace(NOMINAL, b_em=0.0, b_w=0.0, f0=0.0, cd2=0.0)
@@ -19,7 +19,7 @@ def constant(
     n_steps = round(seconds / STEP)
     ones = np.ones((n_steps, 1))
     demand = Demand(TORQUE * ones, brake * ones, 0.0 * ones)
-    motion = moved(columns_of([driveline]), demand, (np.array([speed]), np.zeros(1)), ())
+    motion = integrate_motion(columns_of([driveline]), demand, (np.array([speed]), np.zeros(1)), ())
     return np.asarray(np.arange(n_steps + 1) * STEP), motion
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.open_generator.case import Case, Chosen, Sensors
+from tests.open_generator.case import Case, DrawnEffect, Sensors
 from tests.open_generator.driveline import Driveline
 from tests.open_generator.manoeuvre import Manoeuvre
 from tests.open_generator.shaft import SLIDERS
@@ -12,7 +12,7 @@ DRIVELINE = Driveline(
     cd2=0.012,
 )  # fmt: skip
 """Values of the paper's driveline, everything at the wheel but the motor."""
-SHAFT = Chosen("stiffness_hysteresis", {"share": 0.2, "slip_Nm": 25.0 / sum(SLIDERS)})
+SHAFT = DrawnEffect("stiffness_hysteresis", {"share": 0.2, "slip_Nm": 25.0 / sum(SLIDERS)})
 """Beside the shaft, sliding: a fifth of its stiffness, 25 N*m in all."""
 SPEED = 36.0
 """Wheel speed before a tip-out [rad/s]: 40 km/h."""
@@ -42,7 +42,7 @@ def tip_out(before: float, after: float, duration: float = 3.5) -> Manoeuvre:
     return Manoeuvre("tip-out", duration, SPEED, corners)
 
 
-def tip_outs(hidden: bool = True, rate: int = 100) -> Case:
+def tip_out_case(hidden: bool = True, rate: int = 100) -> Case:
     """Return a case of four tip-outs, the last one held out; without what is `hidden`: clean."""
     steps = ((30.0, -20.0), (60.0, -30.0), (50.0, 10.0), (40.0, -25.0))
     return Case(

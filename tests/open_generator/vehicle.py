@@ -6,12 +6,14 @@ import numpy as np
 
 from tests.open_generator.driveline import Driveline
 from tests.open_generator.effect import Effect, Floats, Parameters
-from tests.open_generator.motion import W_W, Middle, Part, Parts
+from tests.open_generator.motion import W_W, Part, Parts, StepMidpoint
 
 PLACE = "elements.vehicle"
 
 
-def _split(middle: Middle, columns: slice, body: Floats, tyre: Floats, inertia: float) -> Floats:
+def _split(
+    middle: StepMidpoint, columns: slice, body: Floats, tyre: Floats, inertia: float
+) -> Floats:
     """Write the wheel's own motion; return the rate of the body's speed, at the wheel."""
     base = middle.base
     wheel = middle.state[W_W, columns]
@@ -28,7 +30,7 @@ def _added_inertia(p: Parameters, driveline: Driveline) -> Parts:
     """Wheel and rim on the torsion of the tyre's side walls (Zegelaar 1998, thesis, Delft)."""
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def vehicle(middle: Middle) -> None:
+        def vehicle(middle: StepMidpoint) -> None:
             body = middle.state[row + 1, columns]
             speed = middle.state[W_W, columns] - body
             tyre = p["k_t_Nmprad"] * middle.state[row, columns] + p["c_t_Nmsprad"] * speed
@@ -48,7 +50,7 @@ def _tyre_slip(p: Parameters, driveline: Driveline) -> Parts:
     """
 
     def bind(columns: slice, row: int) -> dict[str, Part]:
-        def vehicle(middle: Middle) -> None:
+        def vehicle(middle: StepMidpoint) -> None:
             force, body = middle.state[row, columns], middle.state[row + 1, columns]
             slip = middle.state[W_W, columns] - body
             pulled = p["C_Nm"] * slip - np.abs(body) * force

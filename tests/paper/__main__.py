@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 
 from tests.paper.claims import claims
 from tests.paper.manoeuvre import table_1
-from tests.paper.observers import better_observer, studied
-from tests.paper.page import FOLDER, SPECS, publish, told
-from tests.paper.pareto import pareto, picture
+from tests.paper.observers import better_observer, run_studies
+from tests.paper.page import FOLDER, SPECS, write_measurements_json, write_page
+from tests.paper.pareto import picture, run_pareto
 from tests.paper.pictures import draw
 from tests.verify.store import ROOT, code_digest
 
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if is_shown:
         draw(FOLDER)
     folder = ROOT / "build" / "paper" / code_digest(("language", *SPECS))[:12]
-    rows = studied(folder / f"{given.seed}_{given.samples}", given.seed, given.samples)
+    rows = run_studies(folder / f"{given.seed}_{given.samples}", given.seed, given.samples)
     for row in rows:
         print(
             f"{row.scheme} {row.rate} Hz {'matched' if row.is_matched else 'mismatch'}: first gap "
@@ -46,10 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "better_observer": better_observer(rows),
         "better_observer_mismatch": better_observer(rows, is_matched=False),
     }
-    points = pareto(folder)
-    told(given.seed, table, rows, points, figures)
+    points = run_pareto(folder)
+    write_measurements_json(given.seed, table, rows, points, figures)
     if is_shown:
-        publish(given.seed, table, found, rows, points)
+        write_page(given.seed, table, found, rows, points)
         picture(points).savefig(FOLDER / "pareto.png", dpi=110, metadata={"Software": None})
     print(f"wrote build/paper.json{' and docs/paper' if is_shown else ''}")
     return 0 if all(claim.holds for claim in found) else 1

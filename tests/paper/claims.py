@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.paper.divergence import FITTED, Divergence, divergence
-from tests.paper.manoeuvre import STEP, cycles, run, signal, table_1, until_landing
+from tests.paper.divergence import FITTED, Divergence, fit_divergence
+from tests.paper.manoeuvre import STEP, cycles, landing_lead_time, run_scenario, signal, table_1
 
 PUBLISHED = {"100": 14.0, "1000": 2.0, "10000": 0.8}
 """Table 1 [ms], by rate [Hz]."""
@@ -31,7 +31,7 @@ class Claim:
 def claims() -> list[Claim]:
     """Return all claims in the order of the paper."""
     driven = (("fig_3", "car_tip_out"), ("fig_5", "car_tip_in"))
-    fitted = [_divergence(figure, divergence(scenario)) for figure, scenario in driven]
+    fitted = [_divergence(figure, fit_divergence(scenario)) for figure, scenario in driven]
     return [*fitted, *quick_claims()]
 
 
@@ -41,7 +41,7 @@ def quick_claims() -> list[Claim]:
 
 
 def _shuffle() -> Iterator[Claim]:
-    tip_out, step = run("paper_tip_out"), run("paper_step")
+    tip_out, step = run_scenario("paper_tip_out"), run_scenario("paper_step")
     _, rising = cycles(tip_out.times, signal(tip_out, "plant.w_d"), STEP)
     _, steady = cycles(step.times, signal(step, "plant.w_d"), STEP)
     yield Claim(
@@ -77,7 +77,7 @@ def _divergence(figure: str, found: Divergence) -> Claim:
 
 def _off(instance: str, name: str, in_gaps: bool = False) -> float:
     """Return the root mean square of what an estimator misses of the plant's, from the step on."""
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     wrong = signal(found, f"{instance}.{name}") - signal(found, f"plant.{name}")
     kept = found.times > STEP
     if in_gaps:
@@ -87,7 +87,7 @@ def _off(instance: str, name: str, in_gaps: bool = False) -> float:
 
 def _torque_off(instance: str) -> float:
     """Return the same of the torque, as a part of its size."""
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     size = np.sqrt(np.mean(found.signals["plant.T_hs"][found.times > STEP] ** 2))
     return _off(instance, "T_hs") / float(size)
 
@@ -96,7 +96,7 @@ def _torque_at_100_hz() -> tuple[float, float]:
     """Return what a torque that is held between samples misses, and what the estimator misses at
     samples after the last gap, both as a part of the torque's size.
     """
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     true, own = signal(found, "plant.T_hs"), signal(found, "at_100Hz.T_hs")
     samples = np.isclose(found.times, np.round(found.times / PERIOD) * PERIOD, atol=1e-9)
     (places,) = np.nonzero(samples)
@@ -113,7 +113,7 @@ def _torque_at_100_hz() -> tuple[float, float]:
 
 def _wrong_modes(until: float = 0.3) -> float:
     """Return for which part of a time after the step [s] the slow estimator's mode is wrong."""
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     kept = (found.times > STEP) & (found.times < STEP + until)
     wrong = found.signals["at_100Hz.mode"] != found.signals["plant.mode"]
     return float(np.mean(wrong[kept]))
@@ -139,7 +139,7 @@ def _slow_estimator() -> Iterator[Claim]:
         "the rest is missed in the gaps",
         rest < 0.02,
     )
-    left = until_landing("at_100Hz")
+    left = landing_lead_time("at_100Hz")
     yield Claim(
         "fig_10",
         "at 10 ms the gap is reported about when the other side is hit",
@@ -158,7 +158,7 @@ def _fast_estimator() -> Iterator[Claim]:
         f"off by {place:.2f} mrad of 51",
         share < 0.05 and place < 2.0,
     )
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     seen, true = (len(found.events_of(name)) for name in ("at_1kHz", "plant"))
     yield Claim(
         "fig_12",

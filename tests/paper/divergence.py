@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import modewright as mw
-from tests.paper.manoeuvre import STEP, Reals, cycles, run, signal
+from tests.paper.manoeuvre import STEP, Reals, cycles, run_scenario, signal
 from tests.verify.store import ROOT
 
 FITTED = 0.35
@@ -42,9 +42,9 @@ class Divergence:
 
 
 @lru_cache
-def divergence(scenario: str) -> Divergence:
+def fit_divergence(scenario: str) -> Divergence:
     """Fit the model to the car in a scenario, and tell how they part."""
-    car = run(scenario, "paper_car")
+    car = run_scenario(scenario, "paper_car")
     times, seen = car.times, signal(car, "car.w_em")
     fitted = (times >= STEP) & (times <= STEP + FITTED)
     count = int(np.sum(times <= STEP + FITTED))

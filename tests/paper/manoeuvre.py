@@ -18,7 +18,7 @@ Reals = NDArray[np.float64]
 
 
 @lru_cache
-def run(scenario: str, system: str = "paper") -> mw.Trajectory:
+def run_scenario(scenario: str, system: str = "paper") -> mw.Trajectory:
     """Return a run of a scenario of the paper."""
     found: mw.Trajectory = mw.simulate(system, scenario, root=ROOT)
     return found
@@ -41,14 +41,14 @@ def first_loss(trajectory: mw.Trajectory, instance: str) -> float:
 
 def table_1() -> dict[str, float]:
     """Return the delay until the first loss of contact is seen, by rate [ms]: Table 1."""
-    tip_out = run("paper_tip_out")
+    tip_out = run_scenario("paper_tip_out")
     lost = first_loss(tip_out, "plant")
     return {rate: 1e3 * (first_loss(tip_out, name) - lost) for rate, name in RATES.items()}
 
 
-def until_landing(instance: str) -> float:
+def landing_lead_time(instance: str) -> float:
     """Return how long before the coast side is met an estimator sees the first gap [ms]."""
-    tip_out = run("paper_tip_out")
+    tip_out = run_scenario("paper_tip_out")
     met = next(e.time for e in tip_out.events_of("plant") if e.target == "coast_contact")
     return 1e3 * (met - first_loss(tip_out, instance))
 

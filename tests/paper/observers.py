@@ -13,7 +13,7 @@ from pyarrow import Table
 from scipy.stats import chi2
 
 import modewright as mw
-from sweep.interval import Interval, of_quantile, wilson
+from sweep.interval import Interval, interval_of_quantile, wilson_interval
 from tests.verify.store import ROOT
 
 STUDY, CRUISE = "observers", "false_losses"
@@ -81,7 +81,7 @@ class Row:
         return most / self.cruise_minutes if self.cruise_minutes else float("nan")
 
 
-def studied(folder: Path, seed: int | None, samples: int | None) -> list[Row]:
+def run_studies(folder: Path, seed: int | None, samples: int | None) -> list[Row]:
     """Run both studies, or go on with them, and return the rows."""
     mw.sweep(STUDY, folder / STUDY, root=ROOT, block=100, seed=seed, samples=samples)
     mw.sweep(CRUISE, folder / CRUISE, root=ROOT, block=4)
@@ -115,13 +115,13 @@ def _row(table: Table, cruise: Table, scheme: str, period: float, is_matched: bo
         count=count,
         reported=len(first),
         median=float(np.median(first)),
-        median_interval=of_quantile(first, np.arange(len(first)), 0.5, 0.95),
+        median_interval=interval_of_quantile(first, np.arange(len(first)), 0.5, 0.95),
         p5=float(np.percentile(first, 5)),
         p95=float(np.percentile(first, 95)),
         absolute_median=float(np.median(np.abs(first))),
         absolute_p95=float(np.percentile(np.abs(first), 95)),
         missed_first=missed_first,
-        missed_interval=wilson(missed_first, count, 0.95),
+        missed_interval=wilson_interval(missed_first, count, 0.95),
         missed=int(one[f"gaps{ending}.missed"].sum()),
         gaps=int(one[f"gaps{ending}.truths"].sum()),
         false=int(one[f"gaps{ending}.false_events"].sum()),

@@ -13,7 +13,7 @@ from jinja2 import Environment, StrictUndefined
 from tests.paper.claims import Claim
 from tests.paper.observers import NOTES, Row
 from tests.paper.pareto import Point
-from tests.verify.store import ROOT, code_digest, write
+from tests.verify.store import ROOT, code_digest, write_json
 
 FOLDER = ROOT / "docs" / "paper"
 PAGE = FOLDER / "README.md"
@@ -22,12 +22,12 @@ MARK = "Digest of `spec/paper/` and `spec/ev_driveline/`: `"
 SPECS = ("spec/paper", "spec/ev_driveline")
 
 
-def is_of_these_specs(text: str) -> bool:
+def is_current(text: str) -> bool:
     """Tell whether a page was written with the specs as they are now."""
     return f"{MARK}{_digest()}`" in text
 
 
-def publish(
+def write_page(
     seed: int,
     table: Mapping[str, float],
     found: Sequence[Claim],
@@ -54,7 +54,7 @@ def publish(
     PAGE.write_text(text, encoding="utf-8")
 
 
-def told(
+def write_measurements_json(
     seed: int,
     table: Mapping[str, float],
     rows: Sequence[Row],
@@ -69,7 +69,7 @@ def told(
         "rows": [asdict(row) for row in rows],
         "pareto": {scheme: [asdict(point) for point in own] for scheme, own in points.items()},
     }
-    write(JSON, everything)
+    write_json(JSON, everything)
 
 
 def _digest() -> str:

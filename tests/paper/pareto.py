@@ -28,7 +28,7 @@ class Point:
     cruise: float
 
 
-def pareto(folder: Path) -> dict[str, list[Point]]:
+def run_pareto(folder: Path) -> dict[str, list[Point]]:
     """Run both studies, or go on with them, and return the points of each scheme."""
     tables = []
     for name in (DELAYS, LOSSES):

@@ -12,8 +12,8 @@ from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import gaussian
 
 import modewright as mw
-from tests.paper.divergence import divergence
-from tests.paper.manoeuvre import RATES, STEP, cycles, run, signal
+from tests.paper.divergence import fit_divergence
+from tests.paper.manoeuvre import RATES, STEP, cycles, run_scenario, signal
 
 TRUTH, PAPER, OTHER = "#444a52", "#20639b", "#c0392b"
 RPM = 30.0 / np.pi
@@ -33,7 +33,7 @@ def panels(rows: int, height: float = 1.7) -> tuple[Figure, list[Axes]]:
 
 def traces(scenario: str, mode: str) -> Figure:
     """Motor torque, motor speed and wheel speed of the car and of the fitted model: Figs 3, 5."""
-    car, fitted = run(scenario, "paper_car"), divergence(scenario)
+    car, fitted = run_scenario(scenario, "paper_car"), fit_divergence(scenario)
     t = car.times - STEP
     figure, (torque, motor, wheel) = panels(3)
     step = np.where(t < 0.0, *((30.0, -20.0) if mode == "tip-out" else (-20.0, 30.0)))
@@ -52,7 +52,7 @@ def traces(scenario: str, mode: str) -> Figure:
 
 def spectrogram(scenario: str) -> Figure:
     """Shuffle of the motor speed over time and frequency, with each cycle's own: Fig. 4."""
-    found = run(scenario)
+    found = run_scenario(scenario)
     t, w = found.times, signal(found, "plant.w_d")
     rate = 1.0 / float(t[1] - t[0])
     kept = t >= STEP
@@ -123,7 +123,7 @@ def outputs(shown: Mapping[str, str], until: float) -> Figure:
 
 def modes(shown: Mapping[str, str], until: float) -> Figure:
     """Position in the gap and modes of the plant and of estimators: Figs 10, 12, 14."""
-    found = run("paper_tip_out")
+    found = run_scenario("paper_tip_out")
     t = found.times - STEP
     figure, axes = panels(1 + len(shown), 1.2)
     axes[0].plot(t, 1e3 * found.signals["plant.theta_b"], color=TRUTH)
@@ -143,7 +143,7 @@ def modes(shown: Mapping[str, str], until: float) -> Figure:
 
 
 def _beside(axes: Axes, name: str, factor: float, shown: Mapping[str, str]) -> None:
-    found: mw.Trajectory = run("paper_tip_out")
+    found: mw.Trajectory = run_scenario("paper_tip_out")
     t = found.times - STEP
     plant = factor * signal(found, f"plant.{name}")
     axes.plot(t, plant, color=TRUTH, lw=1.0, ls=(0, (4, 2)), zorder=5, label="plant")

@@ -10,7 +10,7 @@ import pytest
 
 import modewright as mw
 from tests.paper.claims import quick_claims
-from tests.paper.page import FOLDER, PAGE, is_of_these_specs
+from tests.paper.page import FOLDER, PAGE, is_current
 from tests.paper.pictures import FIGURES
 from tests.verify.store import ROOT
 
@@ -27,7 +27,7 @@ def test_what_the_paper_says_of_its_figures_holds() -> None:
 def test_the_page_belongs_to_the_specs() -> None:
     """Models are fitted where the page is made: it says where a claim does not hold."""
     page = PAGE.read_text("utf-8")
-    assert is_of_these_specs(page), REMADE
+    assert is_current(page), REMADE
     assert "this differs" not in page
     missing = [name for name in (*FIGURES, "pareto") if not (FOLDER / f"{name}.png").exists()]
     assert missing == []

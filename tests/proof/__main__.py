@@ -14,11 +14,11 @@ from tests.proof.answer import Answer
 from tests.proof.bar import Bar, bars
 from tests.proof.cases import GENERATOR
 from tests.proof.catalogue import pairs_of
-from tests.proof.control import most_frequent, permuted, simpler, simpler_alarms
-from tests.proof.kept import answers, carry, dask, threads
-from tests.proof.page import published
+from tests.proof.control import baseline_alarm_rate, baseline_rate, majority_rate, permutation_score
+from tests.proof.kept import dask, diagnose_cases, export_study, threads
+from tests.proof.page import write_page
 from tests.proof.plan import SEED, Plan, plans
-from tests.proof.seals import is_sealed, sealed, seals_of
+from tests.proof.seals import is_sealed, seals_of, write_seals
 from tests.verify.store import ROOT
 
 VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
@@ -36,10 +36,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     study = plans(pairs_of(given.generator), given.seed, given.share)
     if given.seal:
-        sealed(seals_of(study, given.seed, given.generator))
+        write_seals(seals_of(study, given.seed, given.generator))
         return 0
     if given.carry:
-        count = carry(study, given.seed, given.generator, VERDICTS)
+        count = export_study(study, given.seed, given.generator, VERDICTS)
         print(f"wrote {count} results to {VERDICTS.relative_to(ROOT)}")
         return 0
     wanted = given.plans.split(",") if given.plans else [plan.name for plan in study]
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 partial(dask, given.cluster) if given.cluster else partial(threads, given.jobs)
             )
             source = given.seed, workers, given.first, given.generator
-            every += answers(plan, *source, carried=VERDICTS)
+            every += diagnose_cases(plan, *source, carried=VERDICTS)
     found = bars(every)
     for bar in found:
         print(f"{'met   ' if bar.met else 'MISSED'} {bar.about}: {bar.asked}: {bar.text}")
@@ -67,8 +67,8 @@ def _publish(
     """Write the page of a whole study whose labels were sealed before."""
     seals = seals_of(study, given.seed, given.generator)
     if is_sealed(seals):
-        carry(study, given.seed, given.generator, VERDICTS)
-        published(every, found, seals, _beside(every, given.seed))
+        export_study(study, given.seed, given.generator, VERDICTS)
+        write_page(every, found, seals, _beside(every, given.seed))
         print("wrote docs/proof.md")
     else:
         print("docs/proof.md is left as it is: the labels of this study are not sealed")
@@ -79,18 +79,18 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
     full, clean = ([one for one in every if one.plan == name] for name in ("full", "clean"))
     if not full:
         return []
-    chance = permuted(full, random.Random(seed))
+    chance = permutation_score(full, random.Random(seed))
     lines = [
         f"permuted labels: first name right {chance:.1%}",
-        f"the most frequent label: {most_frequent(full).text}",
+        f"the most frequent label: {majority_rate(full).text}",
         "recalibration without effects: names no effect",
     ]
     for method, words in (
         ("sindy", "sparse regression of the residual of the recalibrated base (PySINDy)"),
         ("free_gain", "the effect with the largest gain in free simulation"),
     ):
-        alarms = f"; false alarms {simpler_alarms(clean, method).text}" if clean else ""
-        lines.append(f"{words}: {simpler(full, method).text}{alarms}")
+        alarms = f"; false alarms {baseline_alarm_rate(clean, method).text}" if clean else ""
+        lines.append(f"{words}: {baseline_rate(full, method).text}{alarms}")
     return [*lines, _compiled([*full, *clean])]
 
 

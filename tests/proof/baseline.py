@@ -14,10 +14,10 @@ import pysindy
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from diagnosis.bench import Bench
+from diagnosis.bench import ModelSet
 from diagnosis.diagnose import Diagnosis
 from diagnosis.estimate import Estimate
-from diagnosis.joined import burnt
+from diagnosis.joined import burn_in_samples
 from diagnosis.naming import verdict_id
 from diagnosis.simulation import nrmse
 
@@ -59,15 +59,18 @@ WHEEL: Terms = {
 }
 
 
-def baselines(found: Diagnosis) -> dict[str, str]:
+def run_baselines(found: Diagnosis) -> dict[str, str]:
     """Return what each simpler method names."""
-    base, bench = found.selection.base, found.bench
-    tried = {verdict_id(t.layer, bench.automaton): t.estimate for t in found.selection.first_round}
+    base, bench = found.selection.base, found.model_set
+    tried = {
+        verdict_id(t.placed_effect, bench.automaton): t.estimate
+        for t in found.selection.first_round
+    }
     free = {name: one for name, one in tried.items() if one is not None}
     return {"sindy": by_regression(bench, base), "free_gain": by_simulation(bench, base, free)}
 
 
-def by_simulation(bench: Bench, base: Estimate, fitted: Mapping[str, Estimate]) -> str:
+def by_simulation(bench: ModelSet, base: Estimate, fitted: Mapping[str, Estimate]) -> str:
     """Return the fitted effect that brings free simulation nearest; none where none does."""
     misfit = {name: float(np.mean(nrmse(one, bench.series))) for name, one in fitted.items()}
     limit = float(np.mean(nrmse(base, bench.series)))
@@ -75,7 +78,7 @@ def by_simulation(bench: Bench, base: Estimate, fitted: Mapping[str, Estimate]) 
     return best if best is not None and misfit[best] < limit else "nothing_missing"
 
 
-def by_regression(bench: Bench, base: Estimate) -> str:
+def by_regression(bench: ModelSet, base: Estimate) -> str:
     """Return the effect whose term has the largest part in what a balance of the base lacks."""
     signals = [_signals(bench, base, k) for k in range(len(bench.series))]
     found: dict[str, float] = {}
@@ -96,12 +99,12 @@ def by_regression(bench: Bench, base: Estimate) -> str:
     return best if found[best] > 0.0 else "nothing_missing"
 
 
-def _signals(bench: Bench, base: Estimate, k: int) -> Signals:
+def _signals(bench: ModelSet, base: Estimate, k: int) -> Signals:
     """Return what terms are made of in one recording, once the states are found."""
-    series, run, values = bench.series[k], base.outcome.predictions[k], dict(base.values(k))
+    series, run, values = bench.series[k], base.prediction.predictions[k], dict(base.values(k))
     declared = bench.automaton.parameters
     known = {name: float(p.value) for name, p in declared.items() if p.value is not None} | values
-    rows = slice(burnt(series), run.done)
+    rows = slice(burn_in_samples(series), run.completed)
     names = base.candidate.predictor.states
     state = {name: run.states[rows, place] for place, name in enumerate(names)}
     fed = dict(zip(base.candidate.predictor.inputs, series.inputs[rows].T, strict=True))

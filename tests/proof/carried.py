@@ -10,7 +10,7 @@ import pyarrow
 import pyarrow.parquet
 
 from sweep.block import Block, Row
-from sweep.measure import Column
+from sweep.measure import StoreColumn
 from sweep.store import Store
 
 SHARED = ("number", "variant", "scenario", "sample", "replicate", "seed", "status", "message")
@@ -22,7 +22,7 @@ def rows_of(store: Store) -> Iterator[dict[str, Any]]:
         yield from pyarrow.parquet.read_table(path).to_pylist()
 
 
-def written(stores: Mapping[str, Store], path: Path) -> int:
+def export_results(stores: Mapping[str, Store], path: Path) -> int:
     """Write what is kept in the stores of some plans to one file; return how many cases."""
     files = [one for store in stores.values() for one in store.paths()]
     if not files:
@@ -34,7 +34,7 @@ def written(stores: Mapping[str, Store], path: Path) -> int:
     return int(table.num_rows)
 
 
-def restored(store: Store, plan: str, path: Path) -> int:
+def import_results(store: Store, plan: str, path: Path) -> int:
     """Put the cases of a plan that a file holds into its store; return how many were missing.
 
     Results of other code, cases or seeds are left where they are.
@@ -45,11 +45,11 @@ def restored(store: Store, plan: str, path: Path) -> int:
     marks = table.schema.metadata or {}
     if marks.get(plan.encode()) != store.manifest.digest.encode():
         return 0
-    known = store.finished()
+    known = store.finished_starts()
     found = [_row(one, store) for one in table.to_pylist() if one["variant"] == plan]
     missing = [row for row in found if row.number not in known]
     for row in missing:
-        store.write(Block(row.number, row.number + 1), [row])
+        store.write_rows(Block(row.number, row.number + 1), [row])
     return len(missing)
 
 
@@ -60,5 +60,5 @@ def _row(cells: Mapping[str, Any], store: Store) -> Row:
     return Row(**shared, values=values, measures=measures)
 
 
-def _some(cells: Mapping[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
+def _some(cells: Mapping[str, Any], columns: Sequence[StoreColumn]) -> dict[str, Any]:
     return {column.name: cells[column.name] for column in columns}

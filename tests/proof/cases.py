@@ -38,7 +38,7 @@ class Cases:
         return dict(islice(every.items(), most))
 
 
-def made(plan: Plan, seed: int, generator: str = GENERATOR) -> Cases:
+def generate_cases(plan: Plan, seed: int, generator: str = GENERATOR) -> Cases:
     """Return the cases of a plan; they are written if they are not there."""
     key = f"{plan.effects} {plan.strength} {seed}".encode()
     name = f"{generator.rpartition('.')[2]}_{seed}_{hashlib.sha256(key).hexdigest()[:10]}"

@@ -15,7 +15,7 @@ TIMES = 100
 """Permutations of the labels."""
 
 
-def permuted(full: Sequence[Answer], draw: random.Random) -> float:
+def permutation_score(full: Sequence[Answer], draw: random.Random) -> float:
     """Return the mean share of first names that are right against labels in another order."""
     labels = [one.label for one in full]
     shares = []
@@ -26,17 +26,17 @@ def permuted(full: Sequence[Answer], draw: random.Random) -> float:
     return fmean(shares)
 
 
-def most_frequent(full: Sequence[Answer]) -> Rate:
+def majority_rate(full: Sequence[Answer]) -> Rate:
     """Return how often the most frequent label would be right."""
     counts = Counter(one.true for one in full)
     return Rate(max(counts.values(), default=0), len(full))
 
 
-def simpler(full: Sequence[Answer], method: str) -> Rate:
+def baseline_rate(full: Sequence[Answer], method: str) -> Rate:
     """Return how often a simpler method (see baseline) names a true effect."""
     return rate_of(one.simpler.get(method) in one.ids for one in full)
 
 
-def simpler_alarms(clean: Sequence[Answer], method: str) -> Rate:
+def baseline_alarm_rate(clean: Sequence[Answer], method: str) -> Rate:
     """Return how often a simpler method names an effect where nothing is missing."""
     return rate_of(one.simpler.get(method) != NOTHING for one in clean)

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import chirp
 
-from tests.concealed.trip import hann
+from tests.concealed.trip import smooth_hann
 from tests.proof.forms_library import Array
 
 MS = 0.001
 
 
 @dataclass(frozen=True)
-class Compared:
+class LawComparison:
     """What the generator gives, what it gives without the effect, and the library's family.
 
     `law` takes the factors on `typical` values; `starts` are such factors.
@@ -28,7 +28,7 @@ class Compared:
     typical: Sequence[float]
     starts: Sequence[Sequence[float]] = ()
 
-    def fitted(self) -> tuple[float, Array]:
+    def fit(self) -> tuple[float, Array]:
         """What the best fit leaves of the departure from clean [-], and its parameters."""
         typical = np.array(self.typical)
 
@@ -56,4 +56,4 @@ def steps(seconds: float, step: float = 2 * MS) -> Array:
     held = levels[np.minimum((time / seconds * 14).astype(int), 6)]
     sweep = 50 * chirp(time - seconds / 2, 0.5, seconds / 2, 12.0, "logarithmic", phi=-90)
     width = 0.06 * MS / step
-    return np.asarray(hann(held, width) + np.where(time > seconds / 2, sweep, 0.0))
+    return np.asarray(smooth_hann(held, width) + np.where(time > seconds / 2, sweep, 0.0))

@@ -57,7 +57,7 @@ def _numbers(physics: Physics) -> solver.CPhysics:
     return solver.CPhysics(*(getattr(physics, field.name) for field in fields(physics)))
 
 
-def walked(
+def evaluate_path(
     physics: Physics,
     step: float,
     given: Mapping[str, Array],
@@ -88,7 +88,7 @@ def walked(
     return {name: values.copy() for name, values in named.items()}
 
 
-def limited(physics: Physics, step: float, demand: Array) -> Array:
+def limit_rate(physics: Physics, step: float, demand: Array) -> Array:
     """The demand as the generator's rate limiter lets it through."""
     given, out = np.ascontiguousarray(demand), np.empty(len(demand))
     library().limit(

@@ -11,31 +11,31 @@ from pathlib import Path
 from typing import Any
 
 from modewright import cluster_worker
-from sweep.address import Credentials, address_of
+from sweep.address import Credentials, parse_address
 from sweep.block import DONE, STOPPED, Block, Row
-from sweep.clustering import Staff, connected
+from sweep.clustering import WorkerSetup, open_client
 from sweep.manifest import Manifest
-from sweep.measure import Column
+from sweep.measure import StoreColumn
 from sweep.preparation import digest_of
-from sweep.store import Store, locked, open_store
+from sweep.store import Store, lock_folder, open_store
 from sweep.study import Presentation
 from tests.proof.answer import Answer
-from tests.proof.carried import restored, rows_of, written
-from tests.proof.cases import Cases, Label, made
+from tests.proof.carried import export_results, import_results, rows_of
+from tests.proof.cases import Cases, Label, generate_cases
 from tests.proof.plan import Plan
-from tests.proof.result import Result, diagnosed
+from tests.proof.result import Result, diagnose_case
 from tests.verify.store import CODE, ROOT, code_digest
 
 Workers = Callable[[], AbstractContextManager[Executor]]
 """What diagnoses cases, while it is open."""
-VARIED = (Column("strength", "real", ""), Column("rate", "real", "Hz"))
+VARIED = (StoreColumn("strength", "real", ""), StoreColumn("rate", "real", "Hz"))
 MEASURES = (
-    Column("verdict", "text", ""),
-    Column("cpu", "real", "s"),
-    Column("compiler", "real", "s"),
-    Column("wall", "real", "s"),
-    Column("sindy", "text", ""),
-    Column("free_gain", "text", ""),
+    StoreColumn("verdict", "text", ""),
+    StoreColumn("cpu", "real", "s"),
+    StoreColumn("compiler", "real", "s"),
+    StoreColumn("wall", "real", "s"),
+    StoreColumn("sindy", "text", ""),
+    StoreColumn("free_gain", "text", ""),
 )
 
 
@@ -49,12 +49,12 @@ def threads(jobs: int) -> Iterator[Executor]:
 @contextmanager
 def dask(cluster: str) -> Iterator[Executor]:
     """Yield the workers of a Dask cluster, which see this folder: `local:4`, `tls://head:8786`."""
-    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
-    with connected(address_of(cluster), Credentials(), staff) as client:
+    staff = WorkerSetup(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with open_client(parse_address(cluster), Credentials(), staff) as client:
         yield client.get_executor(pure=False)
 
 
-def answers(
+def diagnose_cases(
     plan: Plan,
     seed: int,
     workers: Workers,
@@ -66,21 +66,23 @@ def answers(
 
     A file of `carried` results counts as diagnosed where it is of the same code and cases.
     """
-    cases = made(plan, seed, generator)
+    cases = generate_cases(plan, seed, generator)
     known = cases.known(most)
-    with locked(_folder(plan, cases)):
+    with lock_folder(_folder(plan, cases)):
         store = _store(plan, seed, cases)
-        if carried and (count := restored(store, plan.name, carried)):
+        if carried and (count := import_results(store, plan.name, carried)):
             print(f"{plan.name}: {count} results of {carried.name}", flush=True)
         _fill(store, plan, cases, list(known.items()), seed, workers)
         rows = {row["scenario"]: row for row in rows_of(store)}
     return [_answer(rows[name], plan, label) for name, label in known.items()]
 
 
-def carry(study: Sequence[Plan], seed: int, generator: str, path: Path) -> int:
+def export_study(study: Sequence[Plan], seed: int, generator: str, path: Path) -> int:
     """Write all results of a study so far to one Parquet file; return how many there are."""
-    stores = {plan.name: _store(plan, seed, made(plan, seed, generator)) for plan in study}
-    return written(stores, path)
+    stores = {
+        plan.name: _store(plan, seed, generate_cases(plan, seed, generator)) for plan in study
+    }
+    return export_results(stores, path)
 
 
 def _store(plan: Plan, seed: int, cases: Cases) -> Store:
@@ -131,7 +133,7 @@ def _fill(
     workers: Workers,
 ) -> None:
     """Diagnose the cases that the store does not have, some at a time, and keep each."""
-    finished = store.finished()
+    finished = store.finished_starts()
     missing = [number for number in range(len(known)) if number not in finished]
     if not missing:
         return
@@ -140,7 +142,7 @@ def _fill(
         try:
             for done, future in enumerate(as_completed(work), 1):
                 row = future.result()
-                store.write(Block(row.number, row.number + 1), [row])
+                store.write_rows(Block(row.number, row.number + 1), [row])
                 _tell(plan, known[row.number][1], row, f"{done} of {len(work)}")
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -149,7 +151,7 @@ def _fill(
 
 def _row(plan: Plan, cases: Cases, name: str, label: Label, number: int, seed: int) -> Row:
     own = tuple(effect["id"] for effect in label["effects"]) if plan.without_own else ()
-    result: Result = diagnosed(cases.folder / name, own, plan.is_compared)
+    result: Result = diagnose_case(cases.folder / name, own, plan.is_compared)
     return Row(
         number=number, variant=plan.name, scenario=name, sample=0, replicate=0, seed=seed,
         values={"strength": plan.strength, "rate": float(label["rate_Hz"])},

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 import modewright as mw
 from diagnosis.case import read_series
-from diagnosis.dossier import Dossier
-from diagnosis.estimate import looked_at
-from diagnosis.freedom import ALL_LEVELS, scanned
-from diagnosis.layers import DRIFT
-from diagnosis.level import units_of
-from diagnosis.point import point_of
-from diagnosis.series import Series, thinned
-from diagnosis.smoothing import smoothed
+from diagnosis.dossier import DiagnosisReport
+from diagnosis.estimate import evaluate
+from diagnosis.freedom import ALL_LEVELS, scan_level
+from diagnosis.layers import DISTURBANCE_STATE
+from diagnosis.level import disturbance_units
+from diagnosis.point import vector_of
+from diagnosis.series import SampledRecording, decimate
+from diagnosis.smoothing import smooth_states
 from tests.diagnosis import machines
 from tests.proof.truth import brake_figures, columns, slope_figures
 
@@ -89,7 +89,7 @@ def brake(recordings: Path, drive: str) -> Figure:
 
 def damper(recordings: Path, file: str) -> Figure:
     """The gap of the friction damper."""
-    found = machines.damper(recordings, file)
+    found = machines.diagnose_damper(recordings, file)
     return {
         "asked": f"backlash, NRMSE <= {DAMPER[file]}",
         **found,
@@ -131,25 +131,25 @@ def grade(recordings: Path) -> Figure:
     }
 
 
-def _pull(dossier: Dossier, file: Path) -> tuple[Series, Reals]:
+def _pull(dossier: DiagnosisReport, file: Path) -> tuple[SampledRecording, Reals]:
     """Return a whole trip and the g sin(grade) [m/s^2] (samples,) that a smoother finds in it.
 
     With the parameters found in its windows, the grade as a random walk.
     """
     assert dossier.diagnosis
-    bench, model = dossier.diagnosis.bench, dossier.diagnosis.selection.model
+    bench, model = dossier.diagnosis.model_set, dossier.diagnosis.selection.model
     mapping = dataclasses.replace(dossier.case.mapping, windows={})
-    case = dataclasses.replace(dossier.case, mapping=mapping, read={})
-    (read,) = read_series(file, case, bench.automaton, bench.seen)
-    whole = thinned(read, bench.series[0].is_linear)
+    case = dataclasses.replace(dossier.case, mapping=mapping, recordings={})
+    (read,) = read_series(file, case, bench.automaton, bench.output_names)
+    whole = decimate(read, bench.series[0].is_first_order_hold)
     values = {k: v for k, v in model.values(0).items() if not k.startswith("grade")}
-    name = bench.drifts[0].named(DRIFT)
-    candidate = bench.candidate(())
-    units = units_of(candidate, [whole], values)
-    start = looked_at(candidate, [whole], model.noises, point_of(candidate, 1, values))
-    free = scanned(start, [whole], units, name, ALL_LEVELS)
+    name = bench.disturbances[0].qualified_name(DISTURBANCE_STATE)
+    candidate = bench.compile_candidate(())
+    units = disturbance_units(candidate, [whole], values)
+    start = evaluate(candidate, [whole], model.noise_levels, vector_of(candidate, 1, values))
+    free = scan_level(start, [whole], units, name, ALL_LEVELS)
     column = free.candidate.predictor.states.index(name)
-    (found,) = smoothed(free, [whole])
+    (found,) = smooth_states(free, [whole])
     return whole, -found.states[:, column] / values["m"]
 
 

@@ -26,12 +26,12 @@ def method_digest() -> str:
     return code_digest(METHOD)[:16]
 
 
-def is_of_this_method(text: str) -> bool:
+def is_current(text: str) -> bool:
     """Tell whether a page was written with the method as it is now."""
     return f"{MARK}{method_digest()}`" in text
 
 
-def published(
+def write_page(
     every: Sequence[Answer], found: Sequence[Bar], seals: Mapping[str, Any], beside: Sequence[str]
 ) -> None:
     """Write the page with its figures and figures of evidence."""

@@ -10,7 +10,7 @@ from functools import partial
 from statistics import fmean
 
 from tests.proof.cases import GENERATOR
-from tests.proof.kept import answers, threads
+from tests.proof.kept import diagnose_cases, threads
 from tests.proof.plan import Plan
 
 SEED = 20261226
@@ -23,7 +23,9 @@ MOST_ALARMS = 1
 
 def main() -> int:
     """Diagnose the part; return 0 if enough of it is right."""
-    full, clean = (answers(plan, SEED, partial(threads, JOBS), None, GENERATOR) for plan in PLANS)
+    full, clean = (
+        diagnose_cases(plan, SEED, partial(threads, JOBS), None, GENERATOR) for plan in PLANS
+    )
     figures = {
         "first name right": (fmean(one.is_named for one in full), FEWEST_NAMED),
         "place right": (fmean(one.is_placed() for one in full), FEWEST_PLACED),

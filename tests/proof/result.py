@@ -40,7 +40,7 @@ class Result:
     free_gain: str = ""
 
 
-def diagnosed(case: Path, without: tuple[str, ...] = (), is_compared: bool = True) -> Result:
+def diagnose_case(case: Path, without: tuple[str, ...] = (), is_compared: bool = True) -> Result:
     """Diagnose a copy of a case on one core, with some effects taken out of the library.
 
     Simpler methods are asked where they are compared with.

@@ -38,7 +38,7 @@ def main() -> None:
     library = effects[0] if effects else None
     sys.addaudithook(guard(_end))
     import modewright
-    from diagnosis.dossier import verdict_json
+    from diagnosis.dossier import verdict_to_json
 
     begun = time.monotonic()
     train, held_out = (sorted(Path(case, part).glob("*.csv")) for part in ("train", "held_out"))
@@ -48,10 +48,10 @@ def main() -> None:
     took = {"cpu_s": own + compilers, "compiler_s": compilers, "wall_s": wall}
     simpler = {}
     if found.diagnosis is not None and ALONE not in sys.argv:
-        from tests.proof.baseline import baselines
+        from tests.proof.baseline import run_baselines
 
-        simpler = baselines(found.diagnosis)
-    kept = {"verdict": verdict_json(found.verdict), **took, "baselines": simpler}
+        simpler = run_baselines(found.diagnosis)
+    kept = {"verdict": verdict_to_json(found.verdict), **took, "baselines": simpler}
     Path(result).write_text(json.dumps(kept))
 
 

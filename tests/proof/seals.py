@@ -6,9 +6,9 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from tests.proof.cases import made
+from tests.proof.cases import generate_cases
 from tests.proof.plan import Plan
-from tests.verify.store import ROOT, write
+from tests.verify.store import ROOT, write_json
 
 SEALS = ROOT / "docs" / "evidence" / "proof_seals.json"
 
@@ -20,16 +20,16 @@ def seals_of(every: Sequence[Plan], seed: int, generator: str) -> dict[str, Any]
             "plan": plan.name,
             "effects": plan.effects,
             "strength": plan.strength,
-            "labels": made(plan, seed, generator).seal,
+            "labels": generate_cases(plan, seed, generator).seal,
         }
         for plan in every
     ]
     return {"generator": generator, "seed": seed, "plans": plans}
 
 
-def sealed(found: dict[str, Any]) -> None:
+def write_seals(found: dict[str, Any]) -> None:
     """Write the seals."""
-    write(SEALS, found)
+    write_json(SEALS, found)
 
 
 def is_sealed(found: dict[str, Any]) -> bool:

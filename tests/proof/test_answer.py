@@ -9,7 +9,7 @@ import pytest
 
 from tests.proof.answer import Answer
 from tests.proof.bar import bars
-from tests.proof.control import permuted
+from tests.proof.control import permutation_score
 
 PLACES = {"actuator_lag": "inputs.T_em", "tyre_slip": "elements.vehicle", "road_grade": "flow.w_w"}
 
@@ -107,5 +107,5 @@ def test_the_time_of_a_case_is_that_of_cases_with_and_without_an_effect() -> Non
 def test_permuted_labels_fall_to_chance() -> None:
     names = list(PLACES)
     every = [answer((name,), verdict(name)) for name in names * 200]
-    share = permuted(every, random.Random(1))
+    share = permutation_score(every, random.Random(1))
     assert share == pytest.approx(1 / len(names), abs=0.05)

@@ -11,7 +11,7 @@ from sweep.manifest import Manifest
 from sweep.measuring import Cell
 from sweep.store import Store, open_store
 from sweep.study import Presentation
-from tests.proof.carried import restored, rows_of, written
+from tests.proof.carried import export_results, import_results, rows_of
 from tests.proof.kept import MEASURES, VARIED
 
 COUNT = 5
@@ -34,7 +34,7 @@ def row(number: int, plan: str) -> Row:
 def store_of(folder: Path, plan: str, digest: str, numbers: tuple[int, ...] = ()) -> Store:
     store = open_store(folder, manifest(digest))
     for number in numbers:
-        store.write(Block(number, number + 1), [row(number, plan)])
+        store.write_rows(Block(number, number + 1), [row(number, plan)])
     return store
 
 
@@ -45,28 +45,28 @@ def carried(tmp_path: Path) -> Path:
         "full": store_of(tmp_path / "full", "full", "one", (0, 2, 3)),
         "clean": store_of(tmp_path / "clean", "clean", "two", (1,)),
     }
-    assert written(stores, path) == 4
+    assert export_results(stores, path) == 4
     return path
 
 
 def test_a_study_goes_on_elsewhere_with_what_it_has(carried: Path, tmp_path: Path) -> None:
     there = store_of(tmp_path / "there", "full", "one", (2,))
-    assert restored(there, "full", carried) == 2
-    assert there.finished() == {0, 2, 3}
+    assert import_results(there, "full", carried) == 2
+    assert there.finished_starts() == {0, 2, 3}
     before = list(rows_of(store_of(tmp_path / "full", "full", "one")))
     assert sorted(map(str, rows_of(there))) == sorted(map(str, before))
-    assert restored(there, "full", carried) == 0
+    assert import_results(there, "full", carried) == 0
 
 
 def test_results_of_other_code_or_cases_are_none(carried: Path, tmp_path: Path) -> None:
     other = store_of(tmp_path / "other", "full", "another")
-    assert restored(other, "full", carried) == 0
-    assert restored(store_of(tmp_path / "x", "weak", "one"), "weak", carried) == 0
-    assert not other.finished()
+    assert import_results(other, "full", carried) == 0
+    assert import_results(store_of(tmp_path / "x", "weak", "one"), "weak", carried) == 0
+    assert not other.finished_starts()
 
 
 def test_no_file_is_no_result(tmp_path: Path) -> None:
     store = store_of(tmp_path / "new", "full", "one")
-    assert restored(store, "full", tmp_path / "none.parquet") == 0
-    assert written({"full": store}, tmp_path / "empty.parquet") == 0
+    assert import_results(store, "full", tmp_path / "none.parquet") == 0
+    assert export_results({"full": store}, tmp_path / "empty.parquet") == 0
     assert not (tmp_path / "empty.parquet").exists()

@@ -15,8 +15,8 @@ import pytest
 
 from tests.concealed.catalogue import CATALOGUE
 from tests.concealed.twin import case_of
-from tests.proof.forms_compared import COMPARED
-from tests.proof.forms_truth import walked
+from tests.proof.forms_compared import COMPARISONS
+from tests.proof.forms_truth import evaluate_path
 
 LEAST = 0.002
 """Of an effect's departure from the clean law, left by the best fit of the library's family."""
@@ -52,19 +52,19 @@ NEIGHBOURS: Mapping[str, Mapping[str, float]] = {
 @cache
 def fitted(name: str, number: int) -> tuple[float, str]:
     """What the best fit leaves of the effect, and its numbers."""
-    left, numbers = COMPARED[name](case_of((name,), 1.0, number).physics).fitted()
+    left, numbers = COMPARISONS[name](case_of((name,), 1.0, number).physics).fit()
     return left, str(numbers)
 
 
 def test_an_effect_is_compared_or_has_one_form_only() -> None:
-    assert set(ONE_FORM) == set(CATALOGUE) - set(COMPARED)
-    assert set(COMPARED) <= set(CATALOGUE)
+    assert set(ONE_FORM) == set(CATALOGUE) - set(COMPARISONS)
+    assert set(COMPARISONS) <= set(CATALOGUE)
     assert all(ONE_FORM.values())
 
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [*((name, 3) for name in COMPARED), ("stiffness_nonlinear", 5)],
+    [*((name, 3) for name in COMPARISONS), ("stiffness_nonlinear", 5)],
 )
 def test_the_library_does_not_have_the_form_of_the_generator(name: str, number: int) -> None:
     """Of cases 3 and 5: in the one the knee softens, in the other it hardens."""
@@ -77,7 +77,7 @@ def test_it_is_the_form_and_not_the_fit_that_leaves_something(name: str) -> None
     """Where the generator's numbers make the library's form of it, the fit finds that."""
     left, _ = fitted(name, 3)
     physics = replace(case_of((name,), 1.0, 3).physics, **NEIGHBOURS[name])
-    alike, _ = COMPARED[name](physics).fitted()
+    alike, _ = COMPARISONS[name](physics).fit()
     assert alike <= left / 5, f"{name}: {alike:.3%} is left of the library's own, {left:.3%} of it"
 
 
@@ -85,8 +85,10 @@ def test_a_constant_and_a_factor_are_the_same_in_both() -> None:
     """The known equalities of the list above, as far as they are laws."""
     u, w = np.linspace(-100, 200, 31), np.linspace(-5, 80, 31)
     torque = case_of(("torque_offset",), 1.0, 3).physics
-    assert np.allclose(walked(torque, 0.001, {"demand": u})["motor"], u + torque.torque_offset)
+    assert np.allclose(
+        evaluate_path(torque, 0.001, {"demand": u})["motor"], u + torque.torque_offset
+    )
     for name in ("sensor_offset", "sensor_scale"):
         p = case_of((name,), 1.0, 3).physics
-        read = walked(p, 0.001, {"W_W": w})["encoder"]
+        read = evaluate_path(p, 0.001, {"W_W": w})["encoder"]
         assert np.allclose(read, p.sense_scale * w + p.sense_offset)

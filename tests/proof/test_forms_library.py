@@ -10,7 +10,7 @@ import pytest
 import yaml
 from scipy.integrate import cumulative_simpson, cumulative_trapezoid
 
-from tests.effects.rig import ran
+from tests.effects.rig import run_with_effects
 from tests.language.making import ROOT
 from tests.proof import forms_library as library
 from tests.proof.forms_library import Array
@@ -128,14 +128,16 @@ def test_of_an_input_or_output(
     tmp_path: Path, effect: str, shown: str, wanted: Callable[[], Array]
 ) -> None:
     more = f"outputs: [{shown}]"
-    found = ran(tmp_path, "rotor", f"{{{effect}}}", {"T": course("N*m")}, more=more)
+    found = run_with_effects(tmp_path, "rotor", f"{{{effect}}}", {"T": course("N*m")}, more=more)
     near(found.signals[f"plant.{shown}"], wanted())
 
 
 def test_of_a_limit_of_power(tmp_path: Path) -> None:
     """At 10 rad/s."""
     effect = "{torque_derating@T: {values: {P_max: 1.75 kW, share: 0.7}}}"
-    found = ran(tmp_path, "rotor", effect, {"T": course("N*m", 5.0)}, more="outputs: [u_p_T]")
+    found = run_with_effects(
+        tmp_path, "rotor", effect, {"T": course("N*m", 5.0)}, more="outputs: [u_p_T]"
+    )
     wanted = library.derating(5 * COURSE, np.full(1001, 10.0), 1750.0, 0.7)
     near(found.signals["plant.u_p_T"], wanted)
 
@@ -160,7 +162,9 @@ LOSSES: list[tuple[str, Callable[[Array, Array], Array]]] = [
 def test_of_a_loss(tmp_path: Path, effect: str, law: Callable[[Array, Array], Array]) -> None:
     """What the speed lacks is the integral of the loss."""
     start = "{plant.w: -3 rad/s}"
-    found = ran(tmp_path, "rotor", f"{{{effect}}}", {"T": course("N*m")}, initial=start)
+    found = run_with_effects(
+        tmp_path, "rotor", f"{{{effect}}}", {"T": course("N*m")}, initial=start
+    )
     w = np.asarray(found.signals["plant.w"])
     lost = integral(COURSE)[::10] - J * (w + 3)
     wanted = cumulative_simpson(law(w, COURSE[::10]), dx=0.01, initial=0)
@@ -168,7 +172,7 @@ def test_of_a_loss(tmp_path: Path, effect: str, law: Callable[[Array, Array], Ar
 
 
 def test_of_a_brake_that_lets_go_slowly(tmp_path: Path) -> None:
-    found = ran(
+    found = run_with_effects(
         tmp_path, "rotor", "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s}}}",
         {"T": "0 N*m", "T_b": "{start: 16 N*m, steps: {0.5 s: 0 N*m}}"},
         initial="{plant.w: 50 rad/s}", more="outputs: [T_d_w]",
@@ -206,14 +210,14 @@ SPRINGS: list[tuple[str, Callable[[], Array]]] = [
 
 @pytest.mark.parametrize(("effect", "wanted"), SPRINGS, ids=effect_named)
 def test_of_a_spring(tmp_path: Path, effect: str, wanted: Callable[[], Array]) -> None:
-    found = ran(tmp_path, "shaft", f"{{{effect}}}", {"v": course("rad/s", 0.01)})
+    found = run_with_effects(tmp_path, "shaft", f"{{{effect}}}", {"v": course("rad/s", 0.01)})
     near(found.signals["plant.T_s"], wanted(), 3e-3)
 
 
 def test_of_a_mount(tmp_path: Path) -> None:
     effect = "{mount_compliance@spring: {values: {J_h: 20, k_m: 5 kN*m/rad, c_m: 60}}}"
     more = "outputs: [T_s, phi_spring]"
-    found = ran(tmp_path, "shaft", effect, {"v": course("rad/s", 0.01)}, more=more)
+    found = run_with_effects(tmp_path, "shaft", effect, {"v": course("rad/s", 0.01)}, more=more)
     torque = np.asarray(found.signals["plant.T_s"])
     wanted = library.mount(torque, 0.01, 20.0, 5000.0, 60.0)
     assert np.max(np.abs(np.asarray(found.signals["plant.phi_spring"]) - wanted)) < 1e-3 * np.max(
@@ -224,7 +228,7 @@ def test_of_a_mount(tmp_path: Path) -> None:
 def test_of_a_second_gap(tmp_path: Path) -> None:
     values = "{J_m: 0.5 kg*m^2, k_2: 20 kN*m/rad, c_2: 200 N*m*s/rad, a_2: 0.03 rad}"
     names = ("x_2_half_shaft", "rate_2_half_shaft", "T_2_half_shaft")
-    found = ran(
+    found = run_with_effects(
         tmp_path, "driveline", f"{{second_gap@half_shaft: {{values: {values}}}}}",
         {"T_em": "{start: 20 N*m, steps: {0.2 s: -20 N*m}}"}, horizon="0.6 s",
         more=f"outputs: [{', '.join(names)}]",
@@ -238,6 +242,6 @@ def test_of_a_tyre(tmp_path: Path) -> None:
     effects = "{tyre_slip@body: {values: {J_w: 0.5 kg*m^2, C_t: 1000 N*m, l_r: 0.5 rad}}}"
     more = "outputs: [w, w_v_body]\nequations: {T_l: G * 0.2}"
     start = "{plant.w: 20 rad/s}"
-    found = ran(tmp_path, "rotor", effects, {"T": "6 N*m"}, initial=start, more=more)
+    found = run_with_effects(tmp_path, "rotor", effects, {"T": "6 N*m"}, initial=start, more=more)
     w, v = (float(np.asarray(found.signals[f"plant.{name}"])[-1]) for name in ("w", "w_v_body"))
     assert (w - v) / v == pytest.approx(float(library.tyre_slip(np.array(6.0), 1000.0)), rel=1e-5)

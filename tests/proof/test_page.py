@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from tests.proof.page import PAGE, is_of_this_method
+from tests.proof.page import PAGE, is_current
 from tests.verify.store import ROOT
 
 
 def test_a_page_that_is_published_belongs_to_the_method_as_it_is() -> None:
-    assert is_of_this_method(PAGE.read_text()) if PAGE.exists() else not _claims()
+    assert is_current(PAGE.read_text()) if PAGE.exists() else not _claims()
 
 
 def _claims() -> list[str]:

@@ -53,7 +53,7 @@ def cases() -> list[Case]:
     return [Case(path) for path in found if ".repaired" not in path.suffixes]
 
 
-def beside(case: Case) -> set[str]:
+def unrelated_warnings(case: Case) -> set[str]:
     """Return the warnings that a case is not about: its neighbour may have them too."""
     return {"unused", "unwritten"} - {problem.kind for problem in problems_of(case.path)}
 
@@ -94,12 +94,12 @@ def run_command(words: Sequence[str]) -> None:
             raise ValueError(f"a case does not run `{command}`")
 
 
-def errors(problems: Sequence[Problem]) -> list[str]:
+def error_labels(problems: Sequence[Problem]) -> list[str]:
     """Return kind, place and label of the errors, for messages of tests."""
     return [f"{p.kind} {p.span}: {p.label}" for p in problems if p.severity == "error"]
 
 
-def repairs(problems: Sequence[Problem]) -> Iterator[tuple[Problem, str]]:
+def find_repairs(problems: Sequence[Problem]) -> Iterator[tuple[Problem, str]]:
     """Yield the problems whose help gives the text to write, and that text."""
     for problem in problems:
         for pattern in REPAIRS:
@@ -108,7 +108,7 @@ def repairs(problems: Sequence[Problem]) -> Iterator[tuple[Problem, str]]:
                 yield problem, match.group(1)
 
 
-def with_repairs(text: str, found: Sequence[tuple[Problem, str]]) -> str:
+def apply_repairs(text: str, found: Sequence[tuple[Problem, str]]) -> str:
     """Return a text with the repairs made, those at the end of a line first."""
     lines = text.split("\n")
     for problem, wanted in sorted(found, key=lambda item: -item[0].span.column):

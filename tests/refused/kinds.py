@@ -29,12 +29,12 @@ def kinds() -> dict[str, str]:
     found: dict[str, str] = {}
     for floor in FLOORS:
         for path in sorted((ROOT / floor).rglob("*.py")):
-            for kind, line in reported(path.read_text("utf-8")):
+            for kind, line in reported_kinds(path.read_text("utf-8")):
                 found.setdefault(kind, f"{path.relative_to(ROOT)}:{line}")
     return found
 
 
-def reported(text: str) -> Iterator[tuple[str, int]]:
+def reported_kinds(text: str) -> Iterator[tuple[str, int]]:
     """Yield the kinds that a source reports, with their lines; also through its own helpers."""
     tree = ast.parse(text)
     reporters = dict(REPORTERS)

@@ -122,7 +122,7 @@ def outside(folder: Path) -> Pair:
     return refused, neighbour
 
 
-MADE: dict[str, Callable[[Path], Pair]] = {
+GENERATED_CASES: dict[str, Callable[[Path], Pair]] = {
     "store": store,
     "huge": huge,
     "absent": absent,

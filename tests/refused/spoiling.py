@@ -20,7 +20,7 @@ KEYS = (
 """What stands in place of a key."""
 
 
-def spoilt(text: str, chance: random.Random) -> str:
+def spoil_spec(text: str, chance: random.Random) -> str:
     """Return a spec with one to three places spoilt, as text."""
     root = yaml.compose(text)
     for _ in range(chance.choice((1, 1, 1, 2, 3))):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.refused.kinds import kinds, reported
+from tests.refused.kinds import kinds, reported_kinds
 
 SOURCE = """
 class Check:
@@ -23,7 +23,7 @@ def refuse(span, kind):
 
 
 def test_literals_choices_and_helpers_are_seen() -> None:
-    found = {kind for kind, _ in reported(SOURCE)}
+    found = {kind for kind, _ in reported_kinds(SOURCE)}
     assert found == {"direct", "soft", "softer", "told", "refused"}
 
 

@@ -13,15 +13,15 @@ from tests.refused.book import (
     HERE,
     ROOT,
     Case,
-    beside,
+    apply_repairs,
     cases,
-    errors,
+    error_labels,
+    find_repairs,
     problems_of,
-    repairs,
-    with_repairs,
+    unrelated_warnings,
 )
 from tests.refused.kinds import kinds
-from tests.refused.made import MADE
+from tests.refused.made import GENERATED_CASES
 
 CASES = [pytest.param(case, id=case.name) for case in cases()]
 MOST_CHANGED_LINES = 8
@@ -45,7 +45,11 @@ def test_the_user_is_told_exactly_this(case: Case, update: bool) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_the_nearest_neighbour_passes(case: Case) -> None:
     assert case.repaired.is_file(), f"write {case.repaired.name}: {case.path.name}, just repaired"
-    told = [problem for problem in problems_of(case.repaired) if problem.kind not in beside(case)]
+    told = [
+        problem
+        for problem in problems_of(case.repaired)
+        if problem.kind not in unrelated_warnings(case)
+    ]
     assert not told, mw.render_all(told)
 
 
@@ -62,30 +66,30 @@ def test_a_repair_that_the_help_gives_is_one(case: Case, tmp_path: Path) -> None
     """Every "did you mean `x`?" and "write `x`:" is made; nothing else may come of it."""
     problems = problems_of(case.path)
     shown = str(case.path.relative_to(ROOT))
-    found = [(p, text) for p, text in repairs(problems) if p.span.source.name == shown]
+    found = [(p, text) for p, text in find_repairs(problems) if p.span.source.name == shown]
     if case.path.suffix != ".yaml" or not found:
         return
     (tmp_path / "data").symlink_to(ROOT / "tests" / "data")
     (tmp_path / "refused").mkdir()
     made = tmp_path / "refused" / case.path.name
-    made.write_text(with_repairs(case.path.read_text("utf-8"), found), "utf-8")
+    made.write_text(apply_repairs(case.path.read_text("utf-8"), found), "utf-8")
     others = {(p.kind, p.label) for p in problems} - {(p.kind, p.label) for p, _ in found}
-    assert {(p.kind, p.label) for p in problems_of(made)} <= others, errors(problems_of(made))
+    assert {(p.kind, p.label) for p in problems_of(made)} <= others, error_labels(problems_of(made))
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", GENERATED_CASES)
 def test_what_is_no_committed_file_is_refused_and_its_neighbour_passes(
     name: str, tmp_path: Path
 ) -> None:
-    refused, neighbour = MADE[name](tmp_path)
-    assert errors(problems_of(refused))
+    refused, neighbour = GENERATED_CASES[name](tmp_path)
+    assert error_labels(problems_of(refused))
     assert problems_of(neighbour) == (), mw.render_all(problems_of(neighbour))
 
 
 def test_every_kind_of_problem_has_a_case(tmp_path: Path) -> None:
     """Add `tests/refused/<case>.yaml` and its neighbour for a new kind; see README.md there."""
     seen = {problem.kind for case in cases() for problem in problems_of(case.path)}
-    for name, make in MADE.items():
+    for name, make in GENERATED_CASES.items():
         folder = tmp_path / name
         folder.mkdir()
         seen |= {problem.kind for problem in problems_of(make(folder)[0])}

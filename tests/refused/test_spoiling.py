@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from modewright.checking import checked, errors_first
+from modewright.checking import check_spec, check_without_proofs
 from tests.refused.book import ROOT, cases
-from tests.refused.spoiling import spoilt
+from tests.refused.spoiling import spoil_spec
 
 SMALL = 2500
 """Most characters of a spec that is spoilt, so that many are."""
@@ -48,7 +48,7 @@ measures: {loss: {time: plant.no_contact}}
 def test_what_is_unknown_is_told_once(text: str, kinds: set[str]) -> None:
     name = text.split(":")[2].split()[0]
     path = (ROOT / "spec" / f"{name}.yaml").resolve()
-    found = checked(str(path), ROOT, {path: text}).problems
+    found = check_spec(str(path), ROOT, {path: text}).problems
     assert {problem.kind for problem in found if problem.severity == "error"} == kinds
 
 
@@ -63,9 +63,9 @@ def test_a_spoilt_spec_is_refused_with_problems(seed: int) -> None:
     chance, paths = random.Random(seed), small()
     for _ in range(RUNS):
         path = chance.choice(paths)
-        text = spoilt(path.read_text("utf-8"), chance)
+        text = spoil_spec(path.read_text("utf-8"), chance)
         try:
-            found = errors_first(str(path), ROOT, {path.resolve(): text}).problems
+            found = check_without_proofs(str(path), ROOT, {path.resolve(): text}).problems
         except Exception as defect:
             pytest.fail(f"{path.relative_to(ROOT)}: {defect!r}\n{text}")
         assert all(problem.span.source.name for problem in found)

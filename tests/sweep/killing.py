@@ -9,24 +9,32 @@ from pathlib import Path
 
 from engine.batch import Batch, BatchResult
 from sweep.block import Block
-from sweep.cluster_worker import Answer, answer
+from sweep.cluster_worker import Answer, answer_block
 from sweep.fingerprint import fingerprint
-from tests.sweep.laying import quick
+from tests.sweep.laying import quick_results
 
 
-def quickly(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
-    return answer(wanted, held, Block(start, stop), quick)
+def answer_quickly(
+    expected_fingerprint: Mapping[str, str], serialised_study: bytes, start: int, stop: int
+) -> Answer:
+    return answer_block(expected_fingerprint, serialised_study, Block(start, stop), quick_results)
 
 
-def deadly(mark: Path, wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
+def kill_worker_at_block(
+    mark: Path,
+    expected_fingerprint: Mapping[str, str],
+    serialised_study: bytes,
+    start: int,
+    stop: int,
+) -> Answer:
     """The block from 20 on ends its worker once, that from 40 on always."""
     if start == 40 or (start == 20 and not mark.exists()):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return quickly(wanted, held, start, stop)
+    return answer_quickly(expected_fingerprint, serialised_study, start, stop)
 
 
-def held_deadly(mark: Path, data: bytes) -> bytes:
+def kill_first_holder(mark: Path, data: bytes) -> bytes:
     """The first worker that is given the study ends."""
     if not mark.exists():
         mark.touch()
@@ -34,21 +42,23 @@ def held_deadly(mark: Path, data: bytes) -> bytes:
     return data
 
 
-def always_deadly(data: bytes) -> bytes:
+def kill_every_holder(data: bytes) -> bytes:
     os.kill(os.getpid(), signal.SIGKILL)
     return data
 
 
-def broken(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
+def answer_with_defect(
+    expected_fingerprint: Mapping[str, str], serialised_study: bytes, start: int, stop: int
+) -> Answer:
     def run(batch: Batch) -> BatchResult:
         raise ZeroDivisionError("of our own")
 
-    return answer(wanted, held, Block(start, stop), run)
+    return answer_block(expected_fingerprint, serialised_study, Block(start, stop), run)
 
 
-def own() -> Mapping[str, str]:
+def own_fingerprint() -> Mapping[str, str]:
     return fingerprint()
 
 
-def older() -> Mapping[str, str]:
+def older_fingerprint() -> Mapping[str, str]:
     return {**fingerprint(), "modewright": "0" * 64}

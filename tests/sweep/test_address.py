@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sweep.address import Address, address_of
+from sweep.address import Address, parse_address
 
 
 @pytest.mark.parametrize(
@@ -22,8 +22,8 @@ from sweep.address import Address, address_of
 def test_an_address_is_of_processes_here_or_of_a_scheduler(
     text: str, address: Address, is_open: bool
 ) -> None:
-    assert address_of(text) == address
-    assert address.is_open == is_open
+    assert parse_address(text) == address
+    assert address.is_unprotected == is_open
 
 
 @pytest.mark.parametrize(
@@ -31,4 +31,4 @@ def test_an_address_is_of_processes_here_or_of_a_scheduler(
 )
 def test_what_is_no_address_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no cluster: `local:4`"):
-        address_of(text)
+        parse_address(text)

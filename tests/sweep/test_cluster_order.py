@@ -14,12 +14,12 @@ from distributed.scheduler import WorkerState
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from sweep.block import Block
-from sweep.cluster import IN_FLIGHT, Cluster
+from sweep.cluster import BLOCKS_PER_THREAD, DaskExecutor
 from sweep.cluster_error import ClusterError
 from sweep.cluster_worker import Answer
 from sweep.study_run import run_study
-from tests.sweep.killing import quickly
-from tests.sweep.laying import QUICK, content, study
+from tests.sweep.killing import answer_quickly
+from tests.sweep.laying import QUICK_EXECUTOR, make_study, store_rows
 
 
 class Desk:
@@ -92,10 +92,10 @@ class Turning(queue.SimpleQueue):  # type: ignore[type-arg]
         return super().get(block=False)
 
 
-def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Cluster:
+def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> DaskExecutor:
     kind = type("Turned", (Turning,), {"desk": desk})
     monkeypatch.setattr("sweep.cluster.SimpleQueue", kind)
-    return Cluster(desk, quickly)
+    return DaskExecutor(desk, answer_quickly)
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -103,12 +103,14 @@ def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Cluster:
 def test_rows_depend_on_no_worker_no_block_size_and_no_order(
     tmp_path_factory: pytest.TempPathFactory, size: int, threads: int, seed: Any
 ) -> None:
-    made, folder = study(), tmp_path_factory.mktemp("any")
+    made, folder = make_study(), tmp_path_factory.mktemp("any")
     desk = Desk(lambda count: seed.randrange(count), threads)
     with pytest.MonkeyPatch.context() as patch:
-        found = run_study(made, folder / "there", cluster_of(desk, patch), block=size)
-    assert content(found.store) == content(run_study(made, folder / "here", QUICK).store)
-    assert desk.most <= IN_FLIGHT * threads
+        found = run_study(made, folder / "there", cluster_of(desk, patch), block_size=size)
+    assert store_rows(found.store) == store_rows(
+        run_study(made, folder / "here", QUICK_EXECUTOR).store
+    )
+    assert desk.most <= BLOCKS_PER_THREAD * threads
 
 
 def test_only_so_many_blocks_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,26 +123,28 @@ def test_only_so_many_blocks_are_under_way(monkeypatch: pytest.MonkeyPatch) -> N
             yield Block(start, start + 1)
 
     desk = Desk(lambda count: 0, threads=2)
-    for done, finished in enumerate(cluster_of(desk, monkeypatch)(study(), blocks()), start=1):
+    for done, finished in enumerate(cluster_of(desk, monkeypatch)(make_study(), blocks()), start=1):
         assert finished.file
-        assert taken <= done + IN_FLIGHT * desk.threads
+        assert taken <= done + BLOCKS_PER_THREAD * desk.threads
     assert taken == 60
 
 
 def test_a_block_is_to_blame_only_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     desk = Desk(lambda count: 0, deadly=2)
     blocks = [Block(k, k + 1) for k in range(5)]
-    found = list(cluster_of(desk, monkeypatch)(study(), blocks))
+    found = list(cluster_of(desk, monkeypatch)(make_study(), blocks))
     assert [each.block.start for each in found] == [0, 1, 3, 4, 2]
-    assert [each.lost for each in found if each.lost] == [
+    assert [each.lost_reason for each in found if each.lost_reason] == [
         "3 workers died while it was computed alone"
     ]
 
 
 def test_a_cluster_whose_workers_are_all_gone_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.cluster.LOOK", 0.0)
+    monkeypatch.setattr("sweep.cluster.POLL_INTERVAL", 0.0)
     desk = Desk(lambda count: 0, threads=0)
     with pytest.raises(ClusterError, match="no worker any more for 0 s"):
         list(
-            dataclasses.replace(cluster_of(desk, monkeypatch), patience=0.0)(study(), [Block(0, 1)])
+            dataclasses.replace(cluster_of(desk, monkeypatch), timeout=0.0)(
+                make_study(), [Block(0, 1)]
+            )
         )

@@ -16,12 +16,12 @@ import pytest
 
 from sweep import clustering
 from sweep.address import Address, Credentials
-from sweep.cluster import Cluster
+from sweep.cluster import DaskExecutor
 from sweep.cluster_error import ClusterError
-from sweep.clustering import Staff, connected
+from sweep.clustering import WorkerSetup, open_client
 from sweep.study_run import run_study
-from tests.sweep.killing import own, quickly
-from tests.sweep.laying import study
+from tests.sweep.killing import answer_quickly, own_fingerprint
+from tests.sweep.laying import make_study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 START = """
@@ -66,9 +66,9 @@ def test_a_scheduler_that_is_gone_is_told_in_one_line(
     capfd: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(clustering, "CLOSING", 1.0)
+    monkeypatch.setattr(clustering, "CLOSE_TIMEOUT", 1.0)
     with scheduler() as (process, address):
-        made = study()
+        made = make_study()
         seen: list[int] = []
 
         def hit(done: int, before: int, total: int) -> None:
@@ -79,9 +79,11 @@ def test_a_scheduler_that_is_gone_is_told_in_one_line(
         start = time.monotonic()
         with (
             pytest.raises(ClusterError) as raised,
-            connected(Address(url=address), Credentials(), Staff(own), seconds=20.0) as client,
+            open_client(
+                Address(url=address), Credentials(), WorkerSetup(own_fingerprint), timeout=20.0
+            ) as client,
         ):
-            run_study(made, tmp_path, Cluster(client, quickly, patience=2.0), 4, hit)
+            run_study(made, tmp_path, DaskExecutor(client, answer_quickly, timeout=2.0), 4, hit)
         assert re.match(told, str(raised.value)), str(raised.value)
         assert time.monotonic() - start < 60.0
         assert len(list(tmp_path.glob("blocks/0*.parquet"))) >= 3

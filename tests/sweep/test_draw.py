@@ -7,28 +7,28 @@ import pytest
 from scipy import stats
 from scipy.stats import qmc
 
-from sweep.draw import drawn_values, quantile
-from sweep.point import points_of
+from sweep.draw import draw_values, quantile
+from sweep.point import variants_of
 from sweep.study import Distribution
-from tests.sweep.laying import study
+from tests.sweep.laying import make_study
 
 SHARES = np.array([0.001, 0.25, 0.5, 0.75, 0.999])
 
 
 @pytest.mark.parametrize("method", ["random", "latin_hypercube", "sobol"])
 def test_a_block_has_the_samples_that_it_has_in_the_whole(method: str) -> None:
-    made = study("grid", ("{random: 4, seed: 3}", f"{{{method}: 64, seed: 3}}"))
-    whole = drawn_values(made, range(64))
-    assert drawn_values(made, range(13, 29)) == whole[13:29]
-    assert drawn_values(made, [40, 3, 3, 63]) == [whole[40], whole[3], whole[3], whole[63]]
+    made = make_study("grid", ("{random: 4, seed: 3}", f"{{{method}: 64, seed: 3}}"))
+    whole = draw_values(made, range(64))
+    assert draw_values(made, range(13, 29)) == whole[13:29]
+    assert draw_values(made, [40, 3, 3, 63]) == [whole[40], whole[3], whole[3], whole[63]]
     assert len({tuple(sample.values()) for sample in whole}) == 64
 
 
 def test_names_have_streams_of_their_own_and_seeds_make_others() -> None:
-    first = drawn_values(study(), [0, 1])
-    other = drawn_values(study("grid", ("seed: 3", "seed: 4")), [0, 1])
-    fewer = drawn_values(
-        study(
+    first = draw_values(make_study(), [0, 1])
+    other = draw_values(make_study("grid", ("seed: 3", "seed: 4")), [0, 1])
+    fewer = draw_values(
+        make_study(
             "grid",
             ("  inputs.push.steps.1: {normal: [0 m/s^2, 0.2 m/s^2], within: [-0.5, 0.5]}\n", ""),
         ),
@@ -39,9 +39,9 @@ def test_names_have_streams_of_their_own_and_seeds_make_others() -> None:
 
 
 def test_sequences_are_those_of_scipy() -> None:
-    made = study("grid", ("{random: 4, seed: 3}", "{sobol: 8, seed: 5}"))
+    made = make_study("grid", ("{random: 4, seed: 3}", "{sobol: 8, seed: 5}"))
     shares = qmc.Sobol(d=2, scramble=True, seed=5).random(8)[:, 0]
-    found = [sample["x_1"] for sample in drawn_values(made, range(8))]
+    found = [sample["x_1"] for sample in draw_values(made, range(8))]
     assert found == pytest.approx((0.5 + shares).tolist(), abs=1e-15)
 
 
@@ -67,21 +67,21 @@ def test_choices_come_by_their_weights() -> None:
 
 
 def test_the_last_axis_runs_fastest_and_all_see_the_same_samples() -> None:
-    made = study("grid", ("sampling:", "replicates: 2\nsampling:"))
+    made = make_study("grid", ("sampling:", "replicates: 2\nsampling:"))
     assert made.count == 5 * 3 * 4 * 2
-    points = points_of(made, 0, made.count)
+    points = variants_of(made, 0, made.count)
     assert [p.number for p in points] == list(range(120))
     assert [(p.sample, p.replicate) for p in points[:3]] == [(0, 0), (0, 1), (1, 0)]
     assert [(p.values["w"], p.values["d"]) for p in points[0:24:8]] == [
         (1.0, 0.1), (1.0, 0.2), (1.0, 0.4),
     ]  # fmt: skip
     assert {p.values["x_1"] for p in points} == {p.values["x_1"] for p in points[:8]}
-    assert points_of(made, 55, 61) == points[55:61]
+    assert variants_of(made, 55, 61) == points[55:61]
     assert [p.seed(0, 2) for p in points[:9]] == [0, 1, 2, 3, 4, 5, 6, 7, 0]
 
 
 def test_one_at_a_time_leaves_all_others_alone() -> None:
-    made = study("alone")
-    assert [p.values for p in points_of(made, 0, made.count)] == [
+    made = make_study("alone")
+    assert [p.values for p in variants_of(made, 0, made.count)] == [
         {}, {"w": 1.0}, {"w": 3.0}, {"d": 0.05}, {"d": 0.3},
     ]  # fmt: skip

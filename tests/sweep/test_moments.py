@@ -13,8 +13,8 @@ import pytest
 
 from engine.batch import Batch, BatchResult
 from modewright.show_study import summary_json
-from sweep.executor import InProcess
-from sweep.interval import of_mean, of_quantile
+from sweep.executor import SerialExecutor
+from sweep.interval import interval_of_mean, interval_of_quantile
 from sweep.moments import (
     deviation_of,
     mean_of,
@@ -22,11 +22,11 @@ from sweep.moments import (
     root_mean_square,
     total_of,
 )
-from sweep.picture import pictures
+from sweep.picture import draw_pictures
 from sweep.study_run import run_study
 from sweep.summary import summary_of
-from tests.sweep.laying import content, quick, study
-from tests.sweep.test_measuring import run, signal
+from tests.sweep.laying import make_study, quick_results, store_rows
+from tests.sweep.test_measuring import make_observation, signal
 
 ORDINARY = np.random.default_rng(2).normal(3.0, 2.0, 200)
 LARGEST = 1.7e308
@@ -57,10 +57,10 @@ def test_what_is_larger_than_any_number_is_none() -> None:
     values = np.array([LARGEST, LARGEST, -LARGEST, LARGEST])
     assert mean_of(values) == LARGEST / 2
     assert math.isnan(total_of(values[:2]))
-    assert of_mean(values, np.arange(4), 0.95) is None
-    assert of_quantile(np.tile(values, 20), np.arange(80), 0.5, 0.95) == (LARGEST, LARGEST)
+    assert interval_of_mean(values, np.arange(4), 0.95) is None
+    assert interval_of_quantile(np.tile(values, 20), np.arange(80), 0.5, 0.95) == (LARGEST, LARGEST)
     pairs = np.tile([0.5 * LARGEST, 0.4 * LARGEST], 38)  # four of them are more than any number
-    low, high = of_mean(pairs, np.arange(76) // 4, 0.95) or (0.0, 0.0)
+    low, high = interval_of_mean(pairs, np.arange(76) // 4, 0.95) or (0.0, 0.0)
     assert low == high == pytest.approx(0.45 * LARGEST)
     assert quantiles_of(values, (0.0, 0.25, 1.0)) == [-LARGEST, LARGEST / 2, LARGEST]
 
@@ -68,7 +68,7 @@ def test_what_is_larger_than_any_number_is_none() -> None:
 @pytest.mark.filterwarnings("error")
 def test_measures_of_the_largest_signals_are_finite_or_null() -> None:
     wave = LARGEST * np.sin(np.arange(0.0, 40.0, 0.25))
-    seen = run(times=np.arange(160.0) / 80.0, values=wave)  # type: ignore[arg-type]
+    seen = make_observation(times=np.arange(160.0) / 80.0, values=wave)  # type: ignore[arg-type]
     assert signal("mean", seen) == pytest.approx(math.fsum(wave / LARGEST) / 160 * LARGEST)
     assert signal("rms", seen) == pytest.approx(LARGEST * np.sqrt(np.mean((wave / LARGEST) ** 2)))
     for by in ("crossings", "spectrum"):
@@ -78,7 +78,7 @@ def test_measures_of_the_largest_signals_are_finite_or_null() -> None:
 
 def huge(batch: Batch) -> BatchResult:
     """Results of both signs, some the largest that there are, some of ordinary size."""
-    found = quick(batch)
+    found = quick_results(batch)
     for values in found.outputs.values():
         values[0::3] = LARGEST
         values[1::3] = -LARGEST
@@ -91,13 +91,13 @@ def test_a_study_of_the_largest_numbers_is_summed_up_and_drawn(tmp_path: Path) -
         ("[1 rad/s, 3 rad/s, 5]", "[1 rad/s, 2 rad/s, 3]"),
         ("[0.5 m, 1.5 m]", "[1 m, 1.0e307 m]"),
     )
-    store = run_study(study("grid", *changes), tmp_path, InProcess(huge)).store
+    store = run_study(make_study("grid", *changes), tmp_path, SerialExecutor(huge)).store
     found = summary_of(store)
     (final,) = [line for line in found.lines if line.measure == "final"]
     assert (final.count, final.low, final.high) == (36, -LARGEST, LARGEST)
     assert math.isnan(final.deviation) or math.isfinite(final.deviation)
     json.dumps(summary_json(found), allow_nan=False)
-    drawn = pictures(store)
+    drawn = draw_pictures(store)
     assert all(picture.data("svg") for picture in drawn.values())
     shown = drawn["heat"].figure.get_suptitle()
     assert re.search(r"\(36 variants, without \d\d numbers above 1e\+300\)", shown), shown
@@ -108,9 +108,9 @@ def test_an_infinite_number_in_a_store_counts_as_none(
 ) -> None:
     """As stores of before hold it: the root mean square of a signal above 1e154."""
     monkeypatch.setattr("sweep.measuring.signal_number", lambda *given: math.inf)
-    store = run_study(study("alone"), tmp_path, InProcess(quick)).store
-    assert [row["final"] for row in content(store)] == [math.inf] * 5
+    store = run_study(make_study("alone"), tmp_path, SerialExecutor(quick_results)).store
+    assert [row["final"] for row in store_rows(store)] == [math.inf] * 5
     found = summary_of(store)
     assert found.lines[0].count == 0
     json.dumps(summary_json(found), allow_nan=False)
-    assert pictures(store)["matters"].data("svg")
+    assert draw_pictures(store)["matters"].data("svg")

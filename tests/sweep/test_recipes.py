@@ -9,7 +9,7 @@ import duckdb
 import pytest
 
 from sweep.study_run import run_study
-from tests.sweep.laying import QUICK, study
+from tests.sweep.laying import QUICK_EXECUTOR, make_study
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "studies.md"
 NAMES = {
@@ -21,10 +21,10 @@ NAMES = {
 def test_every_recipe_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("tip_out", "other"):
-        run_study(study(), tmp_path / "build" / name, QUICK, block=7)
+        run_study(make_study(), tmp_path / "build" / name, QUICK_EXECUTOR, block_size=7)
     matched = "seen: {match: below, truth: below, before: 100 ms}"
-    made = study("grid", ("twice: {value: 2 * t_1}", matched))
-    run_study(made, tmp_path / "build" / "lists", QUICK)
+    made = make_study("grid", ("twice: {value: 2 * t_1}", matched))
+    run_study(made, tmp_path / "build" / "lists", QUICK_EXECUTOR)
     (text,) = re.findall(r"```sql\n(.*?)```", PAGE.read_text(), re.DOTALL)
     found = []
     for recipe in text.strip().split("\n\n"):

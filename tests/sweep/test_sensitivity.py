@@ -10,9 +10,9 @@ import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
 from language.problem import SpecError
-from sweep.design import STRIDE, morris_shares
-from sweep.draw import drawn_values
-from sweep.moments import scaled
+from sweep.design import STRIDE, morris_points
+from sweep.draw import draw_values
+from sweep.moments import scale_to_squarable
 from sweep.sensitivity import (
     Index,
     elementary_effects,
@@ -21,10 +21,10 @@ from sweep.sensitivity import (
     sobol_indices,
 )
 from sweep.store import read_store
-from sweep.study import LEVELS, Study
+from sweep.study import MORRIS_LEVELS, Study
 from sweep.study_run import run_study
 from sweep.table import Reals
-from tests.sweep.laying import QUICK, Backwards, content, study
+from tests.sweep.laying import QUICK_EXECUTOR, ReversedExecutor, make_study, store_rows
 
 A, B = 7.0, 0.1
 DRAWN = "  x_1: {uniform: [0.5 m, 1.5 m]}"
@@ -32,7 +32,7 @@ RANDOM = "sampling: {random: 4, seed: 3}"
 
 
 def designed(method: str) -> Study:
-    return study("grid", (RANDOM, f"sampling: {{{method}, seed: 3}}"))
+    return make_study("grid", (RANDOM, f"sampling: {{{method}, seed: 3}}"))
 
 
 def ishigami(shares: Reals) -> Reals:
@@ -76,15 +76,15 @@ def test_indices_are_those_of_salib() -> None:
 
 
 def test_elementary_effects_are_those_of_salib() -> None:
-    shares = morris_shares(3, np.arange(4 * 40), 5)
+    shares = morris_points(3, np.arange(4 * 40), 5)
     assert set(np.unique(shares)) == {0.125, 0.375, 0.625, 0.875}
     results = ishigami(shares)
     effects = elementary_effects(results.reshape(40, 4), shares.reshape(40, 4, 3))
     ours = morris_indices(effects)
     problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
-    levels = (shares * LEVELS - 0.5) / (LEVELS - 1)
-    theirs = salib_morris.analyze(problem, levels, results, num_levels=LEVELS)
-    scale = (LEVELS / (2 * (LEVELS - 1))) / (STRIDE / LEVELS)
+    levels = (shares * MORRIS_LEVELS - 0.5) / (MORRIS_LEVELS - 1)
+    theirs = salib_morris.analyze(problem, levels, results, num_levels=MORRIS_LEVELS)
+    scale = (MORRIS_LEVELS / (2 * (MORRIS_LEVELS - 1))) / (STRIDE / MORRIS_LEVELS)
     for name in ("mu_star", "mu", "sigma"):
         assert ours[name] == pytest.approx(scale * np.asarray(theirs[name], float), rel=1e-9)
 
@@ -93,15 +93,15 @@ def test_a_point_of_a_design_follows_from_its_number_alone() -> None:
     for method, count in (("saltelli: 8", 8 * 4), ("morris: 6", 6 * 3)):
         made = designed(method)
         assert made.sampling.count == count
-        whole = drawn_values(made, range(count))
-        alone = [drawn_values(made, [k])[0] for k in range(count)]
+        whole = draw_values(made, range(count))
+        alone = [draw_values(made, [k])[0] for k in range(count)]
         assert whole == alone
 
 
 def test_indices_are_made_from_a_store_of_each_point_of_the_grid(tmp_path: Path) -> None:
     made = designed("saltelli: 4")
-    run_study(made, tmp_path / "a", Backwards(), block=7)
-    assert len(content(read_store(tmp_path / "a"))) == made.count == 15 * 16
+    run_study(made, tmp_path / "a", ReversedExecutor(), block_size=7)
+    assert len(store_rows(read_store(tmp_path / "a"))) == made.count == 15 * 16
     found = sensitivity_of(read_store(tmp_path / "a"))
     assert (found.method, len(found.indices)) == ("saltelli", 15 * 2 * 6)
     some = [i for i in found.indices if i.measure == "final"]
@@ -112,7 +112,7 @@ def test_indices_are_made_from_a_store_of_each_point_of_the_grid(tmp_path: Path)
 
 
 def test_points_that_are_no_design_have_no_indices(tmp_path: Path) -> None:
-    run_study(study(), tmp_path, QUICK)
+    run_study(make_study(), tmp_path, QUICK_EXECUTOR)
     with pytest.raises(SpecError, match="no design of which indices are made"):
         sensitivity_of(read_store(tmp_path))
 
@@ -124,8 +124,8 @@ DRAWN_IDLE = ("  inputs.push", "  idle: {uniform: [0 m, 1 m]}\n  inputs.push")
 
 def indices_of(folder: Path, design: str, *changes: tuple[str, str]) -> dict[str, Index]:
     """Return those of `final` at the first point of the grid, by name: half of a sum with noise."""
-    made = study("grid", (RANDOM, f"sampling: {{{design}, seed: 3}}"), *changes)
-    run_study(made, folder, QUICK)
+    made = make_study("grid", (RANDOM, f"sampling: {{{design}, seed: 3}}"), *changes)
+    run_study(made, folder, QUICK_EXECUTOR)
     found = sensitivity_of(read_store(folder)).indices
     group = found[0].group
     return {i.name: i for i in found if i.group == group and i.measure == "final"}
@@ -142,7 +142,7 @@ def test_a_step_that_draws_the_same_value_again_has_no_effect(tmp_path: Path) ->
         CHOSEN[1].replace("[1, 9]", "[1, 3]"),
     )  # one level of four: half of all steps
     found = indices_of(tmp_path / "b", "morris: 20", even)
-    shares = morris_shares(2, np.arange(60), 3).reshape(20, 3, 2)
+    shares = morris_points(2, np.arange(60), 3).reshape(20, 3, 2)
     changed = (shares[:, :, 0].min(axis=1) < 0.25).mean()
     assert 0.2 < changed < 0.8
     assert found["x_1"].values["mu_star"] == pytest.approx(changed * (19.0 / 2.0) / 0.5)
@@ -155,7 +155,7 @@ def test_what_has_no_influence_is_not_blamed_for_noise(design: str, tmp_path: Pa
     found = indices_of(tmp_path, design, IDLE, DRAWN_IDLE)["idle"]
     assert set(found.values.values()) == {0.0}
     assert all(interval == (0.0, 0.0) for interval in found.intervals.values())
-    rows = content(read_store(tmp_path))
+    rows = store_rows(read_store(tmp_path))
     each = 4 if "morris" in design else 5
     seeds = {(row["sample"] // each, row["seed"]) for row in rows}  # type: ignore[operator]
     assert len(seeds) == 16 == len({seed for _, seed in seeds})
@@ -166,7 +166,7 @@ def test_replicates_of_a_point_have_noise_of_their_own_and_all_of_them_count(
 ) -> None:
     found = indices_of(tmp_path, "morris: 5", ("set:", "replicates: 3\nset:"))
     assert all(i.used == i.count == 5 for i in found.values())
-    rows = content(read_store(tmp_path))
+    rows = store_rows(read_store(tmp_path))
     seeds = {(r["sample"] // 3, r["replicate"], r["seed"]) for r in rows}  # type: ignore[operator]
     assert len(seeds) == 15
     assert {seed for _, _, seed in seeds} == set(range(15))
@@ -175,7 +175,10 @@ def test_replicates_of_a_point_have_noise_of_their_own_and_all_of_them_count(
 def test_indices_of_the_largest_numbers_are_told(recwarn: pytest.WarningsRecorder) -> None:
     """Shares of a variance have no unit: those of a measure of 1e300 are those of one of 1."""
     results = np.random.default_rng(1).normal(size=(64, 4))
-    plain, large = sobol_indices(scaled(results)[0]), sobol_indices(scaled(1.0e300 * results)[0])
+    plain, large = (
+        sobol_indices(scale_to_squarable(results)[0]),
+        sobol_indices(scale_to_squarable(1.0e300 * results)[0]),
+    )
     for name in plain:
         np.testing.assert_allclose(large[name], plain[name], rtol=1e-12)
     assert not recwarn.list

@@ -9,7 +9,7 @@ import pytest
 
 from language.problem import Problems, SpecError
 from sweep.shape import log_spaced
-from tests.sweep.laying import study
+from tests.sweep.laying import make_study
 
 AXIS, DRAWN = "[0.1 1/s, 0.2 1/s, 0.4 1/s]", "{uniform: [0.5 m, 1.5 m]}"
 
@@ -44,18 +44,18 @@ def test_an_ordinary_axis_has_the_bits_of_powers() -> None:
 )
 def test_a_distribution_that_cannot_be_drawn_from_is_refused(drawn: str, told: str) -> None:
     with pytest.raises(SpecError, match=told):
-        study("grid", (DRAWN, drawn))
+        make_study("grid", (DRAWN, drawn))
 
 
 def test_a_tail_that_has_digits_is_drawn_from() -> None:
-    study("grid", (DRAWN, "{normal: [0 m, 1 m], within: [-9, -8]}"))
-    study("grid", (DRAWN, "{lognormal: [1 m, 1], within: [-2, 2]}"))
+    make_study("grid", (DRAWN, "{normal: [0 m, 1 m], within: [-9, -8]}"))
+    make_study("grid", (DRAWN, "{lognormal: [1 m, 1], within: [-2, 2]}"))
 
 
 def test_a_picture_of_no_measure_or_of_two_is_refused() -> None:
     for of in ("[]", "[peak, t_1]"):
         with pytest.raises(SpecError, match="a `tornado` is of one measure"):
-            study("grid", ("{tornado: peak}", f"{{tornado: {of}}}"))
+            make_study("grid", ("{tornado: peak}", f"{{tornado: {of}}}"))
 
 
 @pytest.mark.parametrize(
@@ -69,16 +69,16 @@ def test_a_picture_of_no_measure_or_of_two_is_refused() -> None:
 )
 def test_values_that_no_path_draws_are_told(drawn: str, words: str) -> None:
     problems = Problems()
-    study("grid", (DRAWN, drawn), ("{random: 4, seed: 3}", "{morris: 4}"), problems=problems)
-    assert [words in one.label for one in problems.found] == ([True] if words else [])
+    make_study("grid", (DRAWN, drawn), ("{random: 4, seed: 3}", "{morris: 4}"), problems=problems)
+    assert [words in one.label for one in problems.reported] == ([True] if words else [])
 
 
 def test_a_value_that_cannot_be_read_does_not_stand_in_the_list_twice() -> None:
     with pytest.raises(SpecError) as refused:
-        study("grid", (AXIS, "[0 1/s, 1e200 1/s, 1e201 1/s]"))
+        make_study("grid", (AXIS, "[0 1/s, 1e200 1/s, 1e201 1/s]"))
     assert [one.kind for one in refused.value.problems if one.kind == "duplicate"] == []
 
 
 def test_a_confidence_next_to_1_is_refused() -> None:
     with pytest.raises(SpecError, match=r"`confidence` is a share from 0\.5 to 0\.999999"):
-        study("grid", ("plots:", "summary: {confidence: 0.9999999999999999}\nplots:"))
+        make_study("grid", ("plots:", "summary: {confidence: 0.9999999999999999}\nplots:"))

@@ -14,11 +14,11 @@ import pyarrow.parquet
 import pytest
 
 from language.problem import SpecError
-from sweep.manifest import MANIFEST, seal_of
+from sweep.manifest import MANIFEST_NAME, seal_of
 from sweep.rows_file import fault_of
 from sweep.store import Store, read_store
 from sweep.study_run import run_study
-from tests.sweep.laying import QUICK, study
+from tests.sweep.laying import QUICK_EXECUTOR, make_study
 from tests.sweep.test_study_run import bytes_of
 
 Change = Callable[[dict[str, Any]], object]
@@ -27,7 +27,7 @@ Change = Callable[[dict[str, Any]], object]
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("kept") / "out"
-    run_study(study(), folder, QUICK, block=10)
+    run_study(make_study(), folder, QUICK_EXECUTOR, block_size=10)
     return folder
 
 
@@ -38,10 +38,10 @@ def out(kept: Path, tmp_path: Path) -> Path:
 
 def edited(folder: Path, change: Change) -> None:
     """Change the manifest of a store, as if that had been written."""
-    data = json.loads((folder / MANIFEST).read_text())
+    data = json.loads((folder / MANIFEST_NAME).read_text())
     change(data)
     data["seal"] = seal_of(data)
-    (folder / MANIFEST).write_text(json.dumps(data))
+    (folder / MANIFEST_NAME).write_text(json.dumps(data))
 
 
 # The manifest.
@@ -49,12 +49,12 @@ def edited(folder: Path, change: Change) -> None:
 
 def test_any_change_of_the_manifest_is_refused_and_nothing_is_removed(out: Path) -> None:
     before = bytes_of(out)
-    text = (out / MANIFEST).read_text()
+    text = (out / MANIFEST_NAME).read_text()
     for old, new in (('"block": 10', '"block": 20'), ('"unit": "m"', '"unit": "mm"')):
         assert old in text
-        (out / MANIFEST).write_text(text.replace(old, new))
+        (out / MANIFEST_NAME).write_text(text.replace(old, new))
         with pytest.raises(SpecError, match=r"`study\.json` cannot be read: it is not as it was"):
-            run_study(study(), out, QUICK)
+            run_study(make_study(), out, QUICK_EXECUTOR)
         with pytest.raises(SpecError, match="cannot be read"):
             read_store(out)
         assert bytes_of(out) == before
@@ -106,7 +106,7 @@ def test_each_part_of_the_manifest_is_checked(change: Change, told: str, out: Pa
     before = bytes_of(out)
     edited(out, change)
     with pytest.raises(SpecError, match=told):
-        run_study(study(), out, QUICK)
+        run_study(make_study(), out, QUICK_EXECUTOR)
     with pytest.raises(SpecError, match=told):
         read_store(out)
     assert bytes_of(out) == before
@@ -133,12 +133,12 @@ def test_other_columns_than_those_of_the_blocks_are_told(out: Path) -> None:
 def test_a_manifest_of_before_there_were_seals_is_refused(
     change: Change, told: str, out: Path
 ) -> None:
-    data = json.loads((out / MANIFEST).read_text())
+    data = json.loads((out / MANIFEST_NAME).read_text())
     change(data)
-    (out / MANIFEST).write_text(json.dumps(data))
+    (out / MANIFEST_NAME).write_text(json.dumps(data))
     before = bytes_of(out)
     with pytest.raises(SpecError, match=told):
-        run_study(study(), out, QUICK)
+        run_study(make_study(), out, QUICK_EXECUTOR)
     assert bytes_of(out) == before
 
 
@@ -146,7 +146,7 @@ def test_blocks_that_a_manifest_does_not_have_are_refused(out: Path) -> None:
     edited(out, lambda data: data.update(block=12))
     before = bytes_of(out)
     with pytest.raises(SpecError, match="no block of the results"):
-        run_study(study(), out, QUICK)
+        run_study(make_study(), out, QUICK_EXECUTOR)
     assert bytes_of(out) == before
 
 
@@ -171,8 +171,8 @@ def test_a_block_with_a_corrupt_body_is_told_and_computed_again(out: Path) -> No
     with pytest.raises(SpecError, match=rf"{path.name}:1:1: this block is damaged"):
         read_store(out)
     told: list[str] = []
-    again = run_study(study(), out, QUICK, warn=told.append)
-    assert (again.before, again.computed) == (50, 10)
+    again = run_study(make_study(), out, QUICK_EXECUTOR, warn=told.append)
+    assert (again.reused, again.computed) == (50, 10)
     assert told == [f"{path} is damaged: its variants are computed again"]
     assert bytes_of(out) == before
 
@@ -189,11 +189,16 @@ def test_a_block_without_a_digest_is_damaged(out: Path) -> None:
 def test_blocks_of_another_study_are_refused_and_left_where_they_are(
     out: Path, tmp_path: Path
 ) -> None:
-    other = run_study(study("grid", ("seed: 3", "seed: 4")), tmp_path / "other", QUICK, block=12)
+    other = run_study(
+        make_study("grid", ("seed: 3", "seed: 4")),
+        tmp_path / "other",
+        QUICK_EXECUTOR,
+        block_size=12,
+    )
     for path in other.store.paths():
         shutil.copy(path, out / "blocks")
     before = bytes_of(out)
-    for attempt in (lambda: read_store(out), lambda: run_study(study(), out, QUICK)):
+    for attempt in (lambda: read_store(out), lambda: run_study(make_study(), out, QUICK_EXECUTOR)):
         with pytest.raises(SpecError, match="no block of the results of `grid` here") as raised:
             attempt()
         assert len(raised.value.problems) == 5
@@ -213,12 +218,12 @@ def test_results_without_their_blocks_are_told_and_made_again(out: Path) -> None
     shutil.rmtree(out / "blocks")
     with pytest.raises(SpecError, match="the folder `blocks` is missing"):
         read_store(out)
-    assert run_study(study(), out, QUICK).computed == 60
+    assert run_study(make_study(), out, QUICK_EXECUTOR).computed == 60
     assert bytes_of(out) == before
 
 
 def test_a_folder_that_is_refused_keeps_no_lock(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
     with pytest.raises(SpecError, match="something else"):
-        run_study(study(), tmp_path, QUICK)
+        run_study(make_study(), tmp_path, QUICK_EXECUTOR)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]

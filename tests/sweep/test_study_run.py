@@ -19,18 +19,24 @@ import numpy as np
 import pytest
 
 from engine.batch import Batch, BatchResult
-from engine.variants import run_variants
+from engine.variants import run_interpreted_batch
 from language.problem import SpecError
 from sweep.block import Block, Row
-from sweep.executor import Finished, InProcess
+from sweep.executor import BlockResult, SerialExecutor
 from sweep.manifest import Manifest, manifest_of
-from sweep.measure import Column
-from sweep.processes import MOST_DEATHS, Processes
-from sweep.store import Store, locked, open_store, read_store
+from sweep.measure import StoreColumn
+from sweep.processes import MAX_DEATHS, ProcessExecutor
+from sweep.store import Store, lock_folder, open_store, read_store
 from sweep.study import Presentation as Shown, Study
-from sweep.study_run import fill, run_study
+from sweep.study_run import fill_store, run_study
 from sweep.summary import summary_of
-from tests.sweep.laying import QUICK, Backwards, content, quick, study
+from tests.sweep.laying import (
+    QUICK_EXECUTOR,
+    ReversedExecutor,
+    make_study,
+    quick_results,
+    store_rows,
+)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork of POSIX")
 
@@ -40,81 +46,81 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 def test_results_do_not_depend_on_block_size_or_order(tmp_path: Path) -> None:
-    made = study()
-    whole = run_study(made, tmp_path / "whole", QUICK)
-    assert (whole.before, whole.computed) == (0, 60)
-    rows = content(whole.store)
+    made = make_study()
+    whole = run_study(made, tmp_path / "whole", QUICK_EXECUTOR)
+    assert (whole.reused, whole.computed) == (0, 60)
+    rows = store_rows(whole.store)
     assert [row["number"] for row in rows] == list(range(60))
     for name, size in (("sevens", 7), ("one", 60)):
-        parts = run_study(made, tmp_path / name, Backwards(), block=size)
-        assert content(parts.store) == rows
-    backwards = run_study(made, tmp_path / "backwards", Backwards())
+        parts = run_study(made, tmp_path / name, ReversedExecutor(), block_size=size)
+        assert store_rows(parts.store) == rows
+    backwards = run_study(made, tmp_path / "backwards", ReversedExecutor())
     assert bytes_of(backwards.store.folder) == bytes_of(whole.store.folder)
 
 
 def test_a_finished_study_is_not_computed_again(tmp_path: Path) -> None:
-    made = study()
-    run_study(made, tmp_path, QUICK)
+    made = make_study()
+    run_study(made, tmp_path, QUICK_EXECUTOR)
     before = bytes_of(tmp_path)
-    again = run_study(made, tmp_path, InProcess(lambda batch: pytest.fail("computed again")))
-    assert (again.before, again.computed) == (60, 0)
+    again = run_study(made, tmp_path, SerialExecutor(lambda batch: pytest.fail("computed again")))
+    assert (again.reused, again.computed) == (60, 0)
     assert bytes_of(tmp_path) == before
 
 
 def test_another_state_of_the_study_is_refused_and_what_changed_is_named(tmp_path: Path) -> None:
-    run_study(study(), tmp_path, QUICK)
+    run_study(make_study(), tmp_path, QUICK_EXECUTOR)
     with pytest.raises(SpecError, match="sampling changed"):
-        run_study(study("grid", ("seed: 3", "seed: 4")), tmp_path, QUICK)
-    shown = study("grid", ("{histogram: t_1, by: d}", "{histogram: peak}"))
-    assert run_study(shown, tmp_path, QUICK).computed == 0
+        run_study(make_study("grid", ("seed: 3", "seed: 4")), tmp_path, QUICK_EXECUTOR)
+    shown = make_study("grid", ("{histogram: t_1, by: d}", "{histogram: peak}"))
+    assert run_study(shown, tmp_path, QUICK_EXECUTOR).computed == 0
     assert read_store(tmp_path).manifest.presentation.plots["spread"]["of"] == ["peak"]
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
     with pytest.raises(SpecError, match="something else"):
-        run_study(study(), tmp_path, QUICK)
+        run_study(make_study(), tmp_path, QUICK_EXECUTOR)
     assert {path.name for path in tmp_path.iterdir()} <= {"thesis.tex", ".lock"}
     with pytest.raises(SpecError, match="no results"):
         read_store(tmp_path)
 
 
 def test_a_damaged_block_is_computed_again(tmp_path: Path) -> None:
-    made = study()
-    run_study(made, tmp_path, QUICK, block=10)
+    made = make_study()
+    run_study(made, tmp_path, QUICK_EXECUTOR, block_size=10)
     before = bytes_of(tmp_path)
     names = list(before)
     (tmp_path / "blocks" / names[1]).write_bytes(before[names[1]][:-20])
     (tmp_path / "blocks" / names[3]).write_bytes(b"")
     (tmp_path / "blocks" / names[4]).rename(tmp_path / "blocks" / names[2])
-    again = run_study(made, tmp_path, QUICK)
+    again = run_study(made, tmp_path, QUICK_EXECUTOR)
     assert again.computed == 40
     assert bytes_of(tmp_path) == before
 
 
 def test_two_processes_do_not_write_into_one_folder(tmp_path: Path) -> None:
-    made = study()
-    with locked(tmp_path), pytest.raises(SpecError, match="another process"):
-        run_study(made, tmp_path, QUICK)
+    made = make_study()
+    with lock_folder(tmp_path), pytest.raises(SpecError, match="another process"):
+        run_study(made, tmp_path, QUICK_EXECUTOR)
 
 
 def slow(batch: Batch) -> BatchResult:
     time.sleep(0.01)
-    return quick(batch)
+    return quick_results(batch)
 
 
 def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
     tmp_path: Path,
 ) -> None:
     """kill -9 of what computes and writes; 20 times through the command line: tests/verify."""
-    made = study()
-    run_study(made, tmp_path / "undisturbed", QUICK, block=2)
+    made = make_study()
+    run_study(made, tmp_path / "undisturbed", QUICK_EXECUTOR, block_size=2)
     random = np.random.default_rng(4)
     done = [0]
     for _ in range(3):
         child = os.fork()
         if child == 0:
-            run_study(made, tmp_path / "killed", InProcess(slow), block=2)
+            run_study(made, tmp_path / "killed", SerialExecutor(slow), block_size=2)
             os._exit(0)
         while len(list((tmp_path / "killed").glob("blocks/0*.parquet"))) <= done[-1]:
             time.sleep(0.001)
@@ -124,20 +130,20 @@ def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
         done.append(len(read_store(tmp_path / "killed").paths()))
     assert done == sorted(set(done))
     assert done[-1] < 30, done
-    last = run_study(made, tmp_path / "killed", QUICK)
-    assert last.before == 2 * done[-1]
+    last = run_study(made, tmp_path / "killed", QUICK_EXECUTOR)
+    assert last.reused == 2 * done[-1]
     assert bytes_of(tmp_path / "killed") == bytes_of(tmp_path / "undisturbed")
 
 
 def test_a_full_disk_ends_the_run_and_what_is_finished_is_kept(tmp_path: Path) -> None:
     """Files may have no more bytes: the write itself fails in the middle, as on a full disk."""
-    made = study()
-    run_study(made, tmp_path / "undisturbed", QUICK, block=10)
+    made = make_study()
+    run_study(made, tmp_path / "undisturbed", QUICK_EXECUTOR, block_size=10)
     store = open_store(tmp_path / "full", manifest_of(made, 10))
     size = min(len(data) for data in bytes_of(tmp_path / "undisturbed").values())
 
-    def filling(study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
-        for number, finished in enumerate(QUICK(study, blocks)):
+    def filling(study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
+        for number, finished in enumerate(QUICK_EXECUTOR(study, blocks)):
             if number == 3:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, limits[1]))
             yield finished
@@ -152,7 +158,7 @@ def test_a_full_disk_ends_the_run_and_what_is_finished_is_kept(tmp_path: Path) -
         signal.signal(signal.SIGXFSZ, old)
     assert len(store.paths()) == 3
     assert [path.name for path in store.folder.rglob("*.part")] == []
-    assert run_study(made, tmp_path / "full", QUICK).before == 30
+    assert run_study(made, tmp_path / "full", QUICK_EXECUTOR).reused == 30
     assert bytes_of(tmp_path / "full") == bytes_of(tmp_path / "undisturbed")
 
 
@@ -164,16 +170,16 @@ def test_on_a_small_disk_a_study_goes_on_when_there_is_room(tmp_path: Path) -> N
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
         return
     try:
-        made = study()
-        run_study(made, tmp_path / "undisturbed", QUICK, block=2)
+        made = make_study()
+        run_study(made, tmp_path / "undisturbed", QUICK_EXECUTOR, block_size=2)
         with pytest.raises(OSError) as raised:
-            run_study(made, disk / "out", QUICK, block=2)
+            run_study(made, disk / "out", QUICK_EXECUTOR, block_size=2)
         assert raised.value.errno == errno.ENOSPC
         there = read_store(disk / "out").paths()
         assert 0 < len(there) < 30
         assert list(disk.rglob("*.part")) == []
         subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
-        assert run_study(made, disk / "out", QUICK).before == 2 * len(there)
+        assert run_study(made, disk / "out", QUICK_EXECUTOR).reused == 2 * len(there)
         assert bytes_of(disk / "out") == bytes_of(tmp_path / "undisturbed")
     finally:
         subprocess.run(["umount", str(disk)], check=True)
@@ -200,34 +206,34 @@ serve(run)
 
 def test_a_dead_worker_is_replaced_and_what_ends_every_worker_is_left_out(tmp_path: Path) -> None:
     """The first block that is computed kills its worker once, the block of 12 variants always."""
-    made = study()
+    made = make_study()
     command = [sys.executable, "-c", WORKER, str(tmp_path / "mark")]
-    run_study(made, tmp_path / "undisturbed", QUICK, block=16)
-    found = run_study(made, tmp_path / "workers", Processes(2, command), block=16)
+    run_study(made, tmp_path / "undisturbed", QUICK_EXECUTOR, block_size=16)
+    found = run_study(made, tmp_path / "workers", ProcessExecutor(2, command), block_size=16)
     assert (tmp_path / "mark").exists()
-    assert [block.start for block, _ in found.lost] == [48]
-    assert f"{MOST_DEATHS} worker processes" in found.lost[0][1]
+    assert [block.start for block, _ in found.lost_blocks] == [48]
+    assert f"{MAX_DEATHS} worker processes" in found.lost_blocks[0][1]
     assert found.computed == 48
-    again = run_study(made, tmp_path / "workers", QUICK)
-    assert (again.before, again.computed) == (48, 12)
+    again = run_study(made, tmp_path / "workers", QUICK_EXECUTOR)
+    assert (again.reused, again.computed) == (48, 12)
     assert bytes_of(tmp_path / "workers") == bytes_of(tmp_path / "undisturbed")
 
 
 def test_real_workers_give_the_bits_of_this_process(tmp_path: Path) -> None:
-    from modewright.studies import WORKER as COMMAND
+    from modewright.studies import WORKER_COMMAND as COMMAND
 
-    made = study("alone")
-    alone = run_study(made, tmp_path / "alone", InProcess(run_variants), block=2)
-    run_study(made, tmp_path / "worker", Processes(1, COMMAND), block=2)
+    made = make_study("alone")
+    alone = run_study(made, tmp_path / "alone", SerialExecutor(run_interpreted_batch), block_size=2)
+    run_study(made, tmp_path / "worker", ProcessExecutor(1, COMMAND), block_size=2)
     assert bytes_of(tmp_path / "worker") == bytes_of(tmp_path / "alone")
-    rows = content(alone.store)
+    rows = store_rows(alone.store)
     assert [row["status"] for row in rows] == ["done"] * 5
     assert len({json.dumps(row["final"]) for row in rows}) == 5
 
 
 def test_what_cannot_be_simulated_is_a_value_of_its_row(tmp_path: Path) -> None:
-    found = run_study(study("failing_ways"), tmp_path, InProcess(run_variants))
-    rows = content(Store(tmp_path, found.store.manifest))
+    found = run_study(make_study("failing_ways"), tmp_path, SerialExecutor(run_interpreted_batch))
+    rows = store_rows(Store(tmp_path, found.store.manifest))
     told = {row["k_now"]: (row["status"], row["message"]) for row in rows}
     assert told[0.0] == ("done", "")
     assert told[1.0][0] == "stopped" and "fire for ever" in str(told[1.0][1])
@@ -241,18 +247,20 @@ def test_what_cannot_be_simulated_is_a_value_of_its_row(tmp_path: Path) -> None:
 
 def test_a_store_holds_any_work_that_comes_in_blocks(tmp_path: Path) -> None:
     """As the proof of the diagnosis does: rows of its own, texts too."""
-    of = Manifest("proof", "0" * 64, {}, 5, 2, (), {}, (Column("named", "text", "1"),), Shown())
+    of = Manifest(
+        "proof", "0" * 64, {}, 5, 2, (), {}, (StoreColumn("named", "text", "1"),), Shown()
+    )
 
-    def compute(blocks: Iterable[Block]) -> Iterator[Finished]:
+    def compute(blocks: Iterable[Block]) -> Iterator[BlockResult]:
         for block in blocks:
             numbers = range(block.start, block.stop)
             rows = [
                 Row(n, "", "", n, 0, 0, {}, "done", "", {"named": f"case {n}"}) for n in numbers
             ]
-            yield Finished(block, rows)
+            yield BlockResult(block, rows)
 
-    fill(of, tmp_path, lambda blocks: itertools.islice(compute(blocks), 1))
-    found = fill(of, tmp_path, compute)
-    assert (found.before, found.computed) == (2, 3)
-    assert [row["named"] for row in content(found.store)] == [f"case {n}" for n in range(5)]
+    fill_store(of, tmp_path, lambda blocks: itertools.islice(compute(blocks), 1))
+    found = fill_store(of, tmp_path, compute)
+    assert (found.reused, found.computed) == (2, 3)
+    assert [row["named"] for row in store_rows(found.store)] == [f"case {n}" for n in range(5)]
     assert summary_of(found.store).counts == {"done": 5}

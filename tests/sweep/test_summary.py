@@ -14,26 +14,28 @@ from matplotlib.patches import Rectangle
 
 from engine.batch import Batch, BatchResult
 from modewright import show_study
-from sweep.bins import MOST_BINS, bin_ends
-from sweep.executor import InProcess
-from sweep.interval import wilson
-from sweep.picture import _binned, pictures, rank_correlation
+from sweep.bins import MAX_BINS, histogram_bin_edges
+from sweep.executor import SerialExecutor
+from sweep.interval import wilson_interval
+from sweep.picture import _assign_bins, draw_pictures, rank_correlation
 from sweep.store import Store
 from sweep.study_run import run_study
 from sweep.summary import Summary, summary_of
-from tests.sweep.laying import QUICK, content, quick, study
+from tests.sweep.laying import QUICK_EXECUTOR, make_study, quick_results, store_rows
 
 
 def faulty(batch: Batch) -> BatchResult:
     """Results in which the variants with the largest `w` have a fault bit."""
-    found = quick(batch)
+    found = quick_results(batch)
     for place in np.flatnonzero(batch.parameters["oscillator.w"] > 2.6).tolist():
         found.faults[place] = ("oscillator: stuck",)  # type: ignore[index]
     return found
 
 
 def store_of(folder: Path, *changes: tuple[str, str]) -> Store:
-    return run_study(study("grid", *changes), folder, InProcess(faulty), block=13).store
+    return run_study(
+        make_study("grid", *changes), folder, SerialExecutor(faulty), block_size=13
+    ).store
 
 
 def line(summary: Summary, measure: str, **group: str) -> object:
@@ -73,11 +75,13 @@ def test_groups_have_the_numbers_of_their_variants(tmp_path: Path) -> None:
 
 def test_rates_of_a_match_have_their_intervals(tmp_path: Path) -> None:
     match = "{match: above, truth: below, before: 1 ms}"
-    store = run_study(study("grid", ("{value: 2 * t_1}", match)), tmp_path, QUICK).store
+    store = run_study(
+        make_study("grid", ("{value: 2 * t_1}", match)), tmp_path, QUICK_EXECUTOR
+    ).store
     rates = {rate.measure: rate for rate in summary_of(store).rates}
     assert (rates["twice.missed"].hits, rates["twice.missed"].count) == (60, 60)
     assert rates["twice.first_missed"].draws == 4  # which all 15 points of the grid see
-    assert rates["twice.first_missed"].interval == wilson(4, 4, 0.95)
+    assert rates["twice.first_missed"].interval == wilson_interval(4, 4, 0.95)
 
 
 def test_replicates_of_a_study_without_noise_make_nothing_surer(tmp_path: Path) -> None:
@@ -85,18 +89,18 @@ def test_replicates_of_a_study_without_noise_make_nothing_surer(tmp_path: Path) 
 
     def still(batch: Batch) -> BatchResult:
         assert batch.seeds is not None
-        return quick(dataclasses.replace(batch, seeds=np.zeros_like(batch.seeds)))
+        return quick_results(dataclasses.replace(batch, seeds=np.zeros_like(batch.seeds)))
 
     drawn = ("{random: 4, seed: 3}", "{random: 40, seed: 3}")
     one_axis = ("w:   {linspace: [1 rad/s, 3 rad/s, 5]}", "w:   [1 rad/s]")
     other = ("d:   [0.1 1/s, 0.2 1/s, 0.4 1/s]", "d:   [0.1 1/s]")
     made = [
-        summary_of(run_study(study("grid", drawn, one_axis, other, *more), folder, run).store)
+        summary_of(run_study(make_study("grid", drawn, one_axis, other, *more), folder, run).store)
         for more, folder in (
             ([], tmp_path / "a"),
             ([("set:", "replicates: 9\nset:")], tmp_path / "b"),
         )
-        for run in [InProcess(still)]
+        for run in [SerialExecutor(still)]
     ]
     for one, nine in zip(made[0].lines, made[1].lines, strict=True):
         assert (nine.count, nine.draws, one.draws) == (9 * one.count, 40, 40)
@@ -108,15 +112,15 @@ def test_replicates_of_a_study_without_noise_make_nothing_surer(tmp_path: Path) 
 
 def test_points_of_a_path_are_one_draw(tmp_path: Path) -> None:
     design = ("{random: 4, seed: 3}", "{morris: 6, seed: 3}")
-    found = summary_of(run_study(study("grid", design), tmp_path, QUICK).store)
+    found = summary_of(run_study(make_study("grid", design), tmp_path, QUICK_EXECUTOR).store)
     assert {(x.count, x.draws) for x in found.lines} == {(6 * 3 * 15, 6)}
 
 
 def test_a_grid_is_no_sample_and_its_replicates_are(tmp_path: Path) -> None:
     for count in (1, 8):
-        made = study("alone", ("sampling: one_at_a_time", f"replicates: {count}"))
+        made = make_study("alone", ("sampling: one_at_a_time", f"replicates: {count}"))
         (final,) = [
-            x for x in summary_of(run_study(made, tmp_path / str(count), QUICK).store).lines
+            x for x in summary_of(run_study(made, tmp_path / str(count), QUICK_EXECUTOR).store).lines
             if x.measure == "final"
         ]  # fmt: skip
         assert (final.count, final.draws) == (4 * count, count)
@@ -136,17 +140,17 @@ def test_reasons_that_differ_in_numbers_are_one(tmp_path: Path) -> None:
     assert len(texts) == 2 and {"fault", "refused"} == {one.status for one in found.failures}
     (one,) = [one for one in found.failures if one.status == "refused"]
     assert (one.count, one.message.endswith("is outside its range [0, 10]")) == (refused, True)
-    first = next(row for row in content(store) if row["status"] == "refused")
+    first = next(row for row in store_rows(store) if row["status"] == "refused")
     assert (one.number, one.message) == (first["number"], first["message"])
     assert any("fault bit is set: `oscillator: stuck` (variant " in text for text in texts)
     assert show_study.summary_json(found)["failures"][0]["count"] == found.failures[0].count
 
 
 def test_what_is_the_case_has_a_rate_and_no_mean(tmp_path: Path) -> None:
-    store = run_study(study(), tmp_path, QUICK).store
+    store = run_study(make_study(), tmp_path, QUICK_EXECUTOR).store
     found = summary_of(store)
     (rate,) = found.rates
-    hits = sum(row["t_1"] < 0.5 for row in content(store))  # type: ignore[operator]
+    hits = sum(row["t_1"] < 0.5 for row in store_rows(store))  # type: ignore[operator]
     assert (rate.measure, rate.hits, rate.count) == ("soon", hits, 60)
     assert 0 < hits < 60 and rate.interval is not None
     assert rate.interval[0] < hits / 60 < rate.interval[1]
@@ -154,16 +158,16 @@ def test_what_is_the_case_has_a_rate_and_no_mean(tmp_path: Path) -> None:
 
 
 def test_nothing_finished_is_an_empty_summary(tmp_path: Path) -> None:
-    store = run_study(study(), tmp_path, lambda study, blocks: iter(())).store
+    store = run_study(make_study(), tmp_path, lambda study, blocks: iter(())).store
     found = summary_of(store)
     assert found.counts == {}
     assert all(x.count == 0 and np.isnan(x.median) for x in found.lines)
-    assert set(pictures(store)) == {"heat", "lines", "matters", "spread"}
+    assert set(draw_pictures(store)) == {"heat", "lines", "matters", "spread"}
 
 
 def test_pictures_show_what_the_store_holds(tmp_path: Path) -> None:
     store = store_of(tmp_path)
-    drawn = pictures(store)
+    drawn = draw_pictures(store)
     heat = drawn["heat"].figure.axes[0]
     assert [t.get_text() for t in heat.get_xticklabels()] == ["1", "1.5", "2", "2.5"]
     assert len(heat.texts) == 12
@@ -175,12 +179,12 @@ def test_pictures_show_what_the_store_holds(tmp_path: Path) -> None:
     bars_of = [bar for axis in spread for bar in axis.patches if isinstance(bar, Rectangle)]
     heights = [bar.get_height() for bar in bars_of]
     assert sum(heights) == 48
-    assert drawn["heat"].data("svg") == pictures(store)["heat"].data("svg")
+    assert drawn["heat"].data("svg") == draw_pictures(store)["heat"].data("svg")
 
 
 def test_a_tornado_of_one_at_a_time_goes_from_lowest_to_highest(tmp_path: Path) -> None:
-    store = run_study(study("alone"), tmp_path, QUICK).store
-    axis = pictures(store)["matters"].figure.axes[0]
+    store = run_study(make_study("alone"), tmp_path, QUICK_EXECUTOR).store
+    axis = draw_pictures(store)["matters"].figure.axes[0]
     widths = [bar.get_extents().width for bar in axis.patches]
     assert len(widths) == 2
     assert widths == sorted(widths)
@@ -196,7 +200,7 @@ def test_a_rank_correlation_sees_what_rises_together() -> None:
 
 def test_numbers_that_are_not_there_are_in_no_bin_of_many() -> None:
     values = np.array([*np.linspace(0.0, 1.0, 40), np.nan])
-    places, middles = _binned(values)
+    places, middles = _assign_bins(values)
     assert places[-1] == -1
     assert (places[0], places[-2], len(middles)) == (0, 11, 12)
 
@@ -209,8 +213,8 @@ def test_no_label_of_a_heat_map_is_over_another(count: int, tmp_path: Path) -> N
         ("histogram: t_1, by: d", "histogram: t_1"),
         ("{random: 4, seed: 3}", "{random: 1, seed: 3}"),
     )
-    store = run_study(study("grid", *axes), tmp_path, QUICK, block=5000).store
-    figure = pictures(store)["heat"].figure
+    store = run_study(make_study("grid", *axes), tmp_path, QUICK_EXECUTOR, block_size=5000).store
+    figure = draw_pictures(store)["heat"].figure
     figure.canvas.draw()
     for labels in (figure.axes[0].get_xticklabels(), figure.axes[0].get_yticklabels()):
         boxes = [label.get_window_extent() for label in labels]
@@ -222,12 +226,14 @@ def test_no_label_of_a_heat_map_is_over_another(count: int, tmp_path: Path) -> N
     "values", [[1.0e17], [1.0, 1.0 + 2.0**-52], [0.0, 0.0], [-1.0e300, -1.0e300], []]
 )
 def test_values_that_are_as_good_as_one_have_one_bin(values: list[float]) -> None:
-    low, high = bin_ends(np.array(values))
+    low, high = histogram_bin_edges(np.array(values))
     assert low < high
     assert all(low < value < high for value in values)
 
 
 def test_bins_are_as_many_as_numpy_takes_but_not_without_end() -> None:
     values = np.random.default_rng(5).normal(size=400)
-    np.testing.assert_allclose(bin_ends(values), np.histogram_bin_edges(values, bins="auto"))
-    assert len(bin_ends(np.append(values, 1.0e9))) == MOST_BINS + 1
+    np.testing.assert_allclose(
+        histogram_bin_edges(values), np.histogram_bin_edges(values, bins="auto")
+    )
+    assert len(histogram_bin_edges(np.append(values, 1.0e9))) == MAX_BINS + 1

@@ -10,19 +10,19 @@ import pytest
 from language.problem import SpecError
 from language.project import Project, read_document
 from sweep.measure import SignalMeasure
-from sweep.picture import pictures
+from sweep.picture import draw_pictures
 from sweep.study import Axis, Distribution
 from sweep.study_reader import read_study
 from sweep.study_run import run_study
 from sweep.summary import summary_of
-from tests.sweep.laying import QUICK, STUDIES, study
+from tests.sweep.laying import QUICK_EXECUTOR, STUDIES, make_study
 
 POINT = "a temperature in degC is a point, not a difference"
 
 
 def test_points_have_their_zero_and_widths_have_none() -> None:
-    made = study("warm")
-    courses = {varied.name: varied.course for varied in made.varied}
+    made = make_study("warm")
+    courses = {varied.name: varied.distribution for varied in made.variables}
     assert courses["oven.T_a"] == Distribution("normal", (273.15, 5.0), (263.15, 283.15))
     assert courses["s.noise.sd"] == Axis((0.1, 0.2))
     assert courses["inputs.draught.chirp.amplitude"] == Distribution("uniform", (1.0, 2.0))
@@ -31,7 +31,7 @@ def test_points_have_their_zero_and_widths_have_none() -> None:
 
 
 def test_a_bare_width_is_in_the_unit_of_the_parameter_without_its_zero() -> None:
-    course = study("warm", ("[0 degC, 5 K]", "[0, 5]")).varied[1].course
+    course = make_study("warm", ("[0 degC, 5 K]", "[0, 5]")).variables[1].distribution
     assert course == Distribution("normal", (273.15, 5.0), (263.15, 283.15))
 
 
@@ -51,7 +51,7 @@ SD, DRAWN = "[0.1, 0.2 K]", "{uniform: [1 K, 2 K]}"
 )
 def test_a_width_in_degrees_celsius_is_refused(old: str, new: str) -> None:
     with pytest.raises(SpecError) as caught:
-        study("warm", (old, new))
+        make_study("warm", (old, new))
     (problem,) = [each for each in caught.value.problems if each.severity == "error"]
     assert (problem.kind, problem.label) == ("dimension", POINT)
     assert problem.help == "write a difference in K"
@@ -59,10 +59,10 @@ def test_a_width_in_degrees_celsius_is_refused(old: str, new: str) -> None:
 
 def test_groups_and_axes_are_in_the_units_of_the_parameters(tmp_path: Path) -> None:
     plots = "plots: {map: {heat_map: last, over: [oven.C, oven.T_a]}}\nsummary:"
-    store = run_study(study("warm", ("summary:", plots)), tmp_path, QUICK).store
+    store = run_study(make_study("warm", ("summary:", plots)), tmp_path, QUICK_EXECUTOR).store
     lines = summary_of(store).lines
     assert [line.group["oven.C"] for line in lines[:2]] == ["4 kJ/K", "5 kJ/K"]
-    axis = pictures(store)["map"].figure.axes[0]
+    axis = draw_pictures(store)["map"].figure.axes[0]
     assert [text.get_text() for text in axis.get_xticklabels()] == ["4", "5"]
     assert axis.get_xlabel() == "oven.C [kJ/K]"
     assert axis.get_ylabel() == "oven.T_a, temperature [degC]"

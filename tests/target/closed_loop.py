@@ -9,9 +9,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from language.number import NumberType
-from language.system import in_numbers
-from lockstep.compare import Tape
-from lockstep.taping import taped
+from language.system import with_number_type
+from lockstep.compare import TickLog
+from lockstep.taping import record_ticks
 from modewright.api import load
 
 TICK = Fraction(1, 100)
@@ -30,7 +30,9 @@ CHANGES = Fraction(1, 4)
 """Seconds after which inputs change."""
 
 
-def driveline(number: NumberType, horizon: Fraction, instances: Sequence[str]) -> dict[str, Tape]:
+def record_driveline(
+    number: NumberType, horizon: Fraction, instances: Sequence[str]
+) -> dict[str, TickLog]:
     """Return tapes of instances of the driveline with its estimators: a torque that steps."""
     draw = random.Random(f"driveline {horizon}")
     count = int(horizon / Fraction(2, 5))
@@ -39,7 +41,7 @@ def driveline(number: NumberType, horizon: Fraction, instances: Sequence[str]) -
     return _run("ev_driveline", number, horizon, {"T_req": ("20 N*m", steps)}, instances, speeds)
 
 
-def supervisor(number: NumberType, horizon: Fraction) -> dict[str, Tape]:
+def record_supervisor(number: NumberType, horizon: Fraction) -> dict[str, TickLog]:
     """Return the tape of the supervisor: keys, voltages, temperatures and faults as they come."""
     draw = random.Random(f"supervisor {horizon}")
     times = [CHANGES * k for k in range(1, int(horizon / CHANGES))]
@@ -56,7 +58,7 @@ def _run(
     courses: Mapping[str, tuple[str, Mapping[Fraction, str]]],
     instances: Sequence[str],
     extra: str = "",
-) -> dict[str, Tape]:
+) -> dict[str, TickLog]:
     lines = ["language: 1", "scenario: long", f"of: {system}", f"horizon: {float(horizon)} s"]
     lines += [extra, "inputs:"]
     for name, (start, steps) in courses.items():
@@ -67,6 +69,6 @@ def _run(
         path = Path(folder) / "scenario_long.yaml"
         path.write_text("\n".join([*lines, ""]))
         loaded = load(system, str(path))
-    run, tapes = taped(in_numbers(loaded.system, number), loaded.scenario)
+    run, tapes = record_ticks(with_number_type(loaded.system, number), loaded.scenario)
     assert run.stopped is None, run.stopped
     return {name: tapes[name] for name in instances}

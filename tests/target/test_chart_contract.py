@@ -9,19 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.chart_contract import ChartContract, proven_of, written
-from codegen.source import c_files, c_program
-from codegen.tool import PACKAGES
-from language.charting import Charting
+from codegen.proofs.chart_contract import (
+    ChartContract,
+    prove_chart_contracts,
+    write_chart_contracts,
+)
+from codegen.source import emit_c_files, run_c_passes
+from codegen.tool import DEBIAN_PACKAGES
+from language.charting import ChartContext
 from language.load import load_automaton, program_of
-from language.operation import Choose
+from language.operation import Switch
 from language.project import Project
-from language.situation import charting_of
+from language.situation import chart_context_of
 from modewright.api import program
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(
-    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+    not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"
 )
 NAME = "supervisor"
 FAULT = "work->wish_chart = supervisor_FIRED_operation_fault;"
@@ -93,11 +97,11 @@ outputs: [mode]
 
 
 def made() -> ChartContract:
-    return ChartContract(charting(), c_program(program(NAME), by_amount=False))
+    return ChartContract(charting(), run_c_passes(program(NAME), by_magnitude=False))
 
 
-def charting() -> Charting:
-    found = charting_of(load_automaton(NAME, Project(Path())), program(NAME).transitions)
+def charting() -> ChartContext:
+    found = chart_context_of(load_automaton(NAME, Project(Path())), program(NAME).transitions)
     assert found
     return found
 
@@ -106,8 +110,8 @@ def charting() -> Charting:
 def test_what_a_micro_step_may_do_is_proven_of_a_chart(tmp_path: Path) -> None:
     """Of the functions that are broken below; of all of them it is a figure of `make verify`."""
     functions = sorted({function for function, _, _ in MISTAKES.values()})
-    written(made(), c_files(program(NAME), by_amount=False), tmp_path)
-    found = proven_of(NAME, functions, tmp_path)
+    write_chart_contracts(made(), emit_c_files(program(NAME), by_magnitude=False), tmp_path)
+    found = prove_chart_contracts(NAME, functions, tmp_path)
     assert found.open == ()
     assert found.proven == found.asked > 100
 
@@ -116,13 +120,13 @@ def test_what_a_micro_step_may_do_is_proven_of_a_chart(tmp_path: Path) -> None:
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_in_the_c_of_a_chart_is_found(mistake: str, tmp_path: Path) -> None:
     function, right, wrong = MISTAKES[mistake]
-    files = c_files(program(NAME), by_amount=False)
+    files = emit_c_files(program(NAME), by_magnitude=False)
     text, file = files[f"{NAME}.c"], f"{NAME}.c"
     start = text.index(f" {re.sub(r'_[0-9]+$', '', function)}(")
     place = text.index(right, start)
     broken = text[:place] + wrong + text[place + len(right) :]
-    written(made(), {**files, file: broken}, tmp_path)
-    found = proven_of(NAME, [function], tmp_path)
+    write_chart_contracts(made(), {**files, file: broken}, tmp_path)
+    found = prove_chart_contracts(NAME, [function], tmp_path)
     assert any(function in goal for goal in found.open), found
 
 
@@ -132,9 +136,9 @@ def test_a_chart_that_was_lowered_to_another_order_is_found(tmp_path: Path) -> N
     own = charting()
     chart = dataclasses.replace(own.chart, order="inner_first")
     other = dataclasses.replace(own, chart=chart)
-    files = c_files(program(NAME), by_amount=False)
-    written(dataclasses.replace(made(), charting=other), files, tmp_path)
-    found = proven_of(NAME, ["select_transitions_1"], tmp_path)
+    files = emit_c_files(program(NAME), by_magnitude=False)
+    write_chart_contracts(dataclasses.replace(made(), charting=other), files, tmp_path)
+    found = prove_chart_contracts(NAME, ["select_transitions_1"], tmp_path)
     assert any("select_transitions_1" in goal for goal in found.open), found
 
 
@@ -143,32 +147,32 @@ def test_a_chart_that_was_lowered_to_another_target_is_found(tmp_path: Path) -> 
     """C and Program agree on it, so it is the chart that says that it is wrong."""
     own = made()
     commit = own.made.blocks["commit"]
-    entered = [op for op in commit if isinstance(op, Choose) and op.selector == "work.takes_main"]
+    entered = [op for op in commit if isinstance(op, Switch) and op.selector == "work.takes_main"]
     (first, to_shut), (second, to_open) = entered[-1].cases
     wrong = dataclasses.replace(entered[-1], cases=((first, to_open), (second, to_shut)))
     blocks = {
         **own.made.blocks,
         "commit": tuple(wrong if op is entered[-1] else op for op in commit),
     }
-    files = c_files(program(NAME), by_amount=False)
+    files = emit_c_files(program(NAME), by_magnitude=False)
     shut, opened = (f"self->mode_main = supervisor_main_{mode};" for mode in ("shut", "open"))
     text = files[f"{NAME}.c"]
     place = text.index(shut) - 200
     tail = text[place:].replace(shut, "@", 1).replace(opened, shut, 1).replace("@", opened, 1)
     lowered = dataclasses.replace(own.made, blocks=blocks)
-    written(
+    write_chart_contracts(
         ChartContract(own.charting, lowered), {**files, f"{NAME}.c": text[:place] + tail}, tmp_path
     )
-    assert proven_of(NAME, ["commit_17"], tmp_path).open == ()
-    found = proven_of(NAME, ["commit"], tmp_path)
+    assert prove_chart_contracts(NAME, ["commit_17"], tmp_path).open == ()
+    found = prove_chart_contracts(NAME, ["commit"], tmp_path)
     assert any("commit_ensures" in goal for goal in found.open), found
 
 
 def test_what_a_chart_asks_and_acsl_does_not_say_is_named() -> None:
     """A guard that calls a function has a lemma from the Program alone, and is no silent gap."""
     whole = automaton(CALLING)
-    found = charting_of(whole, program_of(whole).transitions)
+    found = chart_context_of(whole, program_of(whole).transitions)
     assert found
-    own = ChartContract(found, c_program(program_of(whole), by_amount=False))
+    own = ChartContract(found, run_c_passes(program_of(whole), by_magnitude=False))
     assert "choose_busy_slow" in own.unsaid
     assert made().unsaid == ()

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS, BuildError, optimised
-from codegen.machine import CORTEX_M4F, emulated
+from codegen.build import FLAGS, BuildError, flags_at_level
+from codegen.machine import CORTEX_M4F, run_in_qemu
 from codegen.tool import ARM_COMPILER, EMULATOR
-from language.number import NUMBERS, NumberType
-from lockstep.compare import Tape, compare
+from language.number import NUMBER_TYPES, NumberType
+from lockstep.compare import TickLog, compare
 from modewright.api import lockstep, program
-from tests.lockstep.programs import taped
+from tests.lockstep.programs import record_ticks
 from tests.lockstep.test_flags import PRODUCT, TINY
-from tests.target.closed_loop import driveline, supervisor
+from tests.target.closed_loop import record_driveline, record_supervisor
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which(ARM_COMPILER) and shutil.which(EMULATOR)),
@@ -26,31 +26,33 @@ LEVELS = ("O0", "Os")
 """The two whose code is least alike; `make verify` compares O2 and O3 too."""
 
 
-@pytest.fixture(scope="module", params=NUMBERS)
-def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
+@pytest.fixture(scope="module", params=NUMBER_TYPES)
+def tapes(request: pytest.FixtureRequest) -> dict[str, TickLog]:
     number: NumberType = request.param
     short = Fraction(3, 2)
     return {
-        **driveline(number, short, ["plant", "est", "simple"]),
-        **supervisor(number, Fraction(20)),
+        **record_driveline(number, short, ["plant", "est", "simple"]),
+        **record_supervisor(number, Fraction(20)),
     }
 
 
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", ["plant", "est", "simple", "sup"])
-def test_the_target_computes_the_same_bits(tapes: dict[str, Tape], name: str, level: str) -> None:
-    verdict = compare(tapes[name], optimised(level), machine=CORTEX_M4F)
+def test_the_target_computes_the_same_bits(
+    tapes: dict[str, TickLog], name: str, level: str
+) -> None:
+    verdict = compare(tapes[name], flags_at_level(level), machine=CORTEX_M4F)
     assert verdict.is_equal, str(verdict.first)
     assert verdict.transitions > 0
     assert verdict.ticks == len(tapes[name].values) >= 150
 
 
-def product(folder: Path, number: NumberType) -> Tape:
+def product(folder: Path, number: NumberType) -> TickLog:
     """u * u - v where the product is rounded to v: 0, or the rounding error if contracted."""
     spec = folder / "product.yaml"
     spec.write_text(PRODUCT.replace("float64", number))
     tiny = TINY[number]
-    return taped(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
+    return record_ticks(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
 
 
 @pytest.mark.parametrize(
@@ -73,7 +75,7 @@ def test_a_program_that_fails_on_the_target_is_told(tmp_path: Path) -> None:
     image = tmp_path / "image"
     image.write_bytes(b"no program")
     with pytest.raises(BuildError, match="the emulated program ended with"):
-        emulated(image, b"")
+        run_in_qemu(image, b"")
 
 
 def test_the_command_takes_a_target() -> None:

@@ -10,19 +10,23 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.chart_contract import ChartContract, proven_of, written
-from codegen.source import c_files, c_program
-from codegen.tool import PACKAGES
+from codegen.proofs.chart_contract import (
+    ChartContract,
+    prove_chart_contracts,
+    write_chart_contracts,
+)
+from codegen.source import emit_c_files, run_c_passes
+from codegen.tool import DEBIAN_PACKAGES
 from language import fault
 from language.chart import Chart
-from language.fault import with_fault_transitions
+from language.fault import add_fault_transitions
 from language.load import program_of
 from language.model import Automaton, Mode
-from language.situation import charting_of
+from language.situation import chart_context_of
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(
-    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+    not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"
 )
 NAME = "guarded"
 GUARDED = """\
@@ -134,23 +138,33 @@ def elsewhere(automaton: Automaton, chart: Chart) -> Chart:
     """Ways to another mode than the fault mode."""
     found = WAYS(automaton, chart)
     other = next(node.index for node in chart.nodes if node.path == "rest")
-    changed = {key: dataclasses.replace(way, targets=(other,)) for key, way in found.ways.items()}
-    kept = {key: way for key, way in found.ways.items() if not key.endswith("fault_mode")}
-    return dataclasses.replace(found, ways={**changed, **kept})
+    changed = {
+        key: dataclasses.replace(way, targets=(other,)) for key, way in found.transitions.items()
+    }
+    kept = {key: way for key, way in found.transitions.items() if not key.endswith("fault_mode")}
+    return dataclasses.replace(found, transitions={**changed, **kept})
 
 
-WAY_OUT, WAYS = fault._with_way_out, fault._with_ways
+WAY_OUT, WAYS = fault._add_fault_transition, fault._add_chart_transitions
 LOWERED: dict[str, tuple[str, object, str]] = {
-    "a mode has no way to it": ("language.fault._with_way_out", forgetful, "select_transitions_1"),
-    "its ways lead to another": ("language.fault._with_ways", elsewhere, "select_transitions_1"),
+    "a mode has no way to it": (
+        "language.fault._add_fault_transition",
+        forgetful,
+        "select_transitions_1",
+    ),
+    "its ways lead to another": (
+        "language.fault._add_chart_transitions",
+        elsewhere,
+        "select_transitions_1",
+    ),
     "outer modes go before it": ("language.selecting.FAULT_FIRST", 99, "select_transitions_1"),
     "what it leaves goes on": (
-        "language.selecting._yields",
+        "language.selecting._is_left_by_fault",
         lambda charting, region: False,
         "select_transitions_2",
     ),
     "it stands still while a fault lasts": (
-        "language.selecting._yields",
+        "language.selecting._is_left_by_fault",
         lambda charting, region: region.path != "chart",
         "select_transitions_3",
     ),
@@ -165,9 +179,9 @@ def test_that_the_fault_mode_is_entered_from_anywhere_is_proven(order: str, tmp_
     functions = {function for function, _, _ in MISTAKES.values()}
     functions |= {function for _, _, function in LOWERED.values()}
     made, files = lowered(order)
-    names = set(written(made, files, tmp_path))
+    names = set(write_chart_contracts(made, files, tmp_path))
     whole = names & {*functions, *WHOLE}
-    found = proven_of(NAME, sorted(whole), tmp_path)
+    found = prove_chart_contracts(NAME, sorted(whole), tmp_path)
     assert found.open == ()
     assert found.proven == found.asked > 100
     assert made.unsaid == ()
@@ -182,8 +196,8 @@ def test_a_mistake_in_the_c_of_a_fault_mode_is_found(mistake: str, tmp_path: Pat
     start = text.index(f" {re.sub(r'_[0-9]+$', '', function)}(")
     place = text.index(right, start)
     broken = text[:place] + wrong + text[place + len(right) :]
-    written(made, {**files, file: broken}, tmp_path)
-    found = proven_of(NAME, [function], tmp_path)
+    write_chart_contracts(made, {**files, file: broken}, tmp_path)
+    found = prove_chart_contracts(NAME, [function], tmp_path)
     assert any(function in goal for goal in found.open), found
 
 
@@ -196,8 +210,8 @@ def test_a_chart_whose_fault_mode_was_lowered_wrong_is_found(
     name, wrong, function = LOWERED[mistake]
     monkeypatch.setattr(name, wrong)
     made, files = lowered()
-    written(made, files, tmp_path)
-    found = proven_of(NAME, [function], tmp_path)
+    write_chart_contracts(made, files, tmp_path)
+    found = prove_chart_contracts(NAME, [function], tmp_path)
     assert any(function in goal for goal in found.open), found
 
 
@@ -205,7 +219,7 @@ def lowered(order: str = "outer_first") -> tuple[ChartContract, Mapping[str, str
     """Return the contract of a chart that is lowered now, and its C."""
     whole = automaton(GUARDED.replace("outer_first", order))
     program = program_of(whole)
-    charting = charting_of(with_fault_transitions(whole), program.transitions)
+    charting = chart_context_of(add_fault_transitions(whole), program.transitions)
     assert charting
-    made = ChartContract(charting, c_program(program, by_amount=False))
-    return made, c_files(program, by_amount=False)
+    made = ChartContract(charting, run_c_passes(program, by_magnitude=False))
+    return made, emit_c_files(program, by_magnitude=False)

@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS
-from codegen.instructions import instructions
-from codegen.machine import CORTEX, CORTEX_M4F
-from codegen.metrics import metrics
-from codegen.source import c_files
+from codegen.instructions import count_instructions
+from codegen.machine import CORTEX_FLAGS, CORTEX_M4F
+from codegen.metrics import measure_code
+from codegen.source import emit_c_files
 from codegen.tool import ARM_COMPILER, EMULATOR
 from modewright.api import program
 from modewright.cli import app
-from modewright.exits import exit_code
-from tests.target.closed_loop import driveline
+from modewright.exits import run_with_exit_code
+from tests.target.closed_loop import record_driveline
 from tests.twin.duel import duel
 
 pytestmark = pytest.mark.skipif(
@@ -31,24 +31,24 @@ SIZED = re.compile(r"^[0-9a-f]+ ([0-9a-f]+) (\w) (\w+)$", re.MULTILINE)
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(list(arguments), standalone_mode=False))
+    return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
 @pytest.mark.parametrize("name", ["estimator_float32", "supervisor"])
 def test_sizes_are_those_of_the_symbols(name: str, tmp_path: Path) -> None:
     used = program(name)
-    files = c_files(used)
+    files = emit_c_files(used)
     files["main.c"] = f'#include "{name}.h"\n{name}_Self one;\n{name}_In in;\n{name}_Out out;\n'
     for file, text in files.items():
         (tmp_path / file).write_text(text)
     sources = [file for file in files if file.endswith(".c")]
-    command = [ARM_COMPILER, *CORTEX, *FLAGS, "-c", *sources]
+    command = [ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-c", *sources]
     subprocess.run(command, cwd=tmp_path, check=True)
     objects = [file.replace(".c", ".o") for file in sources]
     listing = ["arm-none-eabi-nm", "-S", *objects]
     told = subprocess.run(listing, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
     sizes = {symbol: (kind, int(size, 16)) for size, kind, symbol in SIZED.findall(told)}
-    found = metrics(used)
+    found = measure_code(used)
     assert (found.instance, found.inputs, found.outputs) == tuple(
         sizes[symbol][1] for symbol in ("one", "in", "out")
     )
@@ -61,19 +61,19 @@ def test_sizes_are_those_of_the_symbols(name: str, tmp_path: Path) -> None:
 
 def test_instructions_are_those_of_the_whole_run() -> None:
     """Another count, of all steps in one loop, has the mean of the steps one by one."""
-    tape = driveline("float32", Fraction(6, 10), ["est"])["est"]
-    found = instructions(tape.program, b"".join(tape.inputs))
+    tape = record_driveline("float32", Fraction(6, 10), ["est"])["est"]
+    found = count_instructions(tape.program, b"".join(tape.inputs))
     (whole, _) = duel(tape, "estimator", 1, CORTEX_M4F).best
     assert len(found.steps) == len(tape.inputs)
     assert whole - 25 < found.mean < whole, "the loop takes some instructions, too"
     assert found.steps[0] == min(found.steps) < found.steps[1], "the first tick only starts"
-    most = metrics(tape.program).longest
+    most = measure_code(tape.program).longest
     assert most is not None
     assert max(found.steps) <= most, "a step takes no more than its machine code lets it"
 
 
 def test_arithmetic_in_software_has_no_bound_and_says_so() -> None:
-    found = metrics(program("estimator_simple"))
+    found = measure_code(program("estimator_simple"))
     assert (found.longest, found.unbounded) == (
         None,
         "__aeabi_dmul has a loop of which no end is known",

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import contract, proven_with, written_of
-from codegen.proofs.misra import misra
-from codegen.proofs.proof import Proof
-from codegen.proofs.sanitised import sanitised
-from codegen.proofs.stack import stack
-from codegen.proofs.strict import strict
+from codegen.proofs.contract import check_contracts, prove_contracts, write_contracts
+from codegen.proofs.misra import check_misra
+from codegen.proofs.proof import ToolVerdict
+from codegen.proofs.sanitised import check_sanitizers
+from codegen.proofs.stack import check_stack
+from codegen.proofs.strict import check_compiler_warnings
 from codegen.proofs.wp import KERNEL
-from codegen.source import c_files
-from codegen.tool import PACKAGES, told
+from codegen.source import emit_c_files
+from codegen.tool import DEBIAN_PACKAGES, run_tool
 from language.load import load_automaton
 from language.program import Program
 from language.project import Project
@@ -24,7 +24,7 @@ from modewright.api import program
 from modewright.code import prove
 
 pytestmark = pytest.mark.skipif(
-    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+    not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"
 )
 CHECKS = ("warnings", "misra", "stack")
 GROWS = """\
@@ -51,7 +51,7 @@ float broken(float x, int32_t n)
 """
 
 
-def held(proofs: list[Proof]) -> list[str]:
+def held(proofs: list[ToolVerdict]) -> list[str]:
     return [finding for proof in proofs for finding in proof.findings]
 
 
@@ -84,8 +84,8 @@ def test_what_guards_may_do_is_proven_of_each_mode() -> None:
 def test_the_contracts_of_shipped_automata_can_be_read(name: str, tmp_path: Path) -> None:
     """To prove them takes minutes; a contract that names what is not there proves nothing."""
     made = program(name)
-    functions, _ = written_of(made, c_files(made, by_amount=False), tmp_path)[0]
-    done = told(["frama-c", *KERNEL, f"{name}.c"], tmp_path)
+    functions, _ = write_contracts(made, emit_c_files(made, by_magnitude=False), tmp_path)[0]
+    done = run_tool(["frama-c", *KERNEL, f"{name}.c"], tmp_path)
     assert done.returncode == 0, done.stdout
     text = (tmp_path / f"{name}.c").read_text()
     assert all(f" {function}(" in text for function in functions)
@@ -111,11 +111,13 @@ def test_what_is_plain_in_parts_has_no_contract() -> None:
 def test_a_mode_that_breaks_its_contract_is_found(
     right: str, wrong: str, goal: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = c_files(program("contactor"), by_amount=False)
+    made = emit_c_files(program("contactor"), by_magnitude=False)
     assert made["contactor.c"].count(right) == 1
     broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
     monkeypatch.setattr("codegen.proofs.contract.c_files", lambda program, by_amount: broken)
-    found = contract(load_automaton("contactor", Project(Path())), program("contactor"), tmp_path)
+    found = check_contracts(
+        load_automaton("contactor", Project(Path())), program("contactor"), tmp_path
+    )
     assert any(goal in finding for finding in found.findings), found
 
 
@@ -149,14 +151,14 @@ def test_a_mistake_in_what_transitions_run_is_found(
     function: str, right: str, wrong: str, goal: str, tmp_path: Path
 ) -> None:
     """Of the function that is broken alone; of all of them it is a figure of `make prove`."""
-    made = c_files(program("hko"), by_amount=False)
+    made = emit_c_files(program("hko"), by_magnitude=False)
     text, file = made["hko.c"], "hko.c"
     place = text.index(right, text.index(f" {function}("))
     broken = text[:place] + wrong + text[place + len(right) :]
-    asking = written_of(program("hko"), {**made, file: broken}, tmp_path)
+    asking = write_contracts(program("hko"), {**made, file: broken}, tmp_path)
     asked = goal.rpartition("_")[0]
     own = [([name for name in names if name == asked], options) for names, options in asking]
-    found = proven_with(tmp_path, file, own)
+    found = prove_contracts(tmp_path, file, own)
     assert found.asked and any(goal in one for one in found.open), found
 
 
@@ -165,62 +167,66 @@ def test_without_a_mistake_all_of_it_is_proven_as_soon(tmp_path: Path) -> None:
     """What is found above is the mistake, not a prover that had too little time."""
     (contactor,) = prove("contactor", checks=("contract",))
     assert contactor.is_asked and not contactor.findings
-    asking = written_of(program("hko"), c_files(program("hko"), by_amount=False), tmp_path)
+    asking = write_contracts(
+        program("hko"), emit_c_files(program("hko"), by_magnitude=False), tmp_path
+    )
     names = {"jump_drive", "jump_gap_1", "switch_no_contact"}
     own = [([name for name in known if name in names], options) for known, options in asking]
-    found = proven_with(tmp_path, "hko.c", own)
+    found = prove_contracts(tmp_path, "hko.c", own)
     assert found.asked and found.open == ()
 
 
 def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
     (tmp_path / "wrong.c").write_text(WRONG)
-    heard = [" ".join(proof.findings) for proof in strict(tmp_path, ["wrong.c"])]
+    heard = [" ".join(proof.findings) for proof in check_compiler_warnings(tmp_path, ["wrong.c"])]
     assert all("double-promotion" in text for text in heard), heard
-    rules = {finding.rpartition(" ")[2] for finding in misra(tmp_path, ["wrong.c"]).findings}
+    rules = {finding.rpartition(" ")[2] for finding in check_misra(tmp_path, ["wrong.c"]).findings}
     assert {"15.5", "15.6", "17.2"} <= rules
-    assert "broken calls itself" in stack(tmp_path, ["wrong.c"], "broken").findings
+    assert "broken calls itself" in check_stack(tmp_path, ["wrong.c"], "broken").findings
 
 
 @pytest.mark.parametrize("name", ["estimator_float32", "supervisor", "driveline"])
 def test_hostile_inputs_find_nothing_undefined(name: str, tmp_path: Path) -> None:
-    found = sanitised(program(name), tmp_path)
+    found = check_sanitizers(program(name), tmp_path)
     assert found.findings == ()
 
 
 def test_a_store_beyond_its_array_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def torn(made: Program) -> dict[str, str]:
-        files = c_files(made)
+        files = emit_c_files(made)
         text, place = files["supervisor.c"], "self->log[self->count_of_log]"
         assert place in text
         return {**files, "supervisor.c": text.replace(place, "self->log[self->count_of_log + 24]")}
 
     monkeypatch.setattr("codegen.harness.c_files", torn)
-    (finding,) = sanitised(program("supervisor"), tmp_path).findings
+    (finding,) = check_sanitizers(program("supervisor"), tmp_path).findings
     assert "out of bounds" in finding
 
 
 def test_what_a_tool_cannot_read_does_not_pass(tmp_path: Path) -> None:
     (tmp_path / "torn.c").write_text("int torn(int a) { if (a { return 1; }\n")
-    proofs = [*strict(tmp_path, ["torn.c"]), misra(tmp_path, ["torn.c"])]
-    proofs.append(stack(tmp_path, ["torn.c"], "torn"))
+    proofs = [*check_compiler_warnings(tmp_path, ["torn.c"]), check_misra(tmp_path, ["torn.c"])]
+    proofs.append(check_stack(tmp_path, ["torn.c"], "torn"))
     assert [proof.check for proof in proofs if proof.holds] == []
-    assert not misra(tmp_path, ["missing.c"]).holds
+    assert not check_misra(tmp_path, ["missing.c"]).holds
 
 
 def test_stack_that_is_not_known_is_told(tmp_path: Path) -> None:
     (tmp_path / "grows.c").write_text(GROWS)
-    found = stack(tmp_path, ["grows.c"], "grows")
+    found = check_stack(tmp_path, ["grows.c"], "grows")
     assert found.findings == ("grows takes more or less each time",)
     assert "memset" in found.about
     assert "__aeabi_dmul" in found.about
-    assert stack(tmp_path, ["grows.c"], "other").findings == ("other is not in the compiled code",)
+    assert check_stack(tmp_path, ["grows.c"], "other").findings == (
+        "other is not in the compiled code",
+    )
 
 
 def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing holds w_em any more, so that it may grow without bound."""
 
     def loosened(program: Program, by_amount: bool) -> dict[str, str]:
-        files = c_files(program, by_amount)
+        files = emit_c_files(program, by_amount)
         text, end, product = (
             files["estimator_simple.c"],
             "w_em <= 2400.0)",

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import contract
-from codegen.proofs.outline import function_of, with_scratch_outside
-from codegen.source import c_files
-from codegen.tool import PACKAGES
+from codegen.proofs.contract import check_contracts
+from codegen.proofs.outline import function_of, move_scratch_to_parameter
+from codegen.source import emit_c_files
+from codegen.tool import DEBIAN_PACKAGES
 from language.load import program_of
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(
-    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+    not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"
 )
 CHART = """\
 language: 1
@@ -49,7 +49,7 @@ FAULT = ", on_range: fault"
 def test_all_that_a_small_chart_asks_is_proven(keys: str, on_range: str, tmp_path: Path) -> None:
     text = CHART.format(keys=keys, on_range=on_range)
     made = automaton(text)
-    found = contract(made, program_of(made), tmp_path)
+    found = check_contracts(made, program_of(made), tmp_path)
     assert found.is_asked
     assert found.findings == ()
     proven, _, asked, *_ = found.about.split()
@@ -59,12 +59,12 @@ def test_all_that_a_small_chart_asks_is_proven(keys: str, on_range: str, tmp_pat
 
 def test_the_scratch_of_a_jump_is_given_to_it_in_the_copy_that_is_proven() -> None:
     made = automaton(CHART.format(keys="order: outer_first", on_range=""))
-    text = c_files(program_of(made), by_amount=False)["small.c"]
+    text = emit_c_files(program_of(made), by_magnitude=False)["small.c"]
     assert function_of(text, "jump").parameters == "small_Self *self"
-    lifted = with_scratch_outside(text, "jump")
+    lifted = move_scratch_to_parameter(text, "jump")
     assert function_of(lifted, "jump").parameters == "small_Self *self, Work *work"
     assert "        Work scratch;\n\n        jump(self, &scratch);\n" in lifted
-    assert with_scratch_outside(lifted, "jump") == lifted
+    assert move_scratch_to_parameter(lifted, "jump") == lifted
 
 
 COUNTING = """\
@@ -85,7 +85,7 @@ outputs: [mode, k]
 @pytest.mark.usefixtures("impatient")
 def test_a_whole_number_stays_in_its_range_and_no_sum_of_it_is_too_large(tmp_path: Path) -> None:
     made = automaton(COUNTING)
-    found = contract(made, program_of(made), tmp_path)
+    found = check_contracts(made, program_of(made), tmp_path)
     assert found.findings == ()
     text = (tmp_path / "counting.c").read_text()
     assert text.count("requires 0 <= self->discrete.k <= 5;") == 1  # read in `jump_a` alone

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, linked
-from codegen.harness import LOCKSTEP, fed, write_harness
-from codegen.instructions import COUNTING, MAIN
-from codegen.machine import CORTEX_M4F, HOST, Machine, emulated
-from lockstep.compare import Tape
+from codegen.build import FLAGS, WARNINGS, run_compiler
+from codegen.harness import LOCKSTEP, tick_inputs, write_harness
+from codegen.instructions import ICOUNT_OPTIONS, MAIN
+from codegen.machine import CORTEX_M4F, HOST, Machine, run_in_qemu
+from lockstep.compare import TickLog
 
 HERE = Path(__file__).parent
 RUN: dict[str, Callable[[Path, bytes], bytes]] = {
     HOST.name: HOST.run,
-    CORTEX_M4F.name: partial(emulated, options=COUNTING),
+    CORTEX_M4F.name: partial(run_in_qemu, options=ICOUNT_OPTIONS),
 }
 CLOCK = {HOST.name: "clock_host.c", CORTEX_M4F.name: "clock_target.c"}
 MAINS = {HOST.name: LOCKSTEP, CORTEX_M4F.name: MAIN}
@@ -50,7 +50,7 @@ class Duel:
 
 
 def duel(
-    tape: Tape, twin: str, rounds: int, machine: Machine = HOST, flags: Sequence[str] = FLAGS
+    tape: TickLog, twin: str, rounds: int, machine: Machine = HOST, flags: Sequence[str] = FLAGS
 ) -> Duel:
     """Run the generated C of a tape's Program and a twin on its inputs, turn by turn."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
@@ -63,9 +63,9 @@ def duel(
             shutil.copyfile(path, folder / path.name)
         sources += [folder / path.name for path in own]
         words = [*machine.command(None), *flags, *WARNINGS, *map(str, sources)]
-        linked([*words, *machine.link(folder / "harness")], folder / "duel")
+        run_compiler([*words, *machine.link(folder / "harness")], folder / "duel")
         records = struct.pack("<2d", len(tape.inputs), rounds)
-        size = 8 * len(fed(tape.program))
+        size = 8 * len(tick_inputs(tape.program))
         records += b"".join(record[:size] for record in tape.inputs)
         found = RUN[machine.name](folder / "duel", records)
     steps, differing, *took = struct.unpack(f"<{len(found) // 8}q", found)

@@ -12,8 +12,8 @@ import pytest
 
 from codegen.machine import CORTEX_M4F, HOST, MACHINES
 from codegen.tool import ARM_COMPILER, EMULATOR
-from lockstep.compare import Tape
-from tests.target.closed_loop import driveline
+from lockstep.compare import TickLog
+from tests.target.closed_loop import record_driveline
 from tests.twin.duel import HERE, duel
 
 NEEDS = pytest.mark.skipif(
@@ -24,14 +24,14 @@ TWINS = {"est": ("estimator", Fraction(3)), "plant": ("plant", Fraction(1))}
 
 
 @pytest.fixture(scope="module", params=TWINS)
-def pair(request: pytest.FixtureRequest) -> tuple[Tape, str]:
+def pair(request: pytest.FixtureRequest) -> tuple[TickLog, str]:
     twin, horizon = TWINS[request.param]
-    return driveline("float32", horizon, [request.param])[request.param], twin
+    return record_driveline("float32", horizon, [request.param])[request.param], twin
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("machine", [HOST.name, pytest.param(CORTEX_M4F.name, marks=NEEDS)])
-def test_a_twin_has_the_same_bits(pair: tuple[Tape, str], machine: str) -> None:
+def test_a_twin_has_the_same_bits(pair: tuple[TickLog, str], machine: str) -> None:
     tape, twin = pair
     found = duel(tape, twin, 1, MACHINES[machine])
     assert tape.transitions > 5
@@ -40,7 +40,7 @@ def test_a_twin_has_the_same_bits(pair: tuple[Tape, str], machine: str) -> None:
 
 
 def test_an_input_that_is_no_number_is_held_by_both() -> None:
-    tape = driveline("float32", Fraction(1), ["est"])["est"]
+    tape = record_driveline("float32", Fraction(1), ["est"])["est"]
     size = struct.calcsize("<d")
     for tick in (100, 101, 500):
         tape.inputs[tick] = struct.pack("<d", math.nan) + tape.inputs[tick][size:]
@@ -53,5 +53,5 @@ def test_a_twin_of_another_plant_is_told(monkeypatch: pytest.MonkeyPatch, tmp_pa
         text = path.read_text().replace("twin_page = {0.05F}", "twin_page = {0.0500001F}")
         (tmp_path / path.name).write_text(text)
     monkeypatch.setattr("tests.twin.duel.HERE", tmp_path)
-    tape = driveline("float32", Fraction(1, 2), ["plant"])["plant"]
+    tape = record_driveline("float32", Fraction(1, 2), ["plant"])["plant"]
     assert duel(tape, "plant", 1).differing > 100

@@ -11,8 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT))
 
-from tests.bench.charts import charts  # noqa: E402
-from tests.verify.store import Figure, measured  # noqa: E402
+from tests.bench.charts import measure_charts  # noqa: E402
+from tests.verify.store import Figure, measure_figures  # noqa: E402
 
 PAIRS = 15
 OVER_FASTEST, OVER_C = 1.0, 0.8
@@ -21,12 +21,12 @@ OVER_FASTEST, OVER_C = 1.0, 0.8
 
 def main() -> int:
     """Measure what is not measured yet; return 0 if every bar is met."""
-    return measured("mode_logic", {"chart_speed": chart_speed})
+    return measure_figures("mode_logic", {"chart_speed": chart_speed})
 
 
 def chart_speed() -> Figure:
     """Medians of ratios of ticks a second; the C by hand holds no input in a range."""
-    found = charts(PAIRS)
+    found = measure_charts(PAIRS)
     ours = found["interpreter_over_fastest"]["median"], found["generated_over_c"]["median"]
     met = ours[0] >= OVER_FASTEST and ours[1] >= OVER_C
     return {"met": met, **{name: one["median"] for name, one in found.items()}}

@@ -21,7 +21,7 @@ from typing import Any
 
 from tests.bench.figures import batch_over_c
 from tests.verify.processor import with_descendants
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 from tests.verify.studies import MILLION, MOST_MEGABYTES, bytes_digest
 
 VARIANTS, WORKERS, KILLS = 100_000, 4, 2
@@ -70,7 +70,7 @@ def main() -> int:
         "cluster_with_two_workers_killed": partial(two_killed_and_what_dask_costs, count),
         "cluster_of_a_million_variants": a_million_variants,
     }
-    return measured("large_studies", figures)
+    return measure_figures("large_studies", figures)
 
 
 def side_by_side() -> Figure:
@@ -115,11 +115,11 @@ def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
     """Run a study by local processes or by Dask; two of its workers are killed where asked for."""
     import modewright as mw
     from modewright import cluster_worker
-    from modewright.studies import TEMPLATE
+    from modewright.studies import TEMPLATE_MODULE
     from sweep import fork_server
     from sweep.address import Address, Credentials
-    from sweep.cluster import Cluster
-    from sweep.clustering import Staff, connected
+    from sweep.cluster import DaskExecutor
+    from sweep.clustering import WorkerSetup, open_client
 
     if kind == "warm":  # what is compiled is compiled, what is read is read
         mw.sweep(study, out, root=ROOT, samples=2000, workers=WORKERS)
@@ -130,10 +130,10 @@ def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
     if kind == "dask":
         found = mw.sweep(study, out, root=ROOT, cluster=f"local:{WORKERS}")
         return {"variants": found.computed}
-    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
-    fork_server.start(TEMPLATE)
+    staff = WorkerSetup(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    fork_server.start_fork_server(TEMPLATE_MODULE)
     killed: list[int] = []
-    with connected(Address(count=WORKERS), Credentials(), staff) as client:
+    with open_client(Address(count=WORKERS), Credentials(), staff) as client:
 
         def kill(done: int, before: int, total: int) -> None:
             """Kill a worker at a third and at two thirds of the way."""
@@ -142,9 +142,9 @@ def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
                 killed.append(next(pid for pid in there if pid not in killed))
                 os.kill(killed[-1], signal.SIGKILL)
 
-        executor = Cluster(client, cluster_worker.compute)
+        executor = DaskExecutor(client, cluster_worker.compute_block)
         found = mw.sweep(study, out, root=ROOT, executor=executor, progress=kill)
-    return {"variants": found.computed, "lost": len(found.lost), "kills": len(killed)}
+    return {"variants": found.computed, "lost": len(found.lost_blocks), "kills": len(killed)}
 
 
 def a_million_variants() -> Figure:
@@ -158,18 +158,18 @@ def a_million_variants() -> Figure:
 def million(out: str) -> dict[str, Any]:
     """Run a million variants on two workers; the scheduler is in the client's process, too."""
     from sweep.address import Address, Credentials
-    from sweep.cluster import Cluster
-    from sweep.clustering import Staff, connected
+    from sweep.cluster import DaskExecutor
+    from sweep.clustering import WorkerSetup, open_client
     from sweep.study_run import run_study
     from sweep.summary import summary_of
-    from tests.sweep.killing import own, quickly
-    from tests.sweep.laying import study
+    from tests.sweep.killing import answer_quickly, own_fingerprint
+    from tests.sweep.laying import make_study
 
     axes = "{linspace: [1 rad/s, 3 rad/s, 1000]}", "{linspace: [0 1/s, 1 1/s, 1000]}"
     changes = (("[1 rad/s, 3 rad/s]", axes[0]), ("[0.05 1/s, 0.3 1/s]", axes[1]))
-    made = study("alone", *changes, ("one_at_a_time", "grid"))
-    with connected(Address(count=2), Credentials(), Staff(own)) as client:
-        found = run_study(made, Path(out), Cluster(client, quickly))
+    made = make_study("alone", *changes, ("one_at_a_time", "grid"))
+    with open_client(Address(count=2), Credentials(), WorkerSetup(own_fingerprint)) as client:
+        found = run_study(made, Path(out), DaskExecutor(client, answer_quickly))
     return {"variants": summary_of(found.store).lines[0].count}
 
 

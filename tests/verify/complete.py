@@ -18,9 +18,9 @@ import numpy as np
 import modewright as mw
 from tests.engine.test_tip_out import ALWAYS, DISCONTINUOUS, MANOEUVRES, PAPER, scenario, truth
 from tests.large.shapes import modes_of_equations
-from tests.verify.first_drive import refused
+from tests.verify.first_drive import check_refused_specs
 from tests.verify.processor import seconds_of
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 CORES = ("Haswell", "SandyBridge", "Prescott")
 """Kernels of OpenBLAS that give three patterns of bits."""
@@ -53,12 +53,12 @@ def main() -> int:
     found["table_1"] = table_1
     found["generate_on_three_kernels"] = generate_anywhere
     found["lockstep_of_types"] = lockstep_of_types
-    found["refused"] = refused
+    found["refused"] = check_refused_specs
     found["check_cold"] = check_cold
     found["check_of_3_mb"] = check_of_3_mb
     for name, path in ({} if is_part else SUITES).items():
         found[name] = partial(suite, path)
-    return measured("language_and_engine", found)
+    return measure_figures("language_and_engine", found)
 
 
 def manoeuvre(name: str) -> Figure:

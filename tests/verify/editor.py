@@ -15,8 +15,8 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 sys.path.insert(0, str(ROOT))
 
-from tests.lsp.talk import Talk, seconds_of_edit  # noqa: E402
-from tests.verify.store import Figure, measured  # noqa: E402
+from tests.lsp.talk import LspClient, seconds_of_edit  # noqa: E402
+from tests.verify.store import Figure, measure_figures  # noqa: E402
 
 MODES = 30
 WAYS = 6
@@ -28,13 +28,13 @@ EDIT_SECONDS = 0.3
 
 def main() -> int:
     """Measure what is not measured yet; return 0 if every bar is met."""
-    return measured("mode_logic", {"edits": edits})
+    return measure_figures("mode_logic", {"edits": edits})
 
 
 def edits() -> Figure:
     """Edits of a chart of 30 modes and 180 transitions, half of them mistakes."""
     text = spec()
-    with tempfile.TemporaryDirectory() as name, Talk() as talk:
+    with tempfile.TemporaryDirectory() as name, LspClient() as talk:
         path = Path(name) / "spec" / "large.yaml"
         path.parent.mkdir()
         path.write_text(text)

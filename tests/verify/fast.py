@@ -12,9 +12,9 @@ from collections.abc import Callable
 from functools import partial
 
 from tests.bench import figures
-from tests.bench.first_step import first_step
-from tests.bench.run import PAIRS, machine
-from tests.verify.store import ROOT, Figure, measured
+from tests.bench.first_step import measure_first_step
+from tests.bench.run import PAIRS, machine_info
+from tests.verify.store import ROOT, Figure, measure_figures
 
 INTERPRETER, SPEED_ERROR = 1.5, 1e-6
 """Most of scipy's time, at this largest error of w_em over its peak."""
@@ -47,7 +47,7 @@ def main() -> int:
     for step in figures.STEPS:
         found[f"accuracy_at_{step.replace(' ', '_')}"] = partial(accuracy, step)
         found[f"crossings_at_{step.replace(' ', '_')}"] = partial(crossings, step)
-    return measured("performance", found)
+    return measure_figures("performance", found)
 
 
 def interpreter_over_scipy(pairs: int) -> Figure:
@@ -55,7 +55,7 @@ def interpreter_over_scipy(pairs: int) -> Figure:
     figure = figures.interpreter_over_scipy(pairs)
     errors = figure["errors"]["interpreter"]
     met = figure["median"] <= INTERPRETER and errors["is_complete"]
-    return {"met": met and errors["largest"] <= SPEED_ERROR, **figure, "machine": machine()}
+    return {"met": met and errors["largest"] <= SPEED_ERROR, **figure, "machine": machine_info()}
 
 
 def compiled_over_c(pairs: int, step: str) -> Figure:
@@ -67,7 +67,7 @@ def compiled_over_c(pairs: int, step: str) -> Figure:
 
 def first_compiled_step() -> Figure:
     """Processor time from specs to the end of a first compiled run, the median of five."""
-    found = sorted((first_step() for _ in range(5)), key=lambda one: float(one["total_s"]))
+    found = sorted((measure_first_step() for _ in range(5)), key=lambda one: float(one["total_s"]))
     return {"met": found[2]["total_s"] < FIRST_STEP, **found[2]}
 
 

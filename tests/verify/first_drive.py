@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 PAPER = ROOT / "tests" / "data" / "paper"
 DRIVES = {"drive_eco": 20.151, "drive_2": 7.55}
@@ -33,7 +33,7 @@ def main() -> int:
     parser.add_argument("--recordings", default=os.environ.get("MODEWRIGHT_RECORDINGS"))
     named = parser.parse_args().recordings
     os.chdir(ROOT)
-    return measured("reference_traces", figures(Path(named) if named else None))
+    return measure_figures("reference_traces", figures(Path(named) if named else None))
 
 
 def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:
@@ -41,7 +41,7 @@ def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:
     found: dict[str, Callable[[], Figure]] = {"tip_out": tip_out, "lockstep": lockstep}
     for suffix in ("", "_noisy"):
         found[f"replay_1kHz{suffix}"] = partial(reference_replay, suffix)
-    found["refused"] = refused
+    found["refused"] = check_refused_specs
     if recordings:
         for drive in DRIVES:
             for estimator in ("estimator", "estimator_simple"):
@@ -128,7 +128,7 @@ def leaf(estimator: str, path: Path) -> Figure:
     }
 
 
-def refused() -> Figure:
+def check_refused_specs() -> Figure:
     """Specs that are refused with exactly the text beside them."""
     book = (ROOT / "tests" / "refused").glob("*.yaml")
     specs = [spec for spec in sorted(book) if not spec.stem.endswith(".repaired")]

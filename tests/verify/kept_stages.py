@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 SEED = 5
 """Of the case, and of the instants."""
@@ -29,7 +29,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=10, help="instants")
     kills: int = parser.parse_args().kills
     os.chdir(ROOT)
-    return measured("diagnosis", {"killed_and_resumed": partial(killed_and_resumed, kills)})
+    return measure_figures("diagnosis", {"killed_and_resumed": partial(killed_and_resumed, kills)})
 
 
 def killed_and_resumed(kills: int = 10) -> Figure:

@@ -20,15 +20,15 @@ from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.starting import programs_of
 from language.load import program_of
-from language.number import NUMBERS, NumberType
+from language.number import NUMBER_TYPES, NumberType
 from language.printing import digest
 from language.program import Program
 from language.signal import Stimulus
-from language.stimulus import held
-from language.system import around, in_numbers
-from lockstep.compare import Tape, compare
+from language.stimulus import constant_pieces
+from language.system import single_instance_system, with_number_type
+from lockstep.compare import TickLog, compare
 from modewright.api import Loaded, load
-from tests.verify.store import ROOT, write
+from tests.verify.store import ROOT, write_json
 
 EVIDENCE = ROOT / "docs" / "evidence" / "lockstep.json"
 PART = 50_000
@@ -44,7 +44,7 @@ def main() -> int:
     ticks: int = parser.parse_args().ticks
     os.chdir(ROOT)
     found = json.loads(EVIDENCE.read_text()) if EVIDENCE.exists() else {}
-    for number in NUMBERS:
+    for number in NUMBER_TYPES:
         sampled = estimators(number)
         for program in [*sampled, plant(number)]:
             parts = -(-ticks // (PART * (len(sampled) if program.period else 1)))
@@ -55,14 +55,14 @@ def main() -> int:
             for part in range(parts):
                 if str(part) not in kept["parts"]:
                     kept["parts"][str(part)] = measured(program, part)
-                    write(EVIDENCE, found, sort_keys=True)
+                    write_json(EVIDENCE, found, sort_keys=True)
                     print(f"{program.name} {number} part {part}: {kept['parts'][str(part)]}")
     return report(found, ticks)
 
 
 def estimators(number: NumberType) -> list[Program]:
     """Return the sampled instances of the shipped system in a number type."""
-    system = in_numbers(load("ev_driveline", "tip_out").system, number)
+    system = with_number_type(load("ev_driveline", "tip_out").system, number)
     automata = [instance.automaton for instance in system.instances.values()]
     return [program_of(automaton) for automaton in automata if automaton.is_sampled]
 
@@ -76,13 +76,13 @@ def plant(number: NumberType) -> Program:
 def driven(number: NumberType, part: int) -> Loaded:
     """Return the plant alone with a torque that steps every 0.4 s, for as many steps as a part."""
     loaded = load("ev_driveline", "tip_out")
-    automaton = in_numbers(loaded.system, number).instances["plant"].automaton
+    automaton = with_number_type(loaded.system, number).instances["plant"].automaton
     draw = random.Random(f"plant {part}")
     horizon = automaton.step * PART
     starts = [Fraction(2 * k, 5) for k in range(int(horizon * 5 / 2) + 1)]
-    torque = held([(start, Fraction(draw.randint(-60, 60))) for start in starts])
+    torque = constant_pieces([(start, Fraction(draw.randint(-60, 60))) for start in starts])
     given = {
-        n: Stimulus(held([(Fraction(0), i.default or Fraction(0))]))
+        n: Stimulus(constant_pieces([(Fraction(0), i.default or Fraction(0))]))
         for n, i in automaton.inputs.items()
     }
     scenario = dataclasses.replace(
@@ -93,7 +93,7 @@ def driven(number: NumberType, part: int) -> Loaded:
         inputs={**given, "T_em": Stimulus(torque)},
         every=Fraction(1),
     )
-    return Loaded(around(automaton), scenario)
+    return Loaded(single_instance_system(automaton), scenario)
 
 
 def measured(program: Program, part: int) -> dict[str, int]:
@@ -108,20 +108,22 @@ def measured(program: Program, part: int) -> dict[str, int]:
     }
 
 
-def moved(program: Program, part: int) -> Tape:
+def moved(program: Program, part: int) -> TickLog:
     """Return the tape of the plant, step by step."""
-    loaded, tape = driven(program.number, part), Tape(program, program.name)
+    loaded, tape = driven(program.number_type, part), TickLog(program, program.name)
     run = simulate(
-        loaded.system, loaded.scenario, ticked=lambda name, used, stepper: tape.record(stepper)
+        loaded.system,
+        loaded.scenario,
+        on_tick=lambda name, used, stepper: tape.record_tick(stepper),
     )
     if run.stopped:
         raise RuntimeError(run.stopped)
     return tape
 
 
-def estimated(program: Program, part: int) -> Tape:
+def estimated(program: Program, part: int) -> TickLog:
     """Return the tape of an estimator on seeded inputs."""
-    stepper, tape = Interpreter(program), Tape(program, program.name)
+    stepper, tape = Interpreter(program), TickLog(program, program.name)
     for variable in program.variables:
         if variable.name.startswith("is_new."):
             stepper.set(variable.name, True)
@@ -129,7 +131,7 @@ def estimated(program: Program, part: int) -> Tape:
         for variable in program.inputs:
             stepper.set(variable.name, values.get(variable.name, 0.0))
         stepper.run("step")
-        tape.record(stepper)
+        tape.record_tick(stepper)
     return tape
 
 
@@ -158,7 +160,7 @@ def drive(part: int, period: float) -> Iterator[dict[str, float]]:
 def report(found: dict[str, dict[str, dict[str, dict[str, int]]]], ticks: int) -> int:
     """Print the sums by number type; return 0 if every bar is met."""
     fine = True
-    for number in NUMBERS:
+    for number in NUMBER_TYPES:
         for what, is_plant in (("estimators", False), ("plant", True)):
             kept = [
                 k["parts"]

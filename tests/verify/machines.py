@@ -12,8 +12,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tests.diagnosis.machines import emps, leaf
-from tests.verify.store import ROOT, Figure, measured
+from tests.diagnosis.machines import diagnose_emps, diagnose_leaf
+from tests.verify.store import ROOT, Figure, measure_figures
 
 EXACT, OFFSET, FORCE = 0.03, 0.06, 0.06
 """Bars of EMPS: M, Fv, Fc and the offset against what is published, and NRMSE of the force."""
@@ -35,12 +35,12 @@ def main() -> int:
         "emps_friction_and_offset": partial(servo_axis, folder),
         "leaf_gap": partial(gap, folder),
     }
-    return measured("diagnosis", found)
+    return measure_figures("diagnosis", found)
 
 
 def servo_axis(recordings: Path) -> Figure:
     """Friction and offset named, with the values that are published."""
-    figure = emps(recordings)
+    figure = diagnose_emps(recordings)
     off = figure["off"]
     is_exact = all(off.get(name, 1.0) <= EXACT for name in ("M", "F_v", "T_c"))
     is_exact = is_exact and off.get("offset", 1.0) <= OFFSET
@@ -51,8 +51,8 @@ def servo_axis(recordings: Path) -> Figure:
 def gap(recordings: Path) -> Figure:
     """The gap named first from either drive, alike, and of use on the other."""
     drives = [
-        leaf(recordings, "drive_eco", "drive_2"),
-        leaf(recordings, "drive_2", "drive_eco"),
+        diagnose_leaf(recordings, "drive_eco", "drive_2"),
+        diagnose_leaf(recordings, "drive_2", "drive_eco"),
     ]
     gaps = [drive["half_gap"] or 0.0 for drive in drives]
     stiffness = [drive["k_hs"] for drive in drives]

@@ -19,7 +19,7 @@ from statistics import median
 from typing import Any
 
 from tests.open_generator.__main__ import main as generate
-from tests.verify.store import CODE, ROOT, Figure, code_digest, measured
+from tests.verify.store import CODE, ROOT, Figure, code_digest, measure_figures
 
 SEED = 20261201
 EFFECTS = "all:5,none:65"
@@ -41,7 +41,7 @@ def main() -> int:
             open_generator, given.seed, given.effects, given.jobs, given.first
         )
     }
-    return measured("diagnosis", rates)
+    return measure_figures("diagnosis", rates)
 
 
 def open_generator(seed: int, effects: str, jobs: int, first: int | None = None) -> Figure:

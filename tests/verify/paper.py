@@ -10,13 +10,13 @@ import time
 from functools import partial
 from typing import Any
 
-from language.longest import most_operations
+from language.longest import max_operations
 from modewright.api import program
 from modewright.code import instructions as counted_of, metrics
 from tests.paper.claims import PUBLISHED
 from tests.paper.observers import NOTES
 from tests.paper.page import JSON
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 BARS = {"100": (0.80, 1.6, 100.0), "1000": (0.75, 1.35, 30.0), "10000": (0.28, 0.6, 30.0)}
 """Of the better observer by rate [Hz]: median and 95th percentile of the first delay [ms], false
@@ -31,7 +31,7 @@ TYPICAL, MOST = 8400, 42000
 def main() -> int:
     """Measure what is not measured yet; return 0 if every bar is met."""
     os.chdir(ROOT)
-    return measured(
+    return measure_figures(
         "paper",
         {
             "paper": reproduced,
@@ -91,7 +91,7 @@ def instructions() -> Figure:
     counted = counted_of("hko", "ev_driveline_can", "random_manoeuvre", numbers="float32")
     largest = max(counted.steps)
     bound = metrics("hko", numbers="float32").longest
-    operations = most_operations(program("hko").blocks, "step")
+    operations = max_operations(program("hko").blocks, "step")
     met = counted.mean <= TYPICAL and bound is not None and largest <= bound <= MOST
     return {
         "met": met,

@@ -14,11 +14,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from codegen.source import c_files
+from codegen.source import emit_c_files
 from language.printing import digest
 from language.program import Program
 from tests.lockstep.chance.spec import Spec
-from tests.verify.store import ROOT, Figure, write
+from tests.verify.store import ROOT, Figure, write_json
 
 PART = 20
 """Specs of a part: a kill loses less than a minute."""
@@ -27,7 +27,7 @@ HITS = 20
 Programs = list[tuple[Spec, Program]]
 
 
-def verified(
+def verify_parts(
     about: str | None,
     name: str,
     full: int,
@@ -51,7 +51,7 @@ def verified(
             if found.get(str(start), {}).get("digest") == key:
                 continue
             found[str(start)] = {"digest": key, **part(pairs, Path(folder))}
-        write(evidence, found, sort_keys=True)
+        write_json(evidence, found, sort_keys=True)
         print(f"{name} {start} to {start + PART - 1}: {found[str(start)]['bits']}", flush=True)
     return [found[str(start)] for start in range(0, count, PART)], -(-HITS * count // full)
 
@@ -62,5 +62,5 @@ def _key_of(pairs: Programs) -> str:
     for path in sorted((ROOT / "engine").glob("*.py")):
         total.update(path.read_bytes())
     for _, made in pairs:
-        total.update("".join((digest(made), *c_files(made).values())).encode())
+        total.update("".join((digest(made), *emit_c_files(made).values())).encode())
     return total.hexdigest()

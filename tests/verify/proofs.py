@@ -11,7 +11,7 @@ from functools import partial
 
 from codegen.proofs.all import CHECKS
 from modewright.code import prove
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 SUBJECT = "c_code"
 AUTOMATA = (
@@ -26,7 +26,7 @@ def main() -> int:
     figures = {
         f"{check} of {name}": partial(proved, name, check) for check in CHECKS for name in AUTOMATA
     }
-    return measured(SUBJECT, figures)
+    return measure_figures(SUBJECT, figures)
 
 
 def proved(name: str, check: str) -> Figure:

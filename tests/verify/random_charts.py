@@ -11,13 +11,13 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from language.number import NUMBERS
+from language.number import NUMBER_TYPES
 from tests.lockstep.chance.batch import Batch
-from tests.lockstep.chance.chart_hits import KINDS, ChartHits, automaton_again
+from tests.lockstep.chance.chart_hits import KINDS, ChartHits, reload_automaton
 from tests.lockstep.chance.charts import chart_of
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import program
-from tests.verify.parts import Programs, verified
+from tests.verify.parts import Programs, verify_parts
 from tests.verify.store import Figure
 
 CHARTS, TICKS = 300, 500
@@ -27,23 +27,23 @@ MOVING, OF_ALL = 3, 0.8
 
 def main() -> int:
     """Run the parts that are missing; return 0 if every figure is met."""
-    return report(*verified(__doc__, "charts", CHARTS, programs, part))
+    return report(*verify_parts(__doc__, "charts", CHARTS, programs, measure_part))
 
 
 def programs(numbers: range, folder: Path) -> Programs:
     """Return some random charts with their Programs, in both number types by turns."""
     charts = [(number, chart_of(number)) for number in numbers]
-    return [(spec, program(spec, NUMBERS[k % 2], folder)) for k, spec in charts]
+    return [(spec, program(spec, NUMBER_TYPES[k % 2], folder)) for k, spec in charts]
 
 
-def part(pairs: Programs, folder: Path, ticks: int = TICKS) -> Figure:
+def measure_part(pairs: Programs, folder: Path, ticks: int = TICKS) -> Figure:
     """Return what some charts give: bits, how many of them move, and what they do."""
     batch = Batch([made for _, made in pairs], folder / "batch")
     bits: Counter[str] = Counter()
     hits: Counter[str] = Counter()
     for spec, made in pairs:
-        watch = ChartHits(automaton_again(spec, folder), made)
-        tape = taped(spec, made, ticks, look=watch.look)
+        watch = ChartHits(reload_automaton(spec, folder), made)
+        tape = record_ticks(spec, made, ticks, look=watch.observe)
         verdict = batch.verdict(tape)
         if verdict.first:
             print(f"{made.name}: {verdict.first}")

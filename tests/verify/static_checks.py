@@ -19,7 +19,7 @@ import modewright as mw  # noqa: E402
 from modewright.checking import spec_files  # noqa: E402
 from tests.large.charts import large_chart  # noqa: E402
 from tests.verify.processor import seconds_of  # noqa: E402
-from tests.verify.store import Figure, measured  # noqa: E402
+from tests.verify.store import Figure, measure_figures  # noqa: E402
 
 SECONDS = 3.0
 """For the whole command, 30 modes and 180 transitions."""
@@ -31,7 +31,7 @@ CASES = ROOT / "tests" / "refused"
 def main() -> int:
     """Measure what is not measured yet; return 0 if every bar is met."""
     figures = {"check_of_180_transitions": large, "alarms": alarms, "kinds_of_logic": kinds}
-    return measured("mode_logic", figures)
+    return measure_figures("mode_logic", figures)
 
 
 def large() -> Figure:

@@ -19,7 +19,7 @@ SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt", ".c", ".h", ".ld")
 Figure = dict[str, Any]
 
 
-def measured(subject: str, figures: Mapping[str, Callable[[], Figure]]) -> int:
+def measure_figures(subject: str, figures: Mapping[str, Callable[[], Figure]]) -> int:
     """Measure what is not measured yet, keep and print all; return 0 if every bar is met."""
     path = ROOT / "docs" / "evidence" / f"{subject}.json"
     digest = code_digest((*CODE, "diagnosis") if subject == DIAGNOSIS else CODE)
@@ -47,10 +47,10 @@ def code_digest(folders: Sequence[str] = CODE) -> str:
 
 
 def _write(path: Path, subject: str, digest: str, figures: Mapping[str, Figure]) -> None:
-    write(path, {"subject": subject, "code": digest, "figures": figures})
+    write_json(path, {"subject": subject, "code": digest, "figures": figures})
 
 
-def write(path: Path, known: Mapping[str, Any], sort_keys: bool = False) -> None:
+def write_json(path: Path, known: Mapping[str, Any], sort_keys: bool = False) -> None:
     """Write what is known as JSON, whole or not at all."""
     path.parent.mkdir(exist_ok=True)
     temporary = path.with_suffix(".tmp")

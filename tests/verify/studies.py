@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 KILLS = 20
 STUDIES = ROOT / "tests" / "data" / "studies"
@@ -59,7 +59,7 @@ def main() -> int:
     }
     if not parser.parse_args().part:
         figures["study_of_a_million_variants"] = a_million_variants
-    return measured("performance", figures)
+    return measure_figures("performance", figures)
 
 
 def killed_at_random_instants() -> Figure:

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
 
-from codegen.build import optimised
+from codegen.build import flags_at_level
 from codegen.machine import CORTEX_M4F, HOST, Machine
-from language.number import NUMBERS, NumberType
-from lockstep.compare import Tape, compare
-from tests.target.closed_loop import driveline, supervisor
-from tests.verify.store import ROOT, Figure, measured
+from language.number import NUMBER_TYPES, NumberType
+from lockstep.compare import TickLog, compare
+from tests.target.closed_loop import record_driveline, record_supervisor
+from tests.verify.store import ROOT, Figure, measure_figures
 
 LEVELS = ("O0", "O2", "O3", "Os")
 BUILDS: tuple[tuple[str, Machine, str | None], ...] = (
@@ -25,11 +25,11 @@ BUILDS: tuple[tuple[str, Machine, str | None], ...] = (
     (CORTEX_M4F.name, CORTEX_M4F, None),
 )
 SUBJECT, STEPS = "c_code", 20_000
-LOOPS: dict[str, Callable[[NumberType], dict[str, Tape]]] = {
-    "plant": lambda number: driveline(number, Fraction(STEPS, 4000), ["plant"]),
-    "est": lambda number: driveline(number, Fraction(STEPS, 1000), ["est"]),
-    "simple": lambda number: driveline(number, Fraction(STEPS, 100), ["simple"]),
-    "sup": lambda number: supervisor(number, Fraction(STEPS, 100)),
+LOOPS: dict[str, Callable[[NumberType], dict[str, TickLog]]] = {
+    "plant": lambda number: record_driveline(number, Fraction(STEPS, 4000), ["plant"]),
+    "est": lambda number: record_driveline(number, Fraction(STEPS, 1000), ["est"]),
+    "simple": lambda number: record_driveline(number, Fraction(STEPS, 100), ["simple"]),
+    "sup": lambda number: record_supervisor(number, Fraction(STEPS, 100)),
 }
 """Instances with the loops that run them for so many steps: of 0.25, 1, 10 and 10 ms."""
 
@@ -39,10 +39,10 @@ def main() -> int:
     os.chdir(ROOT)
     figures = {
         f"bits of {name}, {number}": partial(compared, name, number)
-        for number in NUMBERS
+        for number in NUMBER_TYPES
         for name in LOOPS
     }
-    return measured(SUBJECT, figures)
+    return measure_figures(SUBJECT, figures)
 
 
 def compared(name: str, number: NumberType) -> Figure:
@@ -51,7 +51,7 @@ def compared(name: str, number: NumberType) -> Figure:
     found = {}
     for build, machine, named in BUILDS:
         for level in LEVELS:
-            verdict = compare(tape, optimised(level), named, machine)
+            verdict = compare(tape, flags_at_level(level), named, machine)
             found[f"{build} -{level}"] = verdict.differing
     ticks = len(tape.values)
     return {

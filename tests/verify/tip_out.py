@@ -10,12 +10,12 @@ import tempfile
 from pathlib import Path
 
 import modewright as mw
-from diagnosis.dossier import Dossier
-from diagnosis.wording import oscillation
-from tests.open_generator.case import courses
+from diagnosis.dossier import DiagnosisReport
+from diagnosis.wording import format_oscillation
+from tests.open_generator.case import simulate_cases
 from tests.open_generator.recording import write_case
-from tests.open_generator.tip_out import SHAFT, VARIANT, tip_outs
-from tests.verify.store import ROOT, Figure, measured
+from tests.open_generator.tip_out import SHAFT, VARIANT, tip_out_case
+from tests.verify.store import ROOT, Figure, measure_figures
 
 LESS = 0.6
 """Most of the held-out misfit of free simulation that is left with the effect."""
@@ -24,7 +24,7 @@ LESS = 0.6
 def main() -> int:
     """Measure what is not measured yet; return 0 if the bar is met."""
     os.chdir(ROOT)
-    return measured("diagnosis", {"paper_tip_out": paper_tip_out})
+    return measure_figures("diagnosis", {"paper_tip_out": paper_tip_out})
 
 
 def paper_tip_out() -> Figure:
@@ -32,16 +32,16 @@ def paper_tip_out() -> Figure:
     hidden, clean = diagnosed(hidden=True), diagnosed(hidden=False)
     verdict, found = hidden.verdict, hidden.diagnosis
     assert found
-    before, after = found.shuffles
+    before, after = found.oscillations
     fit = verdict.fit["held_out"].values()
     left = [one.nrmse_after / one.nrmse_before for one in fit]
     names = [(one.id, one.place) for one in verdict.effects]
-    told = oscillation(hidden)
+    told = format_oscillation(hidden)
     met = (
         names == [(SHAFT.name, "elements.half_shaft")]
         and verdict.confirmed is True
         and "growing as the amplitude falls" in told
-        and after.until > before.until
+        and after.followed_time > before.followed_time
         and max(left) < LESS
         and clean.verdict.verdict == "nothing_missing"
     )
@@ -49,19 +49,19 @@ def paper_tip_out() -> Figure:
         "met": met,
         "told": told,
         "effects": [f"{name}@{place}" for name, place in names],
-        "fits_until_s": [round(before.until, 2), round(after.until, 2)],
+        "fits_until_s": [round(before.followed_time, 2), round(after.followed_time, 2)],
         "held_out_misfit_left": [round(one, 2) for one in left],
         "confirmed": verdict.confirmed,
         "clean": clean.verdict.verdict,
     }
 
 
-def diagnosed(hidden: bool) -> Dossier:
+def diagnosed(hidden: bool) -> DiagnosisReport:
     """Return the diagnosis of the tip-outs."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        case = tip_outs(hidden)
-        write_case(folder, case, courses([case])[0])
+        case = tip_out_case(hidden)
+        write_case(folder, case, simulate_cases([case])[0])
         spec = folder / "spec"
         spec.mkdir()
         (spec / "paper_driveline.yaml").write_text(VARIANT)

@@ -11,9 +11,9 @@ from fractions import Fraction
 from functools import partial
 
 from codegen.machine import CORTEX_M4F, HOST, Machine
-from tests.target.closed_loop import driveline
+from tests.target.closed_loop import record_driveline
 from tests.twin.duel import duel
-from tests.verify.store import ROOT, Figure, measured
+from tests.verify.store import ROOT, Figure, measure_figures
 
 SUBJECT, MOST = "c_code", 1.1
 TWINS = {"est": ("estimator", Fraction(20)), "plant": ("plant", Fraction(5))}
@@ -30,13 +30,15 @@ def main() -> int:
         for name in TWINS
         for machine in (HOST, CORTEX_M4F)
     }
-    return measured(SUBJECT, figures)
+    return measure_figures(SUBJECT, figures)
 
 
 def against(name: str, machine: Machine) -> Figure:
     """Return what a step takes, of the generated code and of its twin, in one run."""
     twin, horizon = TWINS[name]
-    found = duel(driveline("float32", horizon, [name])[name], twin, ROUNDS[machine.name], machine)
+    found = duel(
+        record_driveline("float32", horizon, [name])[name], twin, ROUNDS[machine.name], machine
+    )
     generated, by_hand = found.best
     return {
         "steps": found.steps,

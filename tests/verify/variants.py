@@ -11,12 +11,12 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from diagnosis.layers import Layer
+from diagnosis.layers import PlacedEffect
 from language.problem import SpecError
 from language.project import Project
-from tests.diagnosis.accepting import acceptable
-from tests.diagnosis.variant_run import variant_run
-from tests.verify.store import ROOT, Figure, measured
+from tests.diagnosis.accepting import acceptable_layers
+from tests.diagnosis.variant_run import run_variant
+from tests.verify.store import ROOT, Figure, measure_figures
 
 
 def main() -> int:
@@ -25,22 +25,24 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, help="only each n-th of them")
     every: int = parser.parse_args().every
     os.chdir(ROOT)
-    return measured("diagnosis", {"variants_in_lockstep": partial(variants_in_lockstep, every)})
+    return measure_figures(
+        "diagnosis", {"variants_in_lockstep": partial(variants_in_lockstep, every)}
+    )
 
 
 def variants_in_lockstep(every: int = 1) -> Figure:
     """Accept each effect of the library at each place of the base, and run what is written."""
-    layers = acceptable(Project(ROOT))[::every]
+    layers = acceptable_layers(Project(ROOT))[::every]
     faults = {layer.id: fault for layer in layers if (fault := _fault(layer))}
     effects = sorted({layer.effect.name for layer in layers})
     return {"met": not faults, "effects": len(effects), "variants": len(layers), "faults": faults}
 
 
-def _fault(layer: Layer) -> str:
+def _fault(layer: PlacedEffect) -> str:
     """Return what is wrong with a variant; empty where nothing is."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         try:
-            found = variant_run(Path(name), [layer])
+            found = run_variant(Path(name), [layer])
         except SpecError as error:
             return str(error)
     return "" if found.is_whole else str(found)

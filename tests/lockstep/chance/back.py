@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from random import Random
 
-from tests.lockstep.chance.models import Carried
+from tests.lockstep.chance.models import PlantModel
 
 WISH = re.compile(r"<back (\w+) (\w+)>")
 """Where a transition from a mode to another may go back."""
@@ -15,7 +15,7 @@ WITHINS_MS = (7, 10, 25, 80, 640)
 """Less than a tick, whole ticks, and between them, up to the most that are kept."""
 
 
-def with_rewinds(draw: Random, lines: list[str], model: Carried | None) -> list[str]:
+def with_rewinds(draw: Random, lines: list[str], model: PlantModel | None) -> list[str]:
     """Return the lines with some wishes granted: then runs have one substep, sources one flow."""
     carriers = _carriers(lines)
     wishes = [wish.groups() for line in lines for wish in WISH.finditer(line)]
@@ -40,7 +40,7 @@ def with_rewinds(draw: Random, lines: list[str], model: Carried | None) -> list[
     return found
 
 
-def _rewind(draw: Random, model: Carried, line: str) -> str:
+def _rewind(draw: Random, model: PlantModel, line: str) -> str:
     """Return a rewind to where the guard itself turned true, or to anything."""
     (state, unit, _), _ = model.states
     relation = f"{state} {draw.choice(('<', '>='))} {draw.choice((0, -0.05, 0.1, 0.3))} {unit}"

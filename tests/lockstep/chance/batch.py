@@ -8,14 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from codegen.build import compiler, compiler_version, optimised
+from codegen.build import compiler_version, find_compiler, flags_at_level
 from codegen.harness import write_harness
 from codegen.objects import is_shared, object_of
 from language.program import Program
-from lockstep.compare import Tape, Verdict, judged
+from lockstep.compare import TickLog, Verdict, compare_output
 
-FLAGS = (*optimised("O1"), "-w")
-QUICK = (*optimised("O0"), "-w")
+FLAGS = (*flags_at_level("O1"), "-w")
+QUICK = (*flags_at_level("O0"), "-w")
 """Where a difference has to be seen that an optimiser has no part in."""
 SECONDS = 300
 MAIN = "int main(void)"
@@ -51,7 +51,7 @@ class Batch:
         with ThreadPoolExecutor(2) as pool:
             objects = list(pool.map(partial(_compiled, flags), unique))
         self._target = folder / "batch"
-        _done([*compiler(), *map(str, objects), "-lm", "-o", str(self._target)])
+        _done([*find_compiler(), *map(str, objects), "-lm", "-o", str(self._target)])
 
     def run(self, program: Program, records: bytes) -> bytes:
         """Return the output records of a Program for records of inputs."""
@@ -60,9 +60,9 @@ class Batch:
         assert done.returncode == 0, done.returncode
         return done.stdout
 
-    def verdict(self, tape: Tape) -> Verdict:
+    def verdict(self, tape: TickLog) -> Verdict:
         """Return what the comparison of a tape with the C of its Program gives."""
-        return judged(tape, self.run(tape.program, b"".join(tape.inputs)))
+        return compare_output(tape, self.run(tape.program, b"".join(tape.inputs)))
 
 
 def _sources(program: Program, folder: Path) -> list[Path]:
@@ -79,9 +79,11 @@ def _sources(program: Program, folder: Path) -> list[Path]:
 
 def _compiled(flags: Sequence[str], source: Path) -> Path:
     if is_shared(source):
-        return object_of(source, [*compiler(), *flags], compiler_version(), source.parent / "room")
+        return object_of(
+            source, [*find_compiler(), *flags], compiler_version(), source.parent / "room"
+        )
     target = source.with_suffix(".o")
-    _done([*compiler(), *flags, "-c", str(source), "-o", str(target)])
+    _done([*find_compiler(), *flags, "-c", str(source), "-o", str(target)])
     return target
 
 

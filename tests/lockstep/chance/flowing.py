@@ -17,7 +17,7 @@ METHODS = ("euler", "midpoint", "rk4", "midpoint", "exact", "exponential")
 STATES = ("x", "z", "s")
 
 
-def flowing(draw: Random, name: str) -> Spec:
+def random_continuous_spec(draw: Random, name: str) -> Spec:
     """Return a random continuous automaton."""
     made = _Flowing(draw, name)
     text = "\n".join(made.lines()) + "\n"
@@ -83,7 +83,7 @@ class _Flowing:
         coupled = draw.choice(("", " + 3 * z", " - 9 * x", " + 0.7 * u", " - a * v"))
         if self.method == "exact":
             return f"{damped}{coupled} + {draw.uniform(-9, 9)}"
-        return f"{damped}{coupled} + clip({real(draw, self.scope.plus('s'))}, -40, 40)"
+        return f"{damped}{coupled} + clip({real(draw, self.scope.with_reals('s'))}, -40, 40)"
 
     def _mode(self, mode: str) -> list[str]:
         draw, found = self.draw, [f"  {mode}:", "    flow:"]

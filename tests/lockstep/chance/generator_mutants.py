@@ -9,19 +9,17 @@ from typing import Any
 import pytest
 
 from codegen import expression as printed
-from codegen.statement import Writer
+from codegen.statement import StatementEmitter
 from language.number import NumberType
 from language.operation import Binary, Compare, Expr
-from tests.lockstep.chance.mutant import Mutant, Patch, attribute, lines_without
+from tests.lockstep.chance.mutant import Mutant, Patch, attribute, drop_lines
 
 
 def _reciprocal(whole: Binary, operator: str, left: Expr, right: Expr, place: Any) -> str:
     if operator != "/":
         return _BINARY(whole, operator, left, right, place)
-    one = printed.literal(1.0, place.number)
-    return (
-        f"({printed.c_expression(left, place)}) * ({one} / ({printed.c_expression(right, place)}))"
-    )
+    one = printed.format_literal(1.0, place.number)
+    return f"({printed.emit_expression(left, place)}) * ({one} / ({printed.emit_expression(right, place)}))"
 
 
 def _rough(digits: int) -> Callable[[float, NumberType], str]:
@@ -38,7 +36,7 @@ def _rough(digits: int) -> Callable[[float, NumberType], str]:
 
 def _bare(expr: Expr, place: Any) -> str:
     is_sum = isinstance(expr, Binary) and expr.operator in ("+", "-", "*", "/")
-    return printed.c_expression(expr, place) if is_sum else _OPERAND(expr, place)
+    return printed.emit_expression(expr, place) if is_sum else _OPERAND(expr, place)
 
 
 def _double(value: float | int | bool, number: NumberType) -> str:
@@ -59,17 +57,19 @@ def _everywhere(name: str, value: Any) -> Patch:
     return apply
 
 
-def _short(writer: Writer, timer: str, condition: Expr, limit: int, *told: str) -> Any:
+def _short(writer: StatementEmitter, timer: str, condition: Expr, limit: int, *told: str) -> Any:
     return _COUNT(writer, timer, condition, limit - 1, *told)
 
 
-_COUNT = Writer._count
-_BINARY, _OPERAND, _LITERAL = printed._binary, printed._operand, printed.literal
-_EXPRESSION = printed.c_expression
+_COUNT = StatementEmitter._emit_count
+_BINARY, _OPERAND, _LITERAL = printed._emit_binary, printed._emit_operand, printed.format_literal
+_EXPRESSION = printed.emit_expression
 
 GENERATOR = (
     Mutant(
-        "a division is a product", "generator", attribute("codegen.expression._binary", _reciprocal)
+        "a division is a product",
+        "generator",
+        attribute("codegen.expression._emit_binary", _reciprocal),
     ),
     Mutant(
         "literals have 15 digits", "generator", attribute("codegen.expression.decimal", _rough(15))
@@ -77,11 +77,13 @@ GENERATOR = (
     Mutant(
         "literals have 16 digits", "generator", attribute("codegen.expression.decimal", _rough(16))
     ),
-    Mutant("parentheses are missing", "generator", attribute("codegen.expression._operand", _bare)),
+    Mutant(
+        "parentheses are missing", "generator", attribute("codegen.expression._emit_operand", _bare)
+    ),
     Mutant(
         "float32 is computed in double",
         "generator",
-        attribute("codegen.expression.literal", _double),
+        attribute("codegen.expression.format_literal", _double),
     ),
     Mutant(
         "the relation >= fails on equality",
@@ -91,11 +93,14 @@ GENERATOR = (
     Mutant(
         "a case falls through",
         "generator",
-        attribute("codegen.statement.Writer._choose", lines_without("break;")(Writer._choose)),
+        attribute(
+            "codegen.statement.StatementEmitter._emit_choose",
+            drop_lines("break;")(StatementEmitter._emit_choose),
+        ),
     ),
     Mutant(
         "a counter stops one short in C",
         "generator",
-        attribute("codegen.statement.Writer._count", _short),
+        attribute("codegen.statement.StatementEmitter._emit_count", _short),
     ),
 )

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from engine.closures import Compiler
-from language.number import NUMBERS
+from engine.closures import BlockCompiler
+from language.number import NUMBER_TYPES
 from language.program import Program
-from lockstep.compare import Tape, Verdict, judged
+from lockstep.compare import TickLog, Verdict, compare_output
 from tests.lockstep.chance.batch import QUICK, Batch
-from tests.lockstep.chance.kinds import chance
+from tests.lockstep.chance.kinds import spec_of
 from tests.lockstep.chance.mutant import Mutant
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import Spec, program
 
 AT_ONCE = 2
@@ -22,39 +22,39 @@ AT_ONCE = 2
 
 
 @dataclass(frozen=True)
-class Healthy:
+class ReferenceRun:
     """A spec with its Program, the tape of the interpreter and the records of its C."""
 
     spec: Spec
     program: Program
-    tape: Tape
+    tape: TickLog
     output: bytes
 
     @property
     def verdict(self) -> Verdict:
         """What the comparison gives."""
-        return judged(self.tape, self.output)
+        return compare_output(self.tape, self.output)
 
 
-def healthy(count: int, ticks: int, folder: Path) -> list[Healthy]:
+def run_reference_specs(count: int, ticks: int, folder: Path) -> list[ReferenceRun]:
     """Return the first random specs, run by both sides."""
-    pairs = [(s, program(s, n, folder)) for s in map(chance, range(count)) for n in NUMBERS]
+    pairs = [(s, program(s, n, folder)) for s in map(spec_of, range(count)) for n in NUMBER_TYPES]
     batch = Batch([made for _, made in pairs], folder / "batch")
     found = []
     for spec, made in pairs:
-        tape = taped(spec, made, ticks)
-        found.append(Healthy(spec, made, tape, batch.run(made, b"".join(tape.inputs))))
+        tape = record_ticks(spec, made, ticks)
+        found.append(ReferenceRun(spec, made, tape, batch.run(made, b"".join(tape.inputs))))
     return found
 
 
-def killed_by(
-    mutant: Mutant, specs: list[Healthy], ticks: int, patch: pytest.MonkeyPatch, folder: Path
+def find_killing_spec(
+    mutant: Mutant, specs: list[ReferenceRun], ticks: int, patch: pytest.MonkeyPatch, folder: Path
 ) -> str:
     """Return the first spec in which the mutant differs from the healthy side, '' if none does."""
     if mutant.side == "interpreter":
         return next((one.program.name for one in specs if _differs(mutant, one, ticks, patch)), "")
-    for start in range(0, len(specs), AT_ONCE * len(NUMBERS)):
-        some = specs[start : start + AT_ONCE * len(NUMBERS)]
+    for start in range(0, len(specs), AT_ONCE * len(NUMBER_TYPES)):
+        some = specs[start : start + AT_ONCE * len(NUMBER_TYPES)]
         with patch.context() as patched:
             mutant.patch(patched)
             batch = Batch([one.program for one in some], folder / str(start), QUICK)
@@ -64,10 +64,12 @@ def killed_by(
     return ""
 
 
-def _differs(mutant: Mutant, one: Healthy, ticks: int, patch: pytest.MonkeyPatch) -> bool:
+def _differs(mutant: Mutant, one: ReferenceRun, ticks: int, patch: pytest.MonkeyPatch) -> bool:
     with patch.context() as patched:
         mutant.patch(patched)
-        patched.setattr("engine.interpreter._closures_of", lambda same: Compiler(same.program))
-        tape = taped(one.spec, one.program, ticks, mutant.rewrite(one.program))
+        patched.setattr(
+            "engine.interpreter._compile_program", lambda same: BlockCompiler(same.program)
+        )
+        tape = record_ticks(one.spec, one.program, ticks, mutant.rewrite(one.program))
     # A run that is stopped earlier differs as well.
-    return len(tape.values) != len(one.tape.values) or not judged(tape, one.output).is_equal
+    return len(tape.values) != len(one.tape.values) or not compare_output(tape, one.output).is_equal

@@ -63,13 +63,13 @@ class Hits:
         self.tree: Mapping[str, Any] = yaml.safe_load(spec.text)
         self.ticks = 0
         self._waits = [info for info in program.transitions if info.timer and info.ticks]
-        self._back = {info.number for info in program.transitions if info.rewind}
+        self._back = {info.number for info in program.transitions if info.rewind_ticks}
         self._timers: dict[str, int] = {}
         self._mode = -1
         self._elapsed: list[str] = []
         self._event: Event | None = None
 
-    def look(self, stepper: Interpreter) -> None:
+    def observe(self, stepper: Interpreter) -> None:
         """See what a tick left."""
         self._inputs(stepper)
         if self.program.period is None:

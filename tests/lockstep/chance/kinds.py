@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from random import Random
 
-from tests.lockstep.chance.flowing import flowing
-from tests.lockstep.chance.sampled import sampled
+from tests.lockstep.chance.flowing import random_continuous_spec
+from tests.lockstep.chance.sampled import random_sampled_spec
 from tests.lockstep.chance.spec import Spec
 
 
-def chance(number: int) -> Spec:
+def spec_of(number: int) -> Spec:
     """Return the random spec of a number: always the same."""
     return random_spec(Random(f"luck {number}"), f"chance_{number}")
 
 
 def random_spec(draw: Random, name: str) -> Spec:
     """Return a random spec: one of four is continuous."""
-    return flowing(draw, name) if draw.random() < 0.25 else sampled(draw, name)
+    return (
+        random_continuous_spec(draw, name)
+        if draw.random() < 0.25
+        else random_sampled_spec(draw, name)
+    )

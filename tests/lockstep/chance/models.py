@@ -51,7 +51,7 @@ METHODS = ("euler", "midpoint", "midpoint", "rk4", "exact", "exponential")
 
 
 @dataclass(frozen=True)
-class Carried:
+class PlantModel:
     """A model: names and units of its two states and its input, its modes, what may run it."""
 
     name: str
@@ -62,8 +62,8 @@ class Carried:
     methods: tuple[str, ...]
 
 
-CARRIED = (
-    Carried(
+PLANT_MODELS = (
+    PlantModel(
         "mass",
         MASS,
         (("pos", "m", 5), ("vel", "m/s", 60)),
@@ -71,7 +71,7 @@ CARRIED = (
         ("free", "wall"),
         METHODS,
     ),
-    Carried(
+    PlantModel(
         "swing",
         SWING,
         (("ang", "rad", 4), ("rate", "rad/s", 60)),
@@ -82,12 +82,12 @@ CARRIED = (
 )
 
 
-def method_of(draw: Random, model: Carried) -> str:
+def method_of(draw: Random, model: PlantModel) -> str:
     """Return the method and the number of substeps of all runs of an automaton."""
     return f"{draw.choice(model.methods)}, substeps: {draw.randint(1, 2)}"
 
 
-def advance(draw: Random, model: Carried, method: str) -> tuple[list[str], str]:
+def advance(draw: Random, model: PlantModel, method: str) -> tuple[list[str], str]:
     """Return the lines of a mode that say who carries the states, and a guard on the run or ''."""
     mode = draw.choice(model.modes)
     if draw.random() < 0.6:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import pytest
 
-from language.operation import Block, Branch, Choose, Loop, Op
+from language.operation import Block, Branch, Loop, Op, Switch
 from language.program import Program
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -51,17 +51,17 @@ def attribute(name: str, value: Any) -> Patch:
     return lambda patch: patch.setattr(name, value)
 
 
-def changed(change: Change) -> Callable[[Program], Program]:
+def rewrite_operations(change: Change) -> Callable[[Program], Program]:
     """Return what replaces each operation of a Program by some."""
 
     def rewrite(program: Program) -> Program:
-        blocks = {name: rewritten(block, change) for name, block in program.blocks.items()}
+        blocks = {name: rewrite_block(block, change) for name, block in program.blocks.items()}
         return dataclasses.replace(program, blocks=blocks)
 
     return rewrite
 
 
-def rewritten(block: Block, change: Change) -> Block:
+def rewrite_block(block: Block, change: Change) -> Block:
     """Return a block with each operation replaced, the inner ones first."""
     return tuple(op for old in block for op in change(_inside(old, change)))
 
@@ -69,16 +69,16 @@ def rewritten(block: Block, change: Change) -> Block:
 def _inside(op: Op, change: Change) -> Op:
     match op:
         case Branch(condition, then, other):
-            return Branch(condition, rewritten(then, change), rewritten(other, change))
-        case Choose(selector, cases):
-            return Choose(selector, tuple((n, rewritten(b, change)) for n, b in cases))
+            return Branch(condition, rewrite_block(then, change), rewrite_block(other, change))
+        case Switch(selector, cases):
+            return Switch(selector, tuple((n, rewrite_block(b, change)) for n, b in cases))
         case Loop(count, index, body):
-            return Loop(count, index, rewritten(body, change))
+            return Loop(count, index, rewrite_block(body, change))
         case _:
             return op
 
 
-def lines_without(text: str) -> Callable[[Callable[..., Iterator[str]]], Callable[..., Any]]:
+def drop_lines(text: str) -> Callable[[Callable[..., Iterator[str]]], Callable[..., Any]]:
     """Return what makes of a generator of lines one that leaves some out."""
 
     def outer(made: Callable[..., Iterator[str]]) -> Callable[..., Any]:

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from engine.arithmetic import ARITHMETIC
-from language.number import NUMBERS
-from language.operation import Assign, Block, Branch, Op, Ref, Run, Value
+from engine.arithmetic import ARITHMETIC_OF_TYPE
+from language.number import NUMBER_TYPES
+from language.operation import Assign, Block, Branch, Op, Ref, RunBlock, Value
 from language.program import Program, Variable
-from tests.lockstep.chance.mutant import Mutant, Patch, attribute, changed, item
+from tests.lockstep.chance.mutant import Mutant, Patch, attribute, item, rewrite_operations
 
 ACTIONS = "engine.actions"
 SHAPES = "engine.shapes"
@@ -23,8 +23,8 @@ def _elementary(name: str, function: Callable[..., Any]) -> Patch:
     """An elementary operation that is wrong, in both number types."""
 
     def apply(patch: pytest.MonkeyPatch) -> None:
-        for number in NUMBERS:
-            arithmetic = ARITHMETIC[number]
+        for number in NUMBER_TYPES:
+            arithmetic = ARITHMETIC_OF_TYPE[number]
 
             def wrong(*values: Any, real: Any = arithmetic.real) -> Any:
                 return real(function(*values))
@@ -121,16 +121,16 @@ def _late(program: Program) -> Program:
         more[late] = Variable(late, kind)
         return (Assign(op.target, Ref(late)), Assign(late, op.value))
 
-    made = changed(change)(program)
+    made = rewrite_operations(change)(program)
     return dataclasses.replace(made, variables=(*made.variables, *more.values()))
 
 
 def _early(program: Program) -> Program:
     """`previous` is the value of now: kept before the equations are evaluated."""
     step = program.blocks["step"]
-    keep = tuple(op for op in step if op == Run("keep"))
+    keep = tuple(op for op in step if op == RunBlock("keep"))
     place = next((k for k, op in enumerate(step) if "equations_" in repr(op)), 0)
-    rest = (*step[:place], *keep, *(op for op in step[place:] if op != Run("keep")))
+    rest = (*step[:place], *keep, *(op for op in step[place:] if op != RunBlock("keep")))
     return dataclasses.replace(program, blocks={**program.blocks, "step": rest})
 
 
@@ -206,10 +206,10 @@ INTERPRETER = (
         "interpreter",
         _elementary("floor", lambda x: float(math.trunc(float(x))) if math.isfinite(x) else x),
     ),
-    Mutant("a reset is sequential", "interpreter", rewrite=changed(_at_once("reset"))),
-    Mutant("an update is sequential", "interpreter", rewrite=changed(_at_once("next"))),
-    Mutant("equations are stale after a jump", "interpreter", rewrite=changed(_stale)),
-    Mutant("counters outlive their mode", "interpreter", rewrite=changed(_no_clearing)),
+    Mutant("a reset is sequential", "interpreter", rewrite=rewrite_operations(_at_once("reset"))),
+    Mutant("an update is sequential", "interpreter", rewrite=rewrite_operations(_at_once("next"))),
+    Mutant("equations are stale after a jump", "interpreter", rewrite=rewrite_operations(_stale)),
+    Mutant("counters outlive their mode", "interpreter", rewrite=rewrite_operations(_no_clearing)),
     Mutant("previous is one tick late", "interpreter", rewrite=_late),
     Mutant("previous is the value of now", "interpreter", rewrite=_early),
     Mutant("the largest priority wins", "interpreter", rewrite=_any_priority),

@@ -18,25 +18,25 @@ from language.operation import (
     Op,
     Ref,
     add,
-    whole,
+    integer,
 )
 from language.program import Program, Variable
-from language.traversal import walk
-from tests.lockstep.chance.mutant import rewritten
+from language.traversal import walk_ops
+from tests.lockstep.chance.mutant import rewrite_block
 
 ENABLED = "probe.enabled"
 TWO, ORDER, SWITCH = "probe.two", "probe.order", "probe.switch"
 
 
-def probed(program: Program) -> Program:
+def instrument_program(program: Program) -> Program:
     """Return the Program with its counters."""
-    blocks = {name: rewritten(block, _counted) for name, block in program.blocks.items()}
+    blocks = {name: rewrite_block(block, _counted) for name, block in program.blocks.items()}
     for name, block in blocks.items():
         if name.startswith("jump_"):
             blocks[name] = _jump(block)
         if name.startswith("switch_"):
-            blocks[name] = rewritten(block, _switched)
-    written = {name for block in blocks.values() for op in walk(block) for name in _probe(op)}
+            blocks[name] = rewrite_block(block, _switched)
+    written = {name for block in blocks.values() for op in walk_ops(block) for name in _probe(op)}
     variables = tuple(Variable(name, "whole") for name in sorted(written))
     return dataclasses.replace(program, blocks=blocks, variables=(*program.variables, *variables))
 
@@ -46,7 +46,7 @@ def _probe(op: Op) -> list[str]:
 
 
 def _more(name: str) -> Op:
-    return Assign(name, add(Ref(name, whole=True), whole(1)))
+    return Assign(name, add(Ref(name, is_integer=True), integer(1)))
 
 
 def _counted(op: Op) -> Block:
@@ -74,9 +74,9 @@ def _jump(block: Block) -> Block:
         counts: list[Op] = [_more(f"probe.fired_{number}")]
         counts += [Branch(condition, (_more(ORDER),)) for condition in later[:1]]
         chain = (Branch(link.condition, (*counts, *link.then), chain),)
-    sums: list[Op] = [Assign(ENABLED, whole(0))]
+    sums: list[Op] = [Assign(ENABLED, integer(0))]
     sums += [Branch(link.condition, (_more(ENABLED),)) for link, _ in links]
-    several: Expr = Compare(">", Ref(ENABLED, whole=True), whole(1))
+    several: Expr = Compare(">", Ref(ENABLED, is_integer=True), integer(1))
     return (*block[:-1], *sums, Branch(several, (_more(TWO),)), *chain)
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 from engine.interpreter import Interpreter
 from language.program import Program
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from tests.lockstep.chance.hits import BROKEN, INPUTS, LAST, RULES, Hits
-from tests.lockstep.chance.operations import KINDS, executed
-from tests.lockstep.chance.probe import probed
-from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.operations import KINDS, count_executed
+from tests.lockstep.chance.probe import instrument_program
+from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import Spec
 
 COUNTED_TICKS = 40
@@ -35,7 +35,7 @@ class Quality:
         self.shares.update(other.shares)
         self.hits.update(other.hits)
 
-    def lacking(self, least: int) -> list[str]:
+    def missing_coverage(self, least: int) -> list[str]:
         """Return what is hit less often than asked, in words."""
         found = [
             f"{name}: {self.hits[name]} < {least}"
@@ -54,18 +54,18 @@ class Quality:
         return "\n".join(lines)
 
 
-def measured(spec: Spec, program: Program, ticks: int) -> tuple[Tape, Quality]:
+def measure_quality(spec: Spec, program: Program, ticks: int) -> tuple[TickLog, Quality]:
     """Return the tape of a spec, and what it exercised."""
     hits = Hits(spec, program)
     last: list[Interpreter] = []
 
     def look(stepper: Interpreter) -> None:
-        hits.look(stepper)
+        hits.observe(stepper)
         last[:] = [stepper]
 
-    tape = taped(spec, program, ticks, probed(program), look, hits.log)
+    tape = record_ticks(spec, program, ticks, instrument_program(program), look, hits.log)
     hits.finish(last[0])
-    counts = hits.rules + hits.inputs + executed(spec, program, min(ticks, COUNTED_TICKS))
+    counts = hits.rules + hits.inputs + count_executed(spec, program, min(ticks, COUNTED_TICKS))
     shares = Counter({MOVING: int(tape.transitions >= TRANSITIONS)})
     shares[WAITING] = int(hits.rules[BROKEN] > 0 and hits.rules[LAST] > 0)
     return tape, Quality(1, shares, counts)

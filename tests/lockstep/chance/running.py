@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from random import Random
 
-from engine.continuous import ContinuousRun, Stopped
+from engine.continuous import ContinuousRun, SimulationStopped
 from engine.interpreter import Interpreter
 from engine.trajectory import Event
 from language.program import Program
-from lockstep.compare import Tape
+from lockstep.compare import TickLog
 from tests.lockstep.chance.spec import Spec
 from tests.lockstep.chance.stimulus import Tick, ticks
 
@@ -21,20 +21,20 @@ def nothing(seen: object) -> None:
     """Look at nothing."""
 
 
-def taped(
+def record_ticks(
     spec: Spec,
     program: Program,
     count: int,
     run: Program | None = None,
     look: Look = nothing,
     log: Callable[[Event], None] = nothing,
-) -> Tape:
+) -> TickLog:
     """Return the tape of some ticks or major steps, fewer if the run is stopped.
 
     `run` is what the interpreter runs in place of the Program; `look` sees it after each tick,
     `log` each event of a continuous automaton.
     """
-    stepper, tape = Interpreter(run or program), Tape(program, program.name)
+    stepper, tape = Interpreter(run or program), TickLog(program, program.name)
     inputs = inputs_of(spec, program, stepper, count)
     if program.period is None:
         flow = ContinuousRun(program.name, program, stepper, log)
@@ -59,8 +59,8 @@ def inputs_of(spec: Spec, program: Program, stepper: Interpreter, count: int) ->
         yield tick
 
 
-def _seen(tape: Tape, stepper: Interpreter, look: Look) -> None:
-    tape.record(stepper)
+def _seen(tape: TickLog, stepper: Interpreter, look: Look) -> None:
+    tape.record_tick(stepper)
     look(stepper)
 
 
@@ -68,7 +68,7 @@ def _flow(
     run: ContinuousRun, inputs: Iterator[Tick], count: int, stepped: Callable[[], None]
 ) -> None:
     """As engine/simulate.py does: flow to the end of a step, new inputs, jumps."""
-    run.stepped = stepped
+    run.on_step = stepped
     try:
         for number in range(count):
             if number:
@@ -78,5 +78,5 @@ def _flow(
                 run.start()
             run.settle()
             run.end_step()
-    except Stopped:
+    except SimulationStopped:
         return

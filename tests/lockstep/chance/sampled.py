@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from random import Random
 
 from tests.lockstep.chance.back import with_rewinds
-from tests.lockstep.chance.models import CARRIED, Carried, advance, method_of
+from tests.lockstep.chance.models import PLANT_MODELS, PlantModel, advance, method_of
 from tests.lockstep.chance.spec import Aim, Spec
 from tests.lockstep.chance.words import Scope, real, truth, whole
 
@@ -19,7 +19,7 @@ HANDLING = ("", "", ", fallback: hold", ", fallback: 1.5", ", on_range: hold")
 FAULTY = (", on_range: fault", ", on_range: hold, fallback: 0.5")
 
 
-def sampled(draw: Random, name: str) -> Spec:
+def random_sampled_spec(draw: Random, name: str) -> Spec:
     """Return a random sampled automaton."""
     flavour = draw.choice(("plain", "plain", "plain", "regions", "carried", "carried"))
     made = _Sampled(draw, name, flavour)
@@ -42,7 +42,9 @@ class _Sampled:
 
     def __post_init__(self) -> None:
         draw = self.draw
-        self.model: Carried | None = draw.choice(CARRIED) if self.flavour == "carried" else None
+        self.model: PlantModel | None = (
+            draw.choice(PLANT_MODELS) if self.flavour == "carried" else None
+        )
         self.method = method_of(draw, self.model) if self.model else ""
         self.modes = [f"m_{k}" for k in range(draw.randint(2, 6))]
         self.has_fault_mode = draw.random() < 0.25
@@ -64,7 +66,7 @@ class _Sampled:
         )
         if self.model:
             parts = [f"{state} / 1 {unit}" for state, unit, _ in self.model.states]
-            self.scope = self.scope.plus(*parts)
+            self.scope = self.scope.with_reals(*parts)
         self.conditions = [self._condition(k) for k in range(4)]
 
     def _condition(self, number: int) -> str:
@@ -167,15 +169,17 @@ class _Sampled:
         """A chain, out of order in the file; conditions that waits stand for."""
         draw = self.draw
         found = [
-            f'  e_3: "{real(draw, self.scope.plus("e_2", "e_1"))}"',
+            f'  e_3: "{real(draw, self.scope.with_reals("e_2", "e_1"))}"',
             f'  e_1: "{real(draw, self.scope, 3)}"',
-            f'  e_2: "e_1 * 0.5 - ({real(draw, self.scope.plus("e_1"))})"',
-            f'  e_4: "clip({real(draw, self.scope.plus("e_1", "e_2", "e_3"), 3)}, -40, 40)"',
-            f'  b: "{truth(draw, self.scope.plus("e_1", "e_4"), 2)}"',
+            f'  e_2: "e_1 * 0.5 - ({real(draw, self.scope.with_reals("e_1"))})"',
+            f'  e_4: "clip({real(draw, self.scope.with_reals("e_1", "e_2", "e_3"), 3)}, -40, 40)"',
+            f'  b: "{truth(draw, self.scope.with_reals("e_1", "e_4"), 2)}"',
             f'  i: "{whole(draw, self.scope)}"',
         ]
         found += [f'  q_{k}: "{text}"' for k, text in enumerate(self.conditions)]
-        self.scope = self.scope.plus("e_1", "e_2", "e_3", "e_4").also("b", "i > 2", "q_0", "q_3")
+        self.scope = self.scope.with_reals("e_1", "e_2", "e_3", "e_4").with_truths(
+            "b", "i > 2", "q_0", "q_3"
+        )
         return ["equations:", *found]
 
     def _mode(self, mode: str) -> list[str]:
@@ -189,16 +193,18 @@ class _Sampled:
         if is_plain and draw.random() < 0.3:
             found.append(f'    entry: {{k: "{whole(draw, scope)}", gear: key}}')
         if is_plain and draw.random() < 0.25:
-            found.append(f'    exit: {{z: "{real(draw, scope.plus("s"), 1)}", flag: not flag}}')
+            found.append(
+                f'    exit: {{z: "{real(draw, scope.with_reals("s"), 1)}", flag: not flag}}'
+            )
         if draw.random() < 0.75:
             found += ["    update:", f'      x: "{self._growing()}"']
-            found += [f'      z: "{real(draw, scope.plus("s"), 1)}"'] * draw.randint(0, 1)
+            found += [f'      z: "{real(draw, scope.with_reals("s"), 1)}"'] * draw.randint(0, 1)
             if is_plain:
                 found += ['      k: "if b then k + 1 else k - m"'] * draw.randint(0, 1)
         return found + self._transitions(mode, self.modes, guard, "")
 
     def _growing(self) -> str:
-        step = real(self.draw, self.scope.plus("s"), 1)
+        step = real(self.draw, self.scope.with_reals("s"), 1)
         return self.draw.choice(
             (f"x + clip({step}, -3, 3)", f"0.9 * x + clip({step}, -9, 9)", step)
         )
@@ -249,7 +255,7 @@ class _Sampled:
 
     def _reset(self, names: tuple[str, ...], region: str) -> dict[str, str]:
         """Half of the resets of two swap them."""
-        draw, scope = self.draw, self.scope.plus("s")
+        draw, scope = self.draw, self.scope.with_reals("s")
         if region:
             return {"t": '"x - t"'} if names else {}
         if len(names) > 1 and draw.random() < 0.5:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from random import Random
 
-from language.evaluate import NO_NUMBER
+from language.evaluate import INTEGER_OF_NAN
 from tests.lockstep.chance.spec import Aim, Spec
 
 SUBNORMAL = 5e-324
@@ -44,7 +44,7 @@ def _value(draw: Random, aim: Aim, special: bool) -> float | int | bool:
     if aim.type == "truth":
         return draw.random() < 0.5
     if aim.type in ("whole", "enum"):  # in C an enumeration is a byte
-        beyond = (int(aim.high) + 1, *((255,) if aim.type == "enum" else (-7, NO_NUMBER)))
+        beyond = (int(aim.high) + 1, *((255,) if aim.type == "enum" else (-7, INTEGER_OF_NAN)))
         odd = special and draw.random() < 0.03
         return draw.choice(beyond) if odd else draw.randint(int(aim.low), int(aim.high))
     kind = draw.random()

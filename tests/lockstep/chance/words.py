@@ -27,11 +27,11 @@ class Scope:
     tables: tuple[str, ...] = ()
     memory: tuple[str, ...] = ()
 
-    def plus(self, *reals: str) -> Scope:
+    def with_reals(self, *reals: str) -> Scope:
         """Return the scope with more reals."""
         return replace(self, reals=(*self.reals, *reals))
 
-    def also(self, *truths: str) -> Scope:
+    def with_truths(self, *truths: str) -> Scope:
         """Return the scope with more truth values."""
         return replace(self, truths=(*self.truths, *truths))
 
