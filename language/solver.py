@@ -229,8 +229,8 @@ class _TermBuilder:
         items = self.query.parameter_values.get(table.name) if isinstance(table, Ref) else None
         if not isinstance(table, Ref) or not isinstance(items, tuple):
             raise UnsupportedExpressionError
-        terms = [self.of(argument) for argument in arguments]
-        return self._any(f"lookup {table.name}", terms, min(items), max(items))
+        terms = [self.build(argument) for argument in arguments]
+        return self._uninterpreted(f"lookup {table.name}", terms, min(items), max(items))
 
     def _uninterpreted(self, function: str, terms: list[Any], low: float, high: float) -> Any:
         """Return what any function within bounds gives: equal arguments have equal values."""

@@ -35,11 +35,11 @@ def test_a_small_run_has_every_figure_with_its_errors(
     monkeypatch.setattr(figures, "STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "COMPILED_STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "VARIANTS", 4)
-    monkeypatch.setattr(ours, "library_of", partial(load_library, flags=flags_at_level("O0")))
-    monkeypatch.setattr(variants, "library_of", partial(load_library, flags=flags_at_level("O0")))
+    monkeypatch.setattr(ours, "load_library", partial(load_library, flags=flags_at_level("O0")))
+    monkeypatch.setattr(variants, "load_library", partial(load_library, flags=flags_at_level("O0")))
     monkeypatch.setattr(timing, "SHORTEST", 0.0)
     monkeypatch.setattr(charts, "TICKS_IN_C", 2000)
-    monkeypatch.setattr(run, "first_step", lambda: {"total_s": 1.0, "compiler_s": 0.5})
+    monkeypatch.setattr(run, "measure_first_step", lambda: {"total_s": 1.0, "compiler_s": 0.5})
     path = tmp_path / "bench.json"
     assert run.main(["--pairs", "1", "--out", str(path)]) == 0
     found = json.loads(path.read_text())

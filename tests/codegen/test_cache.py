@@ -36,7 +36,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
         made.append(target)
         run_compiler(command, target)
 
-    monkeypatch.setattr(harness, "linked", counting)
+    monkeypatch.setattr(harness, "run_compiler", counting)
     return made
 
 
@@ -214,7 +214,7 @@ def objects(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         made.append(Path(command[-1]).name)
         run_compiler(command, target)
 
-    monkeypatch.setattr("codegen.objects.linked", counting)
+    monkeypatch.setattr("codegen.objects.run_compiler", counting)
     return made
 
 

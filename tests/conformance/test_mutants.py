@@ -95,7 +95,7 @@ def _still_active(patch: pytest.MonkeyPatch) -> None:
         ops = old(charting, transition, way)
         return tuple(op for op in ops if not _sets(op, numbers))
 
-    patch.setattr("language.micro_step.entering", enter)
+    patch.setattr("language.micro_step.lower_entry_set", enter)
 
 
 def _sets(op: Op, numbers: set[int | None]) -> bool:

@@ -155,7 +155,7 @@ def test_a_few_recordings_in_which_much_is_left_do_not_speak_for_all(
         after = list(outcome.innovations)
         for k in np.argsort(-integrated_autocorrelation_by_recording(alone, rubbing.series))[:bad]:
             after[k] = LOUDER * before[k]
-        vars(outcome)["joined"] = np.concatenate(after)
+        vars(outcome)["stacked"] = np.concatenate(after)
         model = dataclasses.replace(right.model, prediction=outcome)
         selection = dataclasses.replace(right, model=model)
         assert has_autocorrelated_residuals(rubbing, selection)

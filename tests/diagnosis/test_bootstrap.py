@@ -86,7 +86,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A cache of thresholds of its own, for three replicates."""
     folder = tmp_path / "thresholds"
     folder.mkdir()
-    monkeypatch.setattr(bootstrap, "own_folder", lambda part: tmp_path / part)
+    monkeypatch.setattr(bootstrap, "cache_subfolder", lambda part: tmp_path / part)
     monkeypatch.setattr(bootstrap, "REPLICATES", 3)
     yield folder
 

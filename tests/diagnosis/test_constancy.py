@@ -55,7 +55,7 @@ def test_what_comes_late_alone_is_the_same_in_each_recording(
     tried = dataclasses.replace(
         known, placed_effect=find_layer(bench, effect), likelihood_gain=gained
     )
-    for one in ("variation", "shown_variation"):
+    for one in ("heterogeneity_score", "simulated_heterogeneity"):
         monkeypatch.setattr(f"diagnosis.constancy.{one}", lambda *of: part * 10_000.0)
     assert rejects_constancy(selection.model, tried, rubbing.series, is_alone) is is_other
 
@@ -70,7 +70,7 @@ def test_what_an_effect_gains_beside_the_others_counts_where_that_is_more(
     tried = dataclasses.replace(
         known, likelihood_gain=dataclasses.replace(known.likelihood_gain, penalised=1500.0)
     )
-    for one in ("variation", "shown_variation"):
+    for one in ("heterogeneity_score", "simulated_heterogeneity"):
         monkeypatch.setattr(f"diagnosis.constancy.{one}", lambda *of: 400.0)
     assert rejects_constancy(selection.model, tried, rubbing.series, False)
     beside = dataclasses.replace(tried, joint_gain=25_000.0)

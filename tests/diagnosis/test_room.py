@@ -65,7 +65,7 @@ def test_no_further_effect_is_looked_for_where_there_is_no_room(
     assert [one.placed_effect.effect.name for one in found.accepted] == ["coulomb_friction"]
     assert any("no further effect is looked for" in text for text in told)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("diagnosis.selection.is_full", lambda *_: False)
+        patch.setattr("diagnosis.selection.meets_stopping_rule", lambda *_: False)
         again = select_effects(own, base, units)
     assert [one.placed_effect.id for one in again.accepted] == [
         one.placed_effect.id for one in found.accepted

@@ -31,7 +31,7 @@ def test_what_some_recordings_alone_promise_takes_no_turn_of_a_fit(
     friction = select_effect(bench, rubbing, FRICTION)
     unseen = [ScreeningResult(find_layer(bench, DRAG), 1e6)] * MAX_FITS
     seen = ScreeningResult(find_layer(bench, FRICTION), 1e3, friction.model)
-    monkeypatch.setattr("diagnosis.search.promises", lambda *_: [*unseen, seen])
+    monkeypatch.setattr("diagnosis.search.screen_candidates", lambda *_: [*unseen, seen])
     found = search_candidates(rubbing, friction.base, {}, [])
     assert [one.placed_effect.id for one in found if one.likelihood_gain] == [FRICTION]
     assert len(found) == MAX_FITS + 1
@@ -52,15 +52,15 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
     def many(_: object, accepted: Sequence[CandidateFit]) -> bool:
         return len(accepted) >= strained
 
-    monkeypatch.setattr("diagnosis.selection.searched", found)
+    monkeypatch.setattr("diagnosis.selection.search_candidates", found)
     monkeypatch.setattr(
         "diagnosis.selection.rescreen_after_refit", lambda _, m, u, tried, *__: (None, tried)
     )
-    monkeypatch.setattr("diagnosis.selection.shown_form", lambda _, m, u, best, tried: best)
-    monkeypatch.setattr("diagnosis.selection.swapped", lambda _, m, before, *__: (before, m))
-    monkeypatch.setattr("diagnosis.selection.is_full", lambda *_: False)
-    monkeypatch.setattr("diagnosis.selection.still_needed", lambda _, kept, *__: kept)
-    monkeypatch.setattr("diagnosis.selection.is_strained", many)
+    monkeypatch.setattr("diagnosis.selection.choose_form", lambda _, m, u, best, tried: best)
+    monkeypatch.setattr("diagnosis.selection.exchange_effects", lambda _, m, before, *__: (before, m))
+    monkeypatch.setattr("diagnosis.selection.meets_stopping_rule", lambda *_: False)
+    monkeypatch.setattr("diagnosis.selection.eliminate_backward", lambda _, kept, *__: kept)
+    monkeypatch.setattr("diagnosis.selection.rejects_bounds", many)
     accepted = select_effects(rubbing, fit_first_base(rubbing), {}).accepted
     assert len(accepted) == (MAX_EFFECTS - 1 if strained == MAX_EFFECTS else MAX_EFFECTS)
 
@@ -82,7 +82,7 @@ def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
         asked.append(given[WORTH])
         return []
 
-    monkeypatch.setattr("diagnosis.selection.searched", found)
+    monkeypatch.setattr("diagnosis.selection.search_candidates", found)
     selection = select_effects(rubbing, fit_first_base(rubbing), {}, screening_fraction=hope)
     assert not selection.accepted
     assert asked == [pytest.approx(least)]

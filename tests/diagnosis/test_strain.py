@@ -100,9 +100,9 @@ def test_a_first_name_that_ends_at_a_limit_is_none(
 @pytest.mark.parametrize(
     ("rule", "why"),
     [
-        ("is_strained", "they are pulled out of their ranges"),
-        ("differs", "the parameters of the first differ from recording to recording"),
-        ("remembers_mostly", "most recordings remember what is left"),
+        ("rejects_bounds", "they are pulled out of their ranges"),
+        ("rejects_constancy", "the parameters of the first differ from recording to recording"),
+        ("has_autocorrelated_residuals_in_most", "most recordings remember what is left"),
     ],
 )
 def test_beside_a_hidden_input_what_is_left_does_not_count(

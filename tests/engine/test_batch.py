@@ -126,7 +126,7 @@ def test_a_tunable_wait_is_swept_by_whole_ticks(waits: list[float]) -> None:
 def test_a_measure_takes_the_rows_of_its_span() -> None:
     late = SignalStatistic("late", "plant.T_hs", "max", Fraction(1, 10), Fraction(105, 1000))
     never = SignalStatistic("never", "plant.T_hs", "max", Fraction(3), Fraction(4))
-    result = run_interpreted_batch(batch_of(1, measures=(late, never), outputs=("plant.T_hs",)))
+    result = run_interpreted_batch(batch_of(1, statistics=(late, never), outputs=("plant.T_hs",)))
     inside = (result.times >= 0.1) & (result.times <= 0.105)
     assert inside.sum() == 11
     assert result.statistics["late"][0] == result.outputs["plant.T_hs"][0, inside].max()

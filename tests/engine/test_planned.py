@@ -151,13 +151,13 @@ def batch_of(count: int, **changes: object) -> Batch:
     kinds = ("first", "final", "max", "min", "peak", "mean", "rms")
     measures = [SignalStatistic(kind, "plant.T_hs", kind) for kind in kinds]  # type: ignore[arg-type]
     late = SignalStatistic("late", "est.T_hs", "mean", Fraction(3, 100), Fraction(5, 100))
-    names = {"measures": (*measures, late), "outputs": ("s_em", "est.mode"), "most_events": 3}
+    names = {"statistics": (*measures, late), "outputs": ("s_em", "est.mode"), "max_events": 3}
     made = Batch(system, scenario, count, **names)  # type: ignore[arg-type]
     return dataclasses.replace(made, **changes)  # type: ignore[arg-type]
 
 
 def assert_same_batch(mine: BatchResult, theirs: BatchResult) -> None:
-    for key in ("measures", "outputs"):
+    for key in ("statistics", "outputs"):
         for name, values in getattr(theirs, key).items():
             assert getattr(mine, key)[name].tobytes() == values.tobytes(), name
     for key in ("times", "event_counts", "event_times", "event_kinds"):
@@ -200,7 +200,7 @@ def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
         {"count": 2, "parameters": first},
         {"count": 1, "parameters": {name: values[:1] * 1.1 for name, values in first.items()}},
         {"count": 1, "parameters": {"plant.k_hs": first["plant.k_hs"][:1]}},
-        {"count": 2, "parameters": first, "most_events": 9},
+        {"count": 2, "parameters": first, "max_events": 9},
     ]
     for changes, plans in zip(others, (1, 1, 2, 3), strict=True):
         batch = batch_of(**changes)

@@ -141,7 +141,7 @@ def test_a_mistake_in_an_effect_names_the_effect_and_where_it_is_laid(tmp_path: 
         load_automaton("laid", project)
     span = caught.value.problems[0].span  # type: ignore[attr-defined]
     assert span.source.layer == "effect wrong@F"
-    assert str(span.source.laid).endswith("laid.yaml:4:11")
+    assert str(span.source.applied_at).endswith("laid.yaml:4:11")
 
 
 @pytest.mark.parametrize("mode", ["drive_contact", "no_contact"])

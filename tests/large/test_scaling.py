@@ -116,4 +116,4 @@ def test_problems_that_a_stage_repeats_are_taken_once() -> None:
             problems.raise_if_errors()
     with problems.collect_errors():
         raise SpecError([Problem("name", PLACE, "second")])
-    assert [problem.label for problem in problems.found] == ["first", "second"]
+    assert [problem.label for problem in problems.reported] == ["first", "second"]

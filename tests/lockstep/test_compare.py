@@ -34,7 +34,7 @@ def change(monkeypatch: pytest.MonkeyPatch) -> Change:
             assert sum(text.count(old) for text in found.values()) == 1, old
             return {name: text.replace(old, new) for name, text in found.items()}
 
-        monkeypatch.setattr("codegen.harness.c_files", files)
+        monkeypatch.setattr("codegen.harness.emit_c_files", files)
 
     return changed
 

@@ -86,7 +86,7 @@ def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) 
         assert right in text
         return {**files, f"{name}.c": text.replace(right, wrong)}
 
-    monkeypatch.setattr("codegen.harness.c_files", torn)
+    monkeypatch.setattr("codegen.harness.emit_c_files", torn)
 
 
 def test_bytes_are_values_and_changes() -> None:

@@ -285,8 +285,8 @@ def test_a_rename_that_leaves_an_old_name_behind_is_refused(
     def without_tables(world: Workspace, declared: Symbol) -> list[Reference]:
         return [each for each in references_to(world, declared) if each.path[0] != "tables"]
 
-    monkeypatch.setattr("modewright.lsp.rename.mentions_of", without_tables)
-    monkeypatch.setattr("modewright.lsp.renamed.mentions_of", without_tables)
+    monkeypatch.setattr("modewright.lsp.rename.references_to", without_tables)
+    monkeypatch.setattr("modewright.lsp.renamed.references_to", without_tables)
     line, column = position_of(DEEP, "x: {unit")
     world = Workspace(deep.parent.parent)
     with pytest.raises(RenameRefused, match=r"not followed: .*deep.yaml:9:"):

@@ -48,7 +48,7 @@ def test_a_text_that_is_no_yaml_is_told_of(talk: LspClient, heater: Path) -> Non
 def test_a_defect_of_ours_is_told_in_the_file_that_shows_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(problems, "errors_first", lambda *_: 1 // 0)
+    monkeypatch.setattr(problems, "check_without_proofs", lambda *_: 1 // 0)
     (told,) = problems.check_quickly(Workspace(tmp_path, "utf-16"), tmp_path / "heater.yaml")
     assert told.message.startswith("a defect of modewright: ZeroDivisionError")
     assert told.severity == types.DiagnosticSeverity.Error

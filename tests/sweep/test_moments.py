@@ -107,7 +107,7 @@ def test_an_infinite_number_in_a_store_counts_as_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As stores of before hold it: the root mean square of a signal above 1e154."""
-    monkeypatch.setattr("sweep.measuring.signal_number", lambda *given: math.inf)
+    monkeypatch.setattr("sweep.measuring.evaluate_signal", lambda *given: math.inf)
     store = run_study(make_study("alone"), tmp_path, SerialExecutor(quick_results)).store
     assert [row["final"] for row in store_rows(store)] == [math.inf] * 5
     found = summary_of(store)

@@ -188,8 +188,8 @@ def test_on_a_small_disk_a_study_goes_on_when_there_is_room(tmp_path: Path) -> N
 WORKER = """
 import os, sys
 import modewright
-from tests.sweep.laying import quick
-from sweep.worker import serve
+from tests.sweep.laying import quick_results
+from sweep.worker import serve_blocks
 
 def run(batch):
     mark = sys.argv[1]
@@ -198,9 +198,9 @@ def run(batch):
     if not os.path.exists(mark):
         open(mark, "w").close()
         os.kill(os.getpid(), 9)
-    return quick(batch)
+    return quick_results(batch)
 
-serve(run)
+serve_blocks(run)
 """
 
 

@@ -114,7 +114,7 @@ def test_a_mode_that_breaks_its_contract_is_found(
     made = emit_c_files(program("contactor"), by_magnitude=False)
     assert made["contactor.c"].count(right) == 1
     broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
-    monkeypatch.setattr("codegen.proofs.contract.c_files", lambda program, by_amount: broken)
+    monkeypatch.setattr("codegen.proofs.contract.emit_c_files", lambda program, by_amount: broken)
     found = check_contracts(
         load_automaton("contactor", Project(Path())), program("contactor"), tmp_path
     )
@@ -198,7 +198,7 @@ def test_a_store_beyond_its_array_is_found(tmp_path: Path, monkeypatch: pytest.M
         assert place in text
         return {**files, "supervisor.c": text.replace(place, "self->log[self->count_of_log + 24]")}
 
-    monkeypatch.setattr("codegen.harness.c_files", torn)
+    monkeypatch.setattr("codegen.harness.emit_c_files", torn)
     (finding,) = check_sanitizers(program("supervisor"), tmp_path).findings
     assert "out of bounds" in finding
 
@@ -237,6 +237,6 @@ def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         text = text.replace(end, "w_em <= 1.7e308)").replace(product, f"{product}2.0 * ")
         return {**files, "estimator_simple.c": text}
 
-    monkeypatch.setattr("codegen.proofs.values.c_files", loosened)
+    monkeypatch.setattr("codegen.proofs.values.emit_c_files", loosened)
     (found,) = prove("estimator_simple", checks=("values",))
     assert any("estimator_simple.c" in finding for finding in found.findings), found

@@ -29,19 +29,19 @@ CLIENT = """
 import sys, time
 from pathlib import Path
 import modewright
-from sweep.processes import Processes
+from sweep.processes import ProcessExecutor
 from sweep.study_run import run_study
 from sweep.summary import summary_of
-from tests.sweep.laying import study
+from tests.sweep.laying import make_study
 from tests.verify.processor import peak_megabytes
 
 axes = "{linspace: [1 rad/s, 3 rad/s, 1000]}", "{linspace: [0 1/s, 1 1/s, 1000]}"
 changes = (("[1 rad/s, 3 rad/s]", axes[0]), ("[0.05 1/s, 0.3 1/s]", axes[1]))
-made = study("alone", *changes, ("one_at_a_time", "grid"))
-worker = "import modewright; from tests.sweep.laying import quick"
-worker += "; from sweep.worker import serve; serve(quick)"
+made = make_study("alone", *changes, ("one_at_a_time", "grid"))
+worker = "import modewright; from tests.sweep.laying import quick_results"
+worker += "; from sweep.worker import serve_blocks; serve_blocks(quick_results)"
 start = time.monotonic()
-found = run_study(made, Path(sys.argv[1]), Processes(2, [sys.executable, "-c", worker]))
+found = run_study(made, Path(sys.argv[1]), ProcessExecutor(2, [sys.executable, "-c", worker]))
 seconds = time.monotonic() - start
 lines = summary_of(found.store).lines
 assert lines[0].count == made.count == 1_000_000

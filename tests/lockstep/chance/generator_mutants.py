@@ -72,10 +72,10 @@ GENERATOR = (
         attribute("codegen.expression._emit_binary", _reciprocal),
     ),
     Mutant(
-        "literals have 15 digits", "generator", attribute("codegen.expression.decimal", _rough(15))
+        "literals have 15 digits", "generator", attribute("codegen.expression.shortest_decimal", _rough(15))
     ),
     Mutant(
-        "literals have 16 digits", "generator", attribute("codegen.expression.decimal", _rough(16))
+        "literals have 16 digits", "generator", attribute("codegen.expression.shortest_decimal", _rough(16))
     ),
     Mutant(
         "parentheses are missing", "generator", attribute("codegen.expression._emit_operand", _bare)
@@ -88,7 +88,7 @@ GENERATOR = (
     Mutant(
         "the relation >= fails on equality",
         "generator",
-        _everywhere("c_expression", _strict),
+        _everywhere("emit_expression", _strict),
     ),
     Mutant(
         "a case falls through",

@@ -38,10 +38,10 @@ def _relation(name: str, wrong: Callable[[Any, Any], bool]) -> Patch:
     """A relation that is wrong, whatever its operands are read from."""
     slot, read = (lambda v, a: v[a]), (lambda v, a: a(v))
     shapes = {
-        "SLOTS": (slot, slot),
-        "SLOT_READ": (slot, read),
-        "READ_SLOT": (read, slot),
-        "READS": (read, read),
+        "SLOT_SLOT": (slot, slot),
+        "SLOT_EXPRESSION": (slot, read),
+        "EXPRESSION_SLOT": (read, slot),
+        "EXPRESSION_EXPRESSION": (read, read),
     }
 
     def made(first: Any, second: Any) -> Any:
@@ -169,20 +169,20 @@ INTERPRETER = (
     Mutant(
         "a counter stops one short",
         "interpreter",
-        attribute(f"{ACTIONS}.count", _count(1, False)),
+        attribute(f"{ACTIONS}.count_while", _count(1, False)),
     ),
     Mutant(
-        "a counter is not cleared", "interpreter", attribute(f"{ACTIONS}.count", _count(0, True))
+        "a counter is not cleared", "interpreter", attribute(f"{ACTIONS}.count_while", _count(0, True))
     ),
     Mutant(
         "a fault bit wipes out the others",
         "interpreter",
-        attribute(f"{ACTIONS}.fault", _overwritten),
+        attribute(f"{ACTIONS}.set_fault", _overwritten),
     ),
     Mutant(
         "a fault bit that is not latched stays",
         "interpreter",
-        attribute(f"{ACTIONS}.clear", lambda slot, bit: lambda v: None),
+        attribute(f"{ACTIONS}.clear_fault", lambda slot, bit: lambda v: None),
     ),
     Mutant("a loop ends one short", "interpreter", attribute(f"{ACTIONS}.loop", _short_loop)),
     Mutant(

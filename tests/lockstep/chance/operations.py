@@ -32,16 +32,16 @@ def count_executed(spec: Spec, program: Program, ticks: int) -> Counter[str]:
     counts: Counter[str] = Counter()
 
     class Counting(BlockCompiler):
-        def _slot(self, expr: Expr) -> None:
+        def _operand_slot(self, expr: Expr) -> None:
             """Let no operand be read without a function of its own."""
 
-        def _row(self, row: Sequence[Assign]) -> StatementClosure:
+        def _compile_assignments(self, row: Sequence[Assign]) -> StatementClosure:
             return _counting(super()._compile_assignments(row), counts, "Assign", len(row))
 
-        def _action(self, op: Op) -> StatementClosure:
+        def _compile_operation(self, op: Op) -> StatementClosure:
             return _counting(super()._compile_operation(op), counts, type(op).__name__)
 
-        def _read(self, expr: Expr) -> ExpressionClosure:
+        def _compile_expression(self, expr: Expr) -> ExpressionClosure:
             read = _counting(super()._compile_expression(expr), counts, type(expr).__name__)
             name = _name(expr)
             return _counting(read, counts, name) if name else read
