@@ -8,8 +8,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from modewright.neighbours import load_own_packages
-
 if TYPE_CHECKING:
     from diagnosis.dossier import DiagnosisReport
     from diagnosis.fit import Fit
@@ -140,8 +138,6 @@ PLACES = {
     "trace": "modewright.traces",
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
-
-load_own_packages()
 
 
 def __getattr__(name: str) -> Any:

@@ -8,11 +8,9 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module, metadata
+from importlib import metadata
 from pathlib import Path
 from typing import Literal
-
-from modewright.neighbours import OWN_PACKAGES
 
 MIN_PYTHON = (3, 11)
 HealthStatus = Literal["ok", "absent", "fault"]
@@ -33,28 +31,14 @@ def run_health_checks() -> Iterator[HealthCheck]:
     version = platform.python_version()
     is_new = sys.version_info >= MIN_PYTHON
     yield HealthCheck("python", "ok" if is_new else "fault", f"{version}, {sys.executable}")
-    yield _check_own_packages()
+    place = f"{metadata.version('modewright')}, {Path(__file__).parent}"
+    yield HealthCheck("modewright", "ok", place)
     yield from _check_dependencies()
     compiler = _check_compiler()
     yield compiler
     yield _check_cache()
     if compiler.verdict == "ok":
         yield _run_self_test()
-
-
-def _check_own_packages() -> HealthCheck:
-    """Tell whether our packages are ours: a folder `engine/` of the user's may hide one."""
-    base = Path(__file__).resolve().parent.parent
-    hidden = []
-    for name in OWN_PACKAGES:
-        file = import_module(name).__file__
-        if file is None or Path(file).resolve().parent.parent != base:
-            hidden.append(f"{name} is {file}")
-    if hidden:
-        return HealthCheck(
-            "modewright", "fault", "; ".join(hidden), "rename that folder or package"
-        )
-    return HealthCheck("modewright", "ok", f"{metadata.version('modewright')}, {base}")
 
 
 def _check_dependencies() -> Iterator[HealthCheck]:

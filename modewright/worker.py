@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from modewright.neighbours import load_own_packages
+from modewright.compiled import run_block
+from sweep.worker import serve_blocks
 
 
 def main() -> None:
     """Answer blocks until who started us is gone."""
-    load_own_packages()
-    from modewright.compiled import run_block
-    from sweep.worker import serve_blocks
-
     serve_blocks(run_block)
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 
-CODE_PACKAGES = ("language", "engine", "codegen", "sweep")
+import codegen
+import engine
+import language
+import sweep
+
+CODE_PACKAGES = (language, engine, codegen, sweep)
 CODE_SUFFIXES = (".py", ".lark", ".txt", ".jinja", ".h")
 LIBRARIES = ("numpy", "scipy", "filterpy", "pyarrow")
 """Noise and Sobol points are numpy's and scipy's, gains filterpy's, files pyarrow's."""
@@ -20,7 +26,7 @@ SHOWN_DIGITS = 12
 @lru_cache(maxsize=1)
 def fingerprint() -> Mapping[str, str]:
     """Return what this process computes with, by part; equal ones give equal bits."""
-    found = {"modewright": _code_digest(Path(__file__).resolve().parent.parent)}
+    found = {"modewright": _code_digest(CODE_PACKAGES)}
     found["Python"] = ".".join(platform.python_version_tuple()[:2])
     found["processor"] = platform.machine()
     for name in LIBRARIES:
@@ -41,11 +47,13 @@ def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str])
     return ", ".join(parts)
 
 
-def _code_digest(base: Path) -> str:
+def _code_digest(packages: Iterable[ModuleType]) -> str:
+    """Return the digest of the files of packages; in the wheel their names and imports differ."""
     total = hashlib.sha256()
-    for package in CODE_PACKAGES:
-        for path in sorted((base / package).rglob("*")):
+    for package in packages:
+        home = Path(str(package.__file__)).parent
+        for path in sorted(home.rglob("*")):
             if path.suffix in CODE_SUFFIXES and path.is_file():
-                name = path.relative_to(base).as_posix()
+                name = f"{home.name}/{path.relative_to(home).as_posix()}"
                 total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()

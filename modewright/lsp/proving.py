@@ -26,7 +26,7 @@ async def run_background_check(workspace: Workspace, path: Path) -> list[types.D
         "texts": {str(file): text for file, text in workspace.texts.items()},
     }
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "modewright.lsp.proving"),
+        *(sys.executable, "-P", "-m", "modewright.lsp.proving"),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,

@@ -12,17 +12,17 @@ import pytest
 ASKED = """
 import os
 import modewright
-from modewright.studies import TEMPLATE
+from modewright.studies import TEMPLATE_MODULE
 from sweep import fork_server
 
 def main():
     environment = dict(os.environ)
-    fork_server.start(TEMPLATE)
+    fork_server.start_fork_server(TEMPLATE_MODULE)
     assert environment == dict(os.environ), "its environment is not ours"
     from sweep.address import Address, Credentials
-    from sweep.clustering import Staff, connected
-    staff = Staff(modewright.cluster_worker.own_fingerprint)
-    with connected(Address(count=2), Credentials(), staff) as client:
+    from sweep.clustering import WorkerSetup, open_client
+    staff = WorkerSetup(modewright.cluster_worker.own_fingerprint)
+    with open_client(Address(count=2), Credentials(), staff) as client:
         told = client.run(lambda: (os.getppid(), "engine.planned_batch" in sys.modules))
     parents, loaded = zip(*told.values())
     print(len(told), len(set(parents)), all(loaded))
