@@ -14,8 +14,7 @@ from typing import Any, Literal
 from codegen.expression import LIBM_FUNCTIONS, format_literal
 from codegen.names import CNames
 from codegen.statement import emit_wrapped_statement
-from language.assembly import range_event_variables
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -31,7 +30,8 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import MODE_VARIABLE, Program
+from language.ir.program import MODE_VARIABLE, Program
+from language.programs.simulation_assembly import range_event_variables
 
 LANES = 4
 """Variants side by side: reals in a vector of 32 bytes."""

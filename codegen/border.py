@@ -18,9 +18,9 @@ from typing import Any
 from codegen.fuzzing import DEFAULT_INPUT_RANGE, Range
 from codegen.harness import tick_inputs
 from codegen.stepper import CompiledStepper
-from language.number import ROUNDING_FUNCTIONS
-from language.program import Program, unqualified_name
-from language.run import RUN_MODE
+from language.ir.number_type import ROUNDING_FUNCTIONS
+from language.ir.program import Program, unqualified_name
+from language.programs.model_run import RUN_MODE
 
 NEIGHBOUR_COUNT = 8
 """Numbers on each side of a border."""

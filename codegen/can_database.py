@@ -10,9 +10,9 @@ from typing import Any
 from codegen.asam.a2l import sanitise_string
 from codegen.asam.conversion import TRUTH, Conversion, conversion_of
 from codegen.names import c_type
-from language.missing import MissingToolError
-from language.printing import digest
-from language.program import Program, Variable, unqualified_name
+from language.ir.printer import digest
+from language.ir.program import Program, Variable, unqualified_name
+from language.text.diagnostic import MissingToolError
 
 BIT_LENGTH = {
     "bool": 1, "uint8_t": 8, "int16_t": 16, "uint16_t": 16, "int32_t": 32, "uint32_t": 32,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from codegen.build import FLAGS
 from codegen.rendering import product_version, render
 from codegen.source import emit_c_files
-from language.printing import digest
-from language.program import Program
+from language.ir.printer import digest
+from language.ir.program import Program
 
 SET_BY_CMAKE = ("-std=c99", "-O2")
 """What CMake sets by its own properties, and by the kind of a build."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from language.text import escape_invisible, truncate
+from language.text.sanitise import escape_invisible, truncate
 
 MAX_COMMENT_LENGTH = 120
 """Longest text of a comment [characters]; `about` of a spec may be a paragraph."""

@@ -29,8 +29,8 @@ from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames, c_type
 from codegen.sanitizers import APP, run_sanitised
 from codegen.source import restrict_to_step
 from codegen.tool import output_of
-from language.program import Constant, Program
-from language.traversal import walk_ops
+from language.ir.program import Constant, Program
+from language.ir.traversal import walk_ops
 
 MAIN = HarnessMain("explore_main.c.jinja")
 MAX_PAGE_CHANGES, MAX_TICK_GROUPS = 4, 96

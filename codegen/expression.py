@@ -6,18 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from codegen.names import C_REAL_TYPE
-from language.number import NumberType, shortest_decimal
-from language.operation import (
-    Binary,
-    Call,
-    Compare,
-    Expr,
-    Item,
-    Ref,
-    Select,
-    Unary,
-    Value,
-)
+from language.ir.number_type import NumberType, shortest_decimal
+from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 
 
 class CNameMap(Protocol):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from language.covariance import COVARIANCE_RANGE
-from language.limit import MICRO_STEP_LIMIT_FAULT
-from language.operation import FaultBit
-from language.program import Program
-from language.rewind import REWIND_LIMIT
-from language.run import EVENT_LIMIT
-from language.stamp import STALE_CALIBRATION
-from language.stepping import LIVELOCK, ZENO
-from language.traversal import walk_ops
+from language.ir.ops import FaultBit
+from language.ir.program import Program
+from language.ir.traversal import walk_ops
+from language.lowering.calibration_stamp import STALE_CALIBRATION
+from language.model.declaration import MICRO_STEP_LIMIT_FAULT
+from language.observers.covariance_update import COVARIANCE_RANGE
+from language.programs.major_step import LIVELOCK, ZENO
+from language.programs.model_run import EVENT_LIMIT
+from language.programs.rewind import REWIND_LIMIT
 
 FAULT_REASONS = {
     COVARIANCE_RANGE: "a variance was outside its range",

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 
-from language.operation import Binary, Block, Expr, Item, Loop, Ref, RunBlock, Value
-from language.program import Program
-from language.substitution import direct_expressions, walk_post_order
-from language.traversal import walk_ops
+from language.ir.ops import Binary, Block, Expr, Item, Loop, Ref, RunBlock, Value
+from language.ir.program import Program
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
+from language.ir.traversal import walk_ops
 
 ARITHMETIC = ("+", "-", "*", "/")
 MIN_OPERATIONS = 3

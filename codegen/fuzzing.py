@@ -17,8 +17,8 @@ from pathlib import Path
 from codegen.harness import HarnessMain, tick_inputs, write_harness
 from codegen.names import c_type
 from codegen.sanitizers import build_sanitised, run_sanitised
-from language.number import MAX_FINITE
-from language.program import Program, Variable, unqualified_name
+from language.ir.number_type import MAX_FINITE
+from language.ir.program import Program, Variable, unqualified_name
 
 FUZZER_COMPILER = "clang-19"
 WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64

@@ -10,8 +10,8 @@ import dataclasses
 from collections.abc import Iterator
 from functools import reduce
 
-from language.number import MAX_FINITE
-from language.operation import (
+from language.ir.number_type import MAX_FINITE
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -24,8 +24,8 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Program
-from language.substitution import map_expressions
+from language.ir.program import Program
+from language.ir.rewrite_ops import map_expressions
 
 LATCH = "latch"
 WITHIN = "within"

@@ -16,7 +16,7 @@ from codegen.names import C_REAL_TYPE, CNames, c_member, c_type
 from codegen.objects import substitute_objects
 from codegen.rendering import render
 from codegen.source import emit_c_files, restrict_to_step
-from language.program import Constant, Program, Variable
+from language.ir.program import Constant, Program, Variable
 
 HARNESS_HEADERS = ("harness.h", "cortex_m4f.h")
 

@@ -10,7 +10,7 @@ from functools import cached_property
 from codegen.build import FLAGS
 from codegen.harness import HarnessMain, build_executable
 from codegen.machine import CORTEX_M4F, run_in_qemu
-from language.program import Program
+from language.ir.program import Program
 
 MAIN = HarnessMain("instructions_main.c.jinja", ("instructions.h", "instructions.c"))
 ICOUNT_OPTIONS = ("-icount", "shift=0")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from codegen.harness import tunable_constants
 from codegen.source import restrict_to_step
 from codegen.unread import remove_dead_stores
-from language.program import Program
+from language.ir.program import Program
 
 REMOVABLE_GROUPS = ("equation.", "work.")
 """What is set for those who look at an instance or at a step: beyond that nothing happens."""

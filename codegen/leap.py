@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from codegen.way import POINT_STATE_PREFIX, TIME_LEFT, ExecutionPath, NotSpecialisable
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -31,11 +31,11 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import MODE_VARIABLE, ModeInfo, Program, Variable
-from language.run import RUN_MODE as RUN_MODE
-from language.substitution import direct_expressions, map_expressions, map_operands
-from language.traversal import block_writes, expr_names, names_used
-from language.wiring import finalise_program
+from language.ir.program import MODE_VARIABLE, ModeInfo, Program, Variable
+from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands
+from language.ir.traversal import block_writes, expr_names, names_used
+from language.lowering.program_builder import finalise_program
+from language.programs.model_run import RUN_MODE
 
 FastPathMode = Literal["on", "anew", "off"]
 """Whether there are leaps; `anew` computes all equations, for one whose states are set between its

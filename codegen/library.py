@@ -20,7 +20,7 @@ from codegen.cache import cache_folder, get_or_build, key_of
 from codegen.objects import is_shared, object_of
 from codegen.run_places import column_positions, row_width
 from codegen.run_source import emit_simulator_files
-from language.assembly import SimulationAssembly
+from language.programs.simulation_assembly import SimulationAssembly
 
 Pointer = ctypes.c_void_p
 Int64 = ctypes.c_int64

@@ -16,7 +16,7 @@ from math import prod
 from pathlib import Path
 
 from codegen.disassembly import Instruction, disassemble
-from language.graph import strongly_connected_components
+from language.model.graphs import strongly_connected_components
 
 CONDITION = re.compile("(eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?")
 Function = tuple[Instruction, ...]

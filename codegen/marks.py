@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 
-from language.operation import Assign, Block, Branch, FaultBit, Loop, Op, Switch, Value
-from language.program import Program, Variable
-from language.traversal import walk_ops
+from language.ir.ops import Assign, Block, Branch, FaultBit, Loop, Op, Switch, Value
+from language.ir.program import Program, Variable
+from language.ir.traversal import walk_ops
 
 RANGE_MARK = "memory.left_{}"
 

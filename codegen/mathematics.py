@@ -12,13 +12,10 @@ from codegen.names import (
 )
 from codegen.rendering import product_version, render
 from codegen.statement import INDENT, MAX_LINE_WIDTH, emit_select, emit_wrapped_statement, is_nested
-from language.functions import FUNCTIONS_BY_TYPE
-from language.number import NumberType
-from language.operation import Assign, Select
-from language.program import (
-    Function,
-    unqualified_name,
-)
+from language.ir.number_type import NumberType
+from language.ir.ops import Assign, Select
+from language.ir.program import Function, unqualified_name
+from language.numerics.function_table import FUNCTIONS_BY_TYPE
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from codegen.proofs.infeasible import (
 from codegen.proofs.terms import Range
 from codegen.source import STATIC_PATTERN, run_c_passes
 from codegen.tool import output_of
-from language.program import Program
+from language.ir.program import Program
 
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERAGE_FLAGS = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")

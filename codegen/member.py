@@ -9,9 +9,9 @@ from codegen.comment import sanitise_comment as safe
 from codegen.expression import format_literal
 from codegen.names import CNames, c_member, c_type
 from codegen.usage import PAGE_GROUPS
-from language.number import NumberType, shortest_decimal
-from language.program import MODE_VARIABLE, Constant, Program, Variable
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.ir.number_type import NumberType, shortest_decimal
+from language.ir.program import MODE_VARIABLE, Constant, Program, Variable
 
 SOLVED_MATRICES = {
     "A": "the linear part of the rates",

@@ -15,7 +15,7 @@ from codegen.machine import CORTEX_FLAGS
 from codegen.proofs.stack import stack_usage
 from codegen.source import emit_c_files
 from codegen.tool import ARM_COMPILER, ARM_SIZE, output_of
-from language.program import Program
+from language.ir.program import Program
 
 STRUCTURES = ("Self", "In", "Out")
 SIZE_PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from language.model import CHART
-from language.number import NumberType
-from language.program import (
+from language.ir.number_type import NumberType
+from language.ir.program import (
     MODE_VARIABLE,
     TICK_UNIT,
     Constant,
@@ -19,6 +18,7 @@ from language.program import (
     mode_variable,
     unqualified_name,
 )
+from language.ir.regions import CHART
 
 C_REAL_TYPE: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODE_PREFIXES = ("memory.mode", "memory.run_mode")

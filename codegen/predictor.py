@@ -25,7 +25,7 @@ from codegen.runs import Prediction, StackedPrediction, StackedRecordings
 from codegen.source import emit_c_files
 from codegen.tracks import simd_recordings_context
 from codegen.vectors import has_gcc_vectors
-from language.program import Program, unqualified_name
+from language.ir.program import Program, unqualified_name
 
 Reals = NDArray[np.float64]
 LIBRARY_FLAGS = (

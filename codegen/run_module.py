@@ -12,16 +12,16 @@ from codegen.names import CNames, c_member
 from codegen.run_places import INSTANCE_NAME, SignalNameMap, row_width
 from codegen.source import module_context
 from codegen.usage import block_usages, locals_of
-from language.assembly import (
+from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program
+from language.lowering.continuous_delay import RECORD_AGE
+from language.programs.major_step import MAX_EVENTS_PER_STEP
+from language.programs.simulation_assembly import (
     RANGE_TOLERANCE,
     SimulationAssembly,
     input_name,
     output_variables,
     range_event_variables,
 )
-from language.history import RECORD_AGE
-from language.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program
-from language.stepping import MAX_EVENTS_PER_STEP
 
 
 def simulator_module_context(

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from codegen.expression import CNameMap, emit_expression
 from codegen.names import CNames
-from language.assembly import SimulationAssembly, output_variables
-from language.number import NumberType
-from language.operation import Assign
-from language.program import Program, unqualified_name
+from language.ir.number_type import NumberType
+from language.ir.ops import Assign
+from language.ir.program import Program, unqualified_name
+from language.programs.simulation_assembly import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"
 """What an instance is called in C: its name may be any that the language takes."""

@@ -27,20 +27,20 @@ from codegen.run_places import (
     emit_wire_formula,
     row_width,
 )
-from language.assembly import (
+from language.ir.number_type import NumberType
+from language.ir.program import Program, unqualified_name
+from language.ir.traversal import block_names
+from language.lowering.program_builder import finalise_program
+from language.model.system import Sensor
+from language.programs.continuous_program import ENGINE_BLOCKS
+from language.programs.major_step import STEP_INTERFACE
+from language.programs.simulation_assembly import (
     InputSource,
     InputTrajectory,
     SimulationAssembly,
     input_name,
     range_event_variables,
 )
-from language.continuous import ENGINE_BLOCKS
-from language.number import NumberType
-from language.program import Program, unqualified_name
-from language.signal import Sensor
-from language.stepping import STEP_INTERFACE
-from language.traversal import block_names
-from language.wiring import finalise_program
 
 
 def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) -> dict[str, str]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from codegen.unassigned import find_unassigned_reads
 from codegen.usage import Usage
-from language.operation import Loop, RunBlock
-from language.program import Program, Variable
-from language.traversal import names_used, reachable_blocks, walk_ops
+from language.ir.ops import Loop, RunBlock
+from language.ir.program import Program, Variable
+from language.ir.traversal import names_used, reachable_blocks, walk_ops
 
 STEP = "step"
 MAX_STACK_BYTES = 128

@@ -32,16 +32,13 @@ from codegen.scratch import STEP, Scratch, adjust_usages, scratch_of
 from codegen.statement import INDENT, MAX_LINE_WIDTH, StatementEmitter
 from codegen.unread import remove_dead_stores
 from codegen.usage import Usage, block_usages, locals_of, loop_locals
-from language.functions import FUNCTIONS_BY_TYPE
-from language.invariant import INVARIANT_PREFIX, INVARIANTS
-from language.operation import RunBlock
-from language.printing import digest
-from language.program import (
-    Program,
-    Variable,
-)
-from language.traversal import names_used, walk_ops
-from language.wiring import finalise_program
+from language.ir.ops import RunBlock
+from language.ir.printer import digest
+from language.ir.program import Program, Variable
+from language.ir.traversal import names_used, walk_ops
+from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
+from language.lowering.program_builder import finalise_program
+from language.numerics.function_table import FUNCTIONS_BY_TYPE
 
 ENTRIES = ("init", "derive", "step")
 COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from codegen.comment import sanitise_comment as safe
 from codegen.expression import CNameMap, emit_expression
 from codegen.usage import Usage
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -28,8 +28,8 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Program, TransitionInfo, unqualified_name
-from language.traversal import expr_names
+from language.ir.program import Program, TransitionInfo, unqualified_name
+from language.ir.traversal import expr_names
 
 INDENT = "    "
 EMPTY_BODY = f"{INDENT}/* nothing to do */"

@@ -23,8 +23,8 @@ from codegen.names import CNames, c_type
 from codegen.rendering import render
 from codegen.source import module_context
 from codegen.usage import block_usages, locals_of
-from language.printing import digest
-from language.program import Program
+from language.ir.printer import digest
+from language.ir.program import Program
 
 MODULE_NAME = "stepper"
 CTYPES: Mapping[str, Any] = {

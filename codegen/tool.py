@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from codegen.build import BuildError
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 ARM_COMPILER = "arm-none-eabi-gcc"
 ARM_SIZE = "arm-none-eabi-size"

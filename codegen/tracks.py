@@ -26,11 +26,11 @@ from codegen.member import ECU_PAGE as MODULE_PAGE
 from codegen.names import CNames, c_member
 from codegen.source import module_context, restrict_to_step, run_c_passes
 from codegen.statement import emit_wrapped_statement
-from language.functions import FUNCTIONS
-from language.operation import Assign, Binary, Block, Branch, Call, Expr, Op, Ref, Select
-from language.program import MODE_VARIABLE, Program, unqualified_name
-from language.substitution import map_expressions, map_operands
-from language.traversal import block_writes, subexpressions
+from language.ir.ops import Assign, Binary, Block, Branch, Call, Expr, Op, Ref, Select
+from language.ir.program import MODE_VARIABLE, Program, unqualified_name
+from language.ir.rewrite_ops import map_expressions, map_operands
+from language.ir.traversal import block_writes, subexpressions
+from language.numerics.function_table import FUNCTIONS
 
 PAGE_PREFIXES = ("derived.", "calibration.")
 """What stays in all steps."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -22,8 +22,8 @@ from language.operation import (
     Switch,
     Value,
 )
-from language.program import MODE_VARIABLE, Program
-from language.substitution import direct_expressions, walk_post_order
+from language.ir.program import MODE_VARIABLE, Program
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
 
 WORK = "work."
 NameSet = frozenset[str]

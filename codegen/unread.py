@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.operation import Assign, Block, Op
-from language.program import Program
-from language.traversal import block_reads, block_writes
+from language.ir.ops import Assign, Block, Op
+from language.ir.program import Program
+from language.ir.traversal import block_reads, block_writes
 
 
 def remove_dead_stores(program: Program, groups: tuple[str, ...]) -> Program:

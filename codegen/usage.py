@@ -7,17 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from codegen.unassigned import find_unassigned_reads
-from language.operation import (
-    Assign,
-    Block,
-    Branch,
-    Loop,
-    RunBlock,
-    Switch,
-)
-from language.program import Program
-from language.stepping import STEP_INTERFACE
-from language.traversal import block_reads, block_writes, reachable_blocks, walk_ops
+from language.ir.ops import Assign, Block, Branch, Loop, RunBlock, Switch
+from language.ir.program import Program
+from language.ir.traversal import block_reads, block_writes, reachable_blocks, walk_ops
+from language.programs.major_step import STEP_INTERFACE
 
 POINTER_OF_GROUP = {
     "input": "in",

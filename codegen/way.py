@@ -7,8 +7,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from codegen.statement import negate_condition
-from language.evaluate import evaluate
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -26,9 +25,10 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Program, Variable
-from language.substitution import map_expressions, map_operands, operands
-from language.traversal import block_reads, block_writes, expr_names
+from language.ir.program import Program, Variable
+from language.ir.rewrite_ops import map_expressions, map_operands, operands
+from language.ir.traversal import block_reads, block_writes, expr_names
+from language.numerics.evaluate import evaluate
 
 WORK, TIME_LEFT, CROSSED = "work.", "work.left", "work.crossed"
 EVALUATION_BLOCKS, POINT_STATE_PREFIX = ("rates_", "guards_"), "work.at_"
@@ -212,7 +212,7 @@ class ExecutionPath:
 
     def _value_number(self, value: Expr) -> int | None:
         """Return the number of a value; equal operations on equal numbers have equal ones, as in
-        language/common.py, and a name has that of its value.
+        language/passes/common_subexpressions.py, and a name has that of its value.
         """
         key: Hashable = None
         match value:

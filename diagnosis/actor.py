@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from diagnosis.bench import ModelSet
 from diagnosis.companion import order_features
 from diagnosis.locus import Location
-from language.known import formula_entries
-from language.rewrite import names_in_text
+from language.expressions.text_rewrite import names_in_text
+from language.overlays.tree_types import formula_entries
 
 Reals = NDArray[np.float64]
 RIPPLE_CORRELATION = 0.6

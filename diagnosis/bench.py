@@ -13,13 +13,13 @@ from diagnosis.estimate import Estimate
 from diagnosis.layers import PlacedEffect, disturbance_effect, find_placements
 from diagnosis.series import SampledRecording
 from diagnosis.shelf import NO_CACHE, FitCache
-from language.document import Document, MappingNode
-from language.effect import Effect
-from language.model import Automaton
-from language.place import PlaceMismatch, find_effect_place
-from language.problem import SpecError
-from language.project import Project
-from language.units import parse_unit
+from language.expressions.units import parse_unit
+from language.model.automaton import Automaton
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project
+from language.text.diagnostic import SpecError
+from language.text.document import Document, MappingNode
 
 FitFunction = Callable[[], Estimate]
 FORCE_DIMENSIONS = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)

@@ -22,13 +22,13 @@ from diagnosis.layers import (
 from diagnosis.recipe import CompiledModel, cache_key, load_or_compile, node_text
 from diagnosis.series import SampledRecording
 from diagnosis.uncertain import FreeParameter, free_parameters_of
-from language.declaration import Formula, Parameter
-from language.document import Document
-from language.effect import added_names
-from language.memory import memory_calls_by_key
-from language.model import Automaton
-from language.project import Project
-from language.syntax import Name, names
+from language.expressions.syntax_tree import Name, names
+from language.lowering.delay_buffers import memory_calls_by_key
+from language.model.automaton import Automaton
+from language.model.declaration import Formula, Parameter
+from language.overlays.effect_reader import added_names
+from language.overlays.expand_document import Project
+from language.text.document import Document
 
 Reals = NDArray[np.float64]
 INITIAL_VALUE_NAME = "start_of_{}"

@@ -15,11 +15,11 @@ from diagnosis.series import SampledRecording, sample_windows
 from diagnosis.shelf import FitCache, hash_of
 from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
 from engine.recording import Recording, read_recording
-from language.document import Document
-from language.effect import Effect
-from language.experiment import RecordingMap
-from language.model import Automaton
-from language.project import Project
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project
+from language.text.document import Document
 
 BootstrapMode = Literal["never", "kept", "made"]
 """Whether thresholds of a bootstrap are used: never, where one has left them, always."""

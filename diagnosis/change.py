@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from diagnosis.layers import PlacedEffect, overlay_effects
-from language.document import Document
-from language.provenance import diff_specs
+from language.text.document import Document
+from language.text.provenance import diff_specs
 
 EQUATION_SECTIONS = (
     "inputs",

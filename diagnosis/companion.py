@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
-from language.document import MappingNode, ScalarNode
+from language.text.document import MappingNode, ScalarNode
 
 Reals = NDArray[np.float64]
 MAX_CORRELATES = 3

@@ -20,8 +20,8 @@ from diagnosis.point import bounds_of
 from diagnosis.prediction import PredictionResult, predict
 from diagnosis.search import CandidateFit
 from diagnosis.series import SampledRecording
-from language.document import MappingNode, ScalarNode
-from language.units import parse_unit
+from language.expressions.units import parse_unit
+from language.text.document import MappingNode, ScalarNode
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]

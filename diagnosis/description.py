@@ -19,7 +19,7 @@ from diagnosis.naming import quantities_of
 from diagnosis.point import ParameterVector, vector_of
 from diagnosis.regression import TermColumns, coefficients_of, rank_terms, select_terms
 from diagnosis.search import LogCallback
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 
 MAX_LOCATIONS = 2
 """Places that are looked at, those whose freedom explains most."""

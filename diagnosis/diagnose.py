@@ -38,9 +38,9 @@ from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.verdict import DecisionOutcome, Misfit, NamedEffect, RankedCandidate, Verdict
 from diagnosis.ways import recalibrate_by_hold
 from engine.recorded_part import file_of, overlap
-from language.load import automaton_of
-from language.model import Automaton
-from language.problem import SpecError
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.text.diagnostic import SpecError
 
 MAX_WORSE_RATIO = 1.1
 """Part of the misfit of simulation from which on a signal is simulated worse."""

@@ -10,10 +10,10 @@ from statistics import median
 from diagnosis.consistency import OutputAgreement
 from diagnosis.finding import Finding, Severity
 from engine.recording import Recording
-from language.experiment import RecordingMap
-from language.map import column_dimension
-from language.model import Automaton
-from language.units import Dimension, are_compatible, parse_unit
+from language.expressions.units import Dimension, are_compatible, parse_unit
+from language.loading.recording_map_reader import column_dimension
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
 """Offsets of clocks [s] that are an error and a warning; actuators and sensors lag up to 0.05."""

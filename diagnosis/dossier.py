@@ -15,7 +15,7 @@ from diagnosis.finding import Finding, format_findings
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict
 from engine.recorded_part import file_of
-from language.model import Automaton
+from language.model.automaton import Automaton
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
 from diagnosis.share import ranking_gain
 from diagnosis.verdict import DecisionOutcome
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 
 UNEXPLAINED_FACTOR = 2.5
 """Times the threshold that the freedom of a place gains where a formula is tried."""

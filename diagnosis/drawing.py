@@ -24,7 +24,7 @@ from diagnosis.whiteness_picture import draw_whiteness
 from diagnosis.window_picture import draw_window
 from diagnosis.worst_window import WorstWindow
 from engine.plot import Picture
-from language.known import format_si_unit
+from language.overlays.tree_types import format_si_unit
 
 SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)

@@ -17,8 +17,8 @@ from diagnosis.probe import DisturbanceResponse, build_disturbance_response
 from diagnosis.regression import RegressionProblem, TermColumns, build_problem
 from diagnosis.scale import place_bindings
 from diagnosis.term import LibraryTerm, Signals, generate_terms
-from language.known import TreeTypes, format_si_unit
-from language.units import Dimension
+from language.expressions.units import Dimension
+from language.overlays.tree_types import TreeTypes, format_si_unit
 
 Reals = NDArray[np.float64]
 TEST_DISTURBANCE = 0.1

@@ -13,8 +13,8 @@ from diagnosis.channel_check import ChannelCheck, check_channel
 from diagnosis.needs import EFFECT_NEEDS, NEED_DESCRIPTIONS
 from diagnosis.spectrum import spectrum
 from engine.recording import Channel, Recording, split_by_windows
-from language.map import column_dimension
-from language.units import PURE_NUMBER, are_compatible, parse_unit
+from language.expressions.units import PURE_NUMBER, are_compatible, parse_unit
+from language.loading.recording_map_reader import column_dimension
 
 Reals = NDArray[np.float64]
 

@@ -24,11 +24,11 @@ from diagnosis.uncertain import FreeParameter
 from diagnosis.variant import format_value
 from diagnosis.verdict import Misfit, Quantity
 from diagnosis.ways import best_hold, recalibrate_by_hold
-from language.document import Document, MappingNode
-from language.load import automaton_of
-from language.model import Automaton
-from language.problem import Problems, Source, Span, suggest_name
-from language.tree import put_node
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.text.diagnostic import Problems, Source, Span, suggest_name
+from language.text.document import Document, MappingNode
+from language.text.node_edit import put_node
 
 BOUND_TOLERANCE = 1e-3
 """Part of its range from an end within which a parameter is at it."""

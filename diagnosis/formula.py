@@ -15,12 +15,12 @@ from diagnosis.probe import element_torques
 from diagnosis.scale import disturbance_unit
 from diagnosis.term import LibraryTerm
 from diagnosis.verdict import Quantity
-from language.document import Document, ScalarNode
-from language.effect import external_names, read_effect
-from language.finding import parse_document
-from language.known import TreeTypes, format_si_unit
-from language.problem import Problems, Source, Span
-from language.units import Dimension, dimension_product, parse_unit
+from language.expressions.units import Dimension, dimension_product, parse_unit
+from language.overlays.effect_reader import external_names, read_effect
+from language.overlays.tree_types import TreeTypes, format_si_unit
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document, ScalarNode
+from language.text.project_files import parse_document
 
 Reals = NDArray[np.float64]
 RANGE_FACTOR = 10.0

@@ -16,14 +16,13 @@ from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.stimulus import stimulus_of
 from engine.trajectory import Trajectory
-from language.declaration import Formula, Input
-from language.experiment import RecordingMap, Scenario, System
-from language.model import Automaton
-from language.problem import Problems, SpecError
-from language.program import Program
-from language.signal import Stimulus, StimulusPiece
-from language.syntax import Name
-from language.system import single_instance_system
+from language.expressions.syntax_tree import Name
+from language.ir.program import Program
+from language.loading.system_reader import single_instance_system
+from language.model.automaton import Automaton
+from language.model.declaration import Formula, Input
+from language.model.system import RecordingMap, Scenario, Stimulus, StimulusPiece, System
+from language.text.diagnostic import Problems, SpecError
 
 Reals = NDArray[np.float64]
 INITIAL_INPUT_NAME = "recorded_start_of_{}"

@@ -14,11 +14,11 @@ import numpy as np
 from engine.channel_reader import file_unit
 from engine.recorded_file import RecordedFile
 from engine.recording import open_recording
-from language.document import ScalarNode
-from language.experiment import ColumnMapping, RecordingMap
-from language.problem import Problems, Source, Span
-from language.project import display_path
-from language.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
+from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
+from language.model.system import ColumnMapping, RecordingMap
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import ScalarNode
 
 TIME_NAME = re.compile(r"(t|time|timestamp|zeit)(_(s|ms|us))?", re.IGNORECASE)
 CHANNEL_TIME_NAME = re.compile(r"(t|time)_\w+_(s|ms|us)", re.IGNORECASE)

@@ -15,19 +15,19 @@ from importlib import resources
 from pathlib import Path
 
 from diagnosis.series import has_feedthrough
-from language.continuous import stable_step_limits
-from language.document import Document, MappingNode, ScalarNode
-from language.effect import Effect, EffectApplication, read_effect
-from language.known import formula_entries
-from language.laying import apply_effect
-from language.load import automaton_of, program_of
-from language.memory import memory_calls_by_key, uses_function
-from language.model import Automaton
-from language.place import PlaceMismatch, find_effect_place
-from language.problem import Problems, Source, Span
-from language.program import Program
-from language.project import Project, read_document
-from language.units import parse_unit
+from language.expressions.units import parse_unit
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.lowering.delay_buffers import memory_calls_by_key, uses_function
+from language.model.automaton import Automaton
+from language.overlays.apply_effect import apply_effect
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
+from language.overlays.effect_reader import Effect, EffectApplication, read_effect
+from language.overlays.expand_document import Project, read_document
+from language.overlays.tree_types import formula_entries
+from language.programs.continuous_program import stable_step_limits
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document, MappingNode, ScalarNode
 
 DISTURBANCE_STATE = "drift"
 SLOWLY_VARYING_FORMS = ("constant_or_random_walk",)

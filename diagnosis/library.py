@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 from diagnosis.change import EquationChange, equation_changes
 from diagnosis.layers import PlacedEffect, automaton_with_effects, find_placements
-from language.document import Document, MappingNode
-from language.effect import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
-from language.known import format_si_unit
-from language.problem import Problems, Source, Span, SpecError
-from language.project import Project
+from language.overlays.effect_reader import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
+from language.overlays.expand_document import Project
+from language.overlays.tree_types import format_si_unit
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.document import Document, MappingNode
 
 HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
 """Keys of an effect's file that are told in words."""

@@ -19,7 +19,7 @@ from diagnosis.evidence import integrated_autocorrelation
 from diagnosis.freedom import free_disturbance
 from diagnosis.layers import PlacedEffect, disturbance_effect
 from diagnosis.locus import Location, location_of, with_smoothed_disturbances
-from language.document import MappingNode
+from language.text.document import MappingNode
 
 ABSORBED_FRACTION = 0.3
 """Part that counts of what the small drifts of the base take up as well."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from diagnosis.locus import Location
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 BLUE, _, _, _, _, _, GREY = PALETTE
 

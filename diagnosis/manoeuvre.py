@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from diagnosis.bench import ModelSet
 from diagnosis.series import SampledRecording
-from language.known import TreeTypes
-from language.units import Dimension
+from language.expressions.units import Dimension
+from language.overlays.tree_types import TreeTypes
 
 Reals = NDArray[np.float64]
 FORCE_UNITS = ("N*m", "N")

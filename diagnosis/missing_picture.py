@@ -11,7 +11,7 @@ from diagnosis.locus import SIGNIFICANT_STDS, DisturbanceEstimate, Location
 from diagnosis.series import SampledRecording
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 _, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 MAX_INPUTS = 3

@@ -31,12 +31,11 @@ from diagnosis.series import (
     sample_windows,
 )
 from engine.recording import Recording
-from language.document import Document
-from language.experiment import ColumnMapping, RecordingMap
-from language.missing import MissingToolError
-from language.model import Automaton
-from language.problem import SpecError
-from language.project import Project
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping, RecordingMap
+from language.overlays.expand_document import Project
+from language.text.diagnostic import MissingToolError, SpecError
+from language.text.document import Document
 
 MAX_LAG, LAG_STEP = 0.48, 0.04
 """Largest offset of clocks looked for, and the distance of those that are tried [s]."""

@@ -11,8 +11,8 @@ from diagnosis.estimate import Estimate
 from diagnosis.layers import PlacedEffect
 from diagnosis.normal import solve
 from diagnosis.verdict import NamedEffect, Quantity
-from language.effect import added_names
-from language.model import Automaton
+from language.model.automaton import Automaton
+from language.overlays.effect_reader import added_names
 
 Reals = NDArray[np.float64]
 VERDICT_ALIASES = {

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.finding import Finding
 from diagnosis.noise import MAD_TO_STD
 from engine.recording import Channel, Recording, split_by_windows
-from language.model import Automaton
+from language.model.automaton import Automaton
 
 Reals = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from diagnosis.dossier import DiagnosisReport
 from diagnosis.fit import parameter_note
 from diagnosis.naming import quantities_of
 from diagnosis.selection import Selection
-from language.document import MappingNode, ScalarNode
+from language.text.document import MappingNode, ScalarNode
 
 MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
 """Part of a value, and standard deviations, from which recalibration was led astray; most told."""

@@ -16,7 +16,7 @@ from diagnosis.layers import PlacedEffect
 from diagnosis.naming import covariance_of, effect_names, place_path
 from diagnosis.search import CandidateFit
 from diagnosis.series import SampledRecording
-from language.document import MappingNode
+from language.text.document import MappingNode
 
 MIN_RESTRICTION_STATISTIC = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from diagnosis.plan import ExperimentPlan
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 
 def draw_experiment(

@@ -15,8 +15,8 @@ from diagnosis.estimate import Estimate
 from diagnosis.layers import PlacedEffect
 from diagnosis.naming import effect_names, place_path
 from diagnosis.point import ParameterVector, bounds_of, vector_of
-from language.model import Automaton, Mode
-from language.syntax import SyntaxTree, names
+from language.expressions.syntax_tree import SyntaxTree, names
+from language.model.automaton import Automaton, Mode
 
 MIN_CORRELATION = 0.2
 """Correlation of what two parameters change from which on they do alike."""

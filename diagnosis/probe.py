@@ -23,10 +23,10 @@ from diagnosis.joined import burn_in_samples, stack_recordings
 from diagnosis.layers import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
 from diagnosis.scale import DISTURBANCE_KIND_BY_SECTION
 from diagnosis.series import SampledRecording
-from language.document import Document, Entry, MappingNode, ScalarNode
-from language.element import outputs_as_mapping
-from language.model import Automaton
-from language.syntax import Name
+from language.expressions.syntax_tree import Name
+from language.model.automaton import Automaton
+from language.reading.element_reader import outputs_as_mapping
+from language.text.document import Document, Entry, MappingNode, ScalarNode
 
 Reals = NDArray[np.float64]
 

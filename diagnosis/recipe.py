@@ -25,7 +25,7 @@ import language
 from codegen.cache import cache_subfolder
 from codegen.predictor import PredictorColumns
 from diagnosis.uncertain import FreeParameter
-from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 
 COMPILATION_MODULES = ("candidate", "layers", "recipe", "series", "uncertain")
 """The files of diagnosis that candidates are made by."""

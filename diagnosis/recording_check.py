@@ -17,8 +17,8 @@ from diagnosis.outlier import drop_huge_values, find_outliers, find_time_leaps
 from diagnosis.reference import cached_reference
 from diagnosis.remedy import find_corrections, find_millisecond_time, replace_corrected
 from engine.recording import Recording, split_by_windows
-from language.experiment import RecordingMap
-from language.model import Automaton
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
 
 ClockErrorSearch = Callable[[Sequence[Recording]], list[Finding] | None]
 MIN_DURATION = 2.0

@@ -18,7 +18,7 @@ from diagnosis.spectrum import spectrum
 from engine.band import PALETTE
 from engine.plot import Picture
 from engine.recording import Channel, Recording
-from language.text import escape_invisible, truncate
+from language.text.sanitise import escape_invisible, truncate
 
 Reals = NDArray[np.float64]
 

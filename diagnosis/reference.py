@@ -15,9 +15,9 @@ from diagnosis.free_run import (
     simulate_free_run,
 )
 from engine.recording import Recording
-from language.experiment import RecordingMap
-from language.load import program_of
-from language.model import Automaton
+from language.loading.load import program_of
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
 
 MAX_STEP, STABILITY_MARGIN = 0.004, 3.0
 """Longest major step [s], and how far it stays below the largest stable one."""

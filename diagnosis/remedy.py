@@ -22,11 +22,11 @@ from diagnosis.disagreement import SHARED_FRACTION, UNIT_FACTORS
 from diagnosis.finding import Finding
 from diagnosis.reference import ReferenceModel
 from engine.recording import Channel, Recording, split_by_windows
-from language.experiment import ColumnMapping
-from language.map import column_dimension
-from language.model import Automaton
-from language.problem import SpecError
-from language.units import are_compatible, parse_unit
+from language.expressions.units import are_compatible, parse_unit
+from language.loading.recording_map_reader import column_dimension
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping
+from language.text.diagnostic import SpecError
 
 MAX_CONSISTENT_GAIN = 1.6
 """Gains between this and its inverse are those of a model that is right but for its parameters."""

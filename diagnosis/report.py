@@ -34,7 +34,7 @@ from diagnosis.rerun import (
 )
 from diagnosis.shown import ModelComparison, compare_models
 from diagnosis.sources import provenance_rows, tool_versions
-from language.known import format_si_unit
+from language.overlays.tree_types import format_si_unit
 
 
 def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:

@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.dossier import DiagnosisReport
 from diagnosis.variant import missing_effects, variant_name
 from diagnosis.worst_window import WorstWindow
-from language.known import format_si_unit
+from language.overlays.tree_types import format_si_unit
 
 VARIANT = "variant.yaml"
 WINDOW = "window.csv"

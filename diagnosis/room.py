@@ -18,7 +18,7 @@ from diagnosis.level import disturbance_units
 from diagnosis.location import disturbance_locations
 from diagnosis.point import extend_vector
 from diagnosis.tuning import fit_noise_covariance
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 
 FREE_LEVEL = 1000.0
 """Units that such a drift may have."""

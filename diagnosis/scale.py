@@ -9,7 +9,7 @@ from diagnosis.bench import ModelSet
 from diagnosis.estimate import Estimate
 from diagnosis.joined import burn_in_samples
 from diagnosis.layers import disturbance_effect
-from language.place import PlaceMismatch, find_effect_place
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
 
 Reals = NDArray[np.float64]
 DISTURBANCE_KIND_BY_SECTION = {"flow": "balance", "elements": "element", "outputs": "output"}

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from diagnosis.noise import noise_of
 from engine.recording import Channel, Recording, split_by_windows
-from language.experiment import RecordingMap
-from language.graph import reachable
-from language.model import Automaton
+from language.model.automaton import Automaton
+from language.model.graphs import reachable
+from language.model.system import RecordingMap
 
 Reals = NDArray[np.float64]
 DECIMATED_PERIOD = Fraction(5, 1000)

@@ -11,8 +11,8 @@ from diagnosis.estimate import Estimate
 from diagnosis.series import SampledRecording
 from diagnosis.whiteness import WhitenessTest, innovation_whiteness
 from diagnosis.worst_window import FreeRuns, WorstWindow, find_worst_window, simulate_free_runs
-from language.known import format_si_unit
-from language.map import column_dimension
+from language.loading.recording_map_reader import column_dimension
+from language.overlays.tree_types import format_si_unit
 
 
 @dataclass(frozen=True)

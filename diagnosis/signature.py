@@ -17,14 +17,14 @@ from engine.band import PALETTE
 from engine.plot import Picture
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.document import Document
-from language.finding import parse_document
-from language.known import format_si_unit
-from language.model import Automaton
-from language.problem import Source
-from language.project import Project
-from language.scenario import read_scenario
-from language.system import single_instance_system
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import single_instance_system
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project
+from language.overlays.tree_types import format_si_unit
+from language.text.diagnostic import Source
+from language.text.document import Document
+from language.text.project_files import parse_document
 
 HORIZON = 4
 """Time of the manoeuvre [s]: forwards, from 1 s backwards, from 2.5 s forwards again."""

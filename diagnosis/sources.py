@@ -11,7 +11,7 @@ from codegen.rendering import product_version
 from diagnosis.dossier import DiagnosisReport
 from diagnosis.layers import shipped_effects
 from diagnosis.recipe import node_text
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 DIGEST_LENGTH = 16
 """Hexadecimal digits of SHA-256 that are told."""

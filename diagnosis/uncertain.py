@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from language.declaration import Parameter
-from language.known import format_si_unit
-from language.model import Automaton
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.overlays.tree_types import format_si_unit
 
 Reals = NDArray[np.float64]
 PRIOR_STD = 0.15

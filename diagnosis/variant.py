@@ -15,10 +15,10 @@ from diagnosis.selection import Selection
 from diagnosis.uncertain import si_unit
 from diagnosis.verdict import Quantity
 from diagnosis.wording import format_rounded
-from language.declaration import Parameter
-from language.effect import Effect, added_names
-from language.model import Automaton
-from language.project import read_document
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.overlays.effect_reader import Effect, added_names
+from language.overlays.expand_document import read_document
 
 NAME_SUFFIX = "_diagnosed"
 MAX_NAME_LENGTH = 31

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from diagnosis.whiteness import WhitenessTest
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 BLUE, RED, *_ = PALETTE
 

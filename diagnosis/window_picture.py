@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from diagnosis.worst_window import WorstWindow
 from engine.band import PALETTE
 from engine.plot import Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 MAX_INPUTS = 3

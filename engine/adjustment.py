@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from engine.batch import Batch
 from engine.starting import programs_of
 from engine.stimulus import resolve_recording
-from language.declaration import Formula, Parameter
-from language.experiment import Scenario, System
-from language.model import Automaton
-from language.printing import digest
-from language.problem import SpecError
-from language.program import Program
-from language.syntax import Name
+from language.expressions.syntax_tree import Name
+from language.ir.printer import digest
+from language.ir.program import Program
+from language.model.automaton import Automaton
+from language.model.declaration import Formula, Parameter
+from language.model.system import Scenario, System
+from language.text.diagnostic import SpecError
 
 Bounds = tuple[float, float]
 """The least and the largest value of a parameter."""

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from language.evaluate import ELEMENTARY_BY_TYPE, divide
-from language.number import NumberType
+from language.ir.number_type import NumberType
+from language.numerics.evaluate import ELEMENTARY_BY_TYPE, divide
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 
 def import_pyarrow(feature: str, hint: str = "") -> ModuleType:

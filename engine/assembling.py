@@ -6,13 +6,23 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from engine.rows import recorded_columns
-from language.assembly import InputSource, InputTrajectory, RecordedSignal, SimulationAssembly
-from language.declaration import Formula
-from language.experiment import Connection, Scenario, System
-from language.operation import Block
-from language.program import Program
-from language.traversal import block_reads
-from language.wires import connection_block, piece_block, wire_formulas, wires_program
+from language.ir.ops import Block
+from language.ir.program import Program
+from language.ir.traversal import block_reads
+from language.lowering.connection_program import (
+    connection_block,
+    piece_block,
+    wire_formulas,
+    wires_program,
+)
+from language.model.declaration import Formula
+from language.model.system import Connection, Scenario, System
+from language.programs.simulation_assembly import (
+    InputSource,
+    InputTrajectory,
+    RecordedSignal,
+    SimulationAssembly,
+)
 
 
 def assembly_of(

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
 from engine.trajectory import SignalArray, Trajectory
-from language.wiring import INACTIVE
+from language.lowering.program_builder import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
 """Colours that colour-blind readers tell apart (Tol 2021, bright)."""

@@ -15,9 +15,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from language.experiment import Scenario, System
-from language.model import CHART
-from language.signal import Stimulus
+from language.ir.regions import CHART
+from language.model.system import Scenario, Stimulus, System
 
 Reals = NDArray[np.float64]
 StatisticKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]

@@ -13,9 +13,9 @@ import numpy as np
 
 from engine.recorded_csv import DECIMAL
 from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
-from language.experiment import ColumnMapping, RecordingMap
-from language.problem import Problems, Span, suggest_name
-from language.units import Unit, UnitError, are_compatible, parse_unit
+from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
+from language.model.system import ColumnMapping, RecordingMap
+from language.text.diagnostic import Problems, Span, suggest_name
 
 MAX_STAMP_LENGTH = 40
 TIME_LIMIT = 10**12

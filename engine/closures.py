@@ -10,8 +10,7 @@ from engine.actions import StatementClosure
 from engine.arithmetic import ARITHMETIC_OF_TYPE
 from engine.frame import RANGE_VIOLATIONS, FrameLayout, frame_layout_of
 from engine.shapes import ExpressionClosure, Frame
-from language.evaluate import BINARY_OPERATIONS
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -32,8 +31,9 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Function, Program
-from language.traversal import expr_names, substitute_variable
+from language.ir.program import Function, Program
+from language.ir.traversal import expr_names, substitute_variable
+from language.numerics.evaluate import BINARY_OPERATIONS
 
 MAX_FUSED_ASSIGNMENTS = 4
 """Most assignments in one function (engine/actions.py)."""

@@ -16,8 +16,8 @@ from engine.invariant_watch import InvariantMonitor
 from engine.keeping import DelayRecorder
 from engine.range_watch import RangeMonitor
 from engine.trajectory import Event
-from language.program import Program, TransitionInfo, unqualified_name
-from language.stepping import MAX_EVENTS_PER_STEP
+from language.ir.program import Program, TransitionInfo, unqualified_name
+from language.programs.major_step import MAX_EVENTS_PER_STEP
 
 FlowSegment = tuple[Fraction, Fraction, Sequence[float], float]
 """Where a flow began and was to end, and the states and age of the records at its start."""

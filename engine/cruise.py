@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from engine.interpreter import Stepper
 from engine.range_watch import RangeMonitor
-from language.program import Program
+from language.ir.program import Program
 
 
 class FastPath:

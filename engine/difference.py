@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.trajectory import Event, SignalArray, Trajectory
-from language.model import CHART
+from language.ir.regions import CHART
 
 Reals = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from fractions import Fraction
 from engine.continuous import SimulationStopped
 from engine.interpreter import Stepper
 from engine.signals import Signals
-from language.experiment import Connection, System
-from language.program import Program, unqualified_name
+from language.ir.program import Program, unqualified_name
+from language.model.system import Connection, System
 
 
 class InputWiring:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.model import CHART
-from language.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program, TransitionInfo
+from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program, TransitionInfo
+from language.ir.regions import CHART
 
 
 def fired_transitions(program: Program, stepper: Stepper) -> list[TransitionInfo]:

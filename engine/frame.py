@@ -7,7 +7,7 @@ from typing import Any
 
 from engine.arithmetic import ARITHMETIC_OF_TYPE
 from engine.shapes import Frame
-from language.program import Constant, Program
+from language.ir.program import Constant, Program
 
 INITIAL_VALUES = {"real": 0.0, "truth": False, "whole": 0}
 RANGE_VIOLATIONS = "left range"

@@ -11,7 +11,7 @@ from engine.arithmetic import ARITHMETIC_OF_TYPE
 from engine.closures import BlockCompiler
 from engine.frame import RANGE_VIOLATIONS
 from engine.shapes import Frame
-from language.program import Program
+from language.ir.program import Program
 
 
 class Stepper(Protocol):

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.program import InvariantInfo, Program
+from language.ir.program import InvariantInfo, Program
 
 INVARIANT_BLOCK = "invariants"
 

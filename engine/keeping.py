@@ -5,8 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from engine.interpreter import Stepper
-from language.history import RECORD_AGE
-from language.program import Program
+from language.ir.program import Program
+from language.lowering.continuous_delay import RECORD_AGE
 
 
 class DelayRecorder:

@@ -17,8 +17,8 @@ from scipy.integrate import solve_ivp
 
 from engine.continuous import SimulationStopped
 from engine.interpreter import Interpreter
-from language.model import CHART
-from language.program import ModeInfo, Program, unqualified_name
+from language.ir.program import ModeInfo, Program, unqualified_name
+from language.ir.regions import CHART
 
 ScipyMethod = Literal["DOP853", "Radau", "LSODA"]
 """Explicit of order 8 and implicit of order 5 (Hairer, Norsett, Wanner, Solving Ordinary

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from engine.interpreter import Stepper
-from language.number import round_to_type
-from language.program import Program
+from language.ir.number_type import round_to_type
+from language.ir.program import Program
 
 DERIVE_BLOCKS = ("derive", "compare_stamps")
 """What runs after a change, as `X_Calibrate` does in C."""

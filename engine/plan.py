@@ -21,9 +21,9 @@ from engine.schedule import Schedule, TimeGrid
 from engine.sensing import noise_stream
 from engine.signals import DelayLine
 from engine.stimulus import InputSignal
-from language.assembly import InputTrajectory as Varying, SimulationAssembly
-from language.experiment import Scenario, System
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
+from language.programs.simulation_assembly import InputTrajectory as Varying, SimulationAssembly
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]

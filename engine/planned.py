@@ -18,10 +18,10 @@ from engine.plan import build_run_plan
 from engine.range_watch import format_range_violation, range_event
 from engine.rows import recorded_columns
 from engine.trajectory import Event, Trajectory, column_array, fault_names
-from language.assembly import SimulationAssembly, range_event_variables
-from language.experiment import Scenario, System
-from language.number import round_to_type
-from language.program import InvariantInfo, Program, unqualified_name
+from language.ir.number_type import round_to_type
+from language.ir.program import InvariantInfo, Program, unqualified_name
+from language.model.system import Scenario, System
+from language.programs.simulation_assembly import SimulationAssembly, range_event_variables
 
 EVENT_DTYPE = np.dtype(
     [

@@ -18,8 +18,8 @@ from engine.plan import RunPlan, build_run_plan, noise_samples
 from engine.planned import EVENT_DTYPE, BuildLibrary
 from engine.trajectory import fault_names
 from engine.variants import list_event_kinds, row_range, run_variant, scenario_of_variant
-from language.assembly import SimulationAssembly, range_event_variables
-from language.program import unqualified_name
+from language.ir.program import unqualified_name
+from language.programs.simulation_assembly import SimulationAssembly, range_event_variables
 
 STATISTIC_KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
 CHUNK_SIZE = 2000

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 
 from engine.band import PALETTE, ModeBand, draw_band, label_segments
 from engine.trajectory import Trajectory
-from language.mode import IMPLICIT_MODE
-from language.problem import suggest_name
-from language.text import escape_invisible
+from language.reading.mode_reader import IMPLICIT_MODE
+from language.text.diagnostic import suggest_name
+from language.text.sanitise import escape_invisible
 
 QUANTITIES = {
     "1": "number", "A": "current", "K": "temperature", "N": "force", "N*m": "torque",

@@ -9,8 +9,8 @@ from operator import le
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.assembly import RANGE_TOLERANCE
-from language.program import Program, unqualified_name
+from language.ir.program import Program, unqualified_name
+from language.programs.simulation_assembly import RANGE_TOLERANCE
 
 FINITE_RANGE = (-sys.float_info.max, sys.float_info.max)
 """The range of a state that has none of its own."""

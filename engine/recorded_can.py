@@ -13,11 +13,10 @@ from engine.recorded_file import (
     require_size,
     unreadable_error,
 )
-from language.experiment import RecordingMap
-from language.inside import path_exists, project_root_of, require_inside_project
-from language.missing import MissingToolError
-from language.problem import Problems, Source, Span, SpecError
-from language.project import display_path
+from language.model.system import RecordingMap
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
+from language.text.project_files import path_exists, project_root_of, require_inside_project
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
 """Endings of files that say what CAN frames mean; DBC is the usual one."""

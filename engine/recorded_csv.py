@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 
 from engine.recorded_file import MAX_BYTES, MAX_PROBLEMS, RecordedFile, Samples
-from language.problem import Problems, Source, Span
-from language.project import display_path
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source, Span
 
 DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 """A number: longer ones, and words such as `nan`, are none."""

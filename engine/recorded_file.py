@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_BYTES = 512 * 1024 * 1024
 """Largest recording read, unpacked."""

@@ -19,9 +19,8 @@ from engine.recorded_file import (
     require_size,
     unreadable_error,
 )
-from language.missing import MissingToolError
-from language.problem import Source, Span
-from language.project import display_path
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import MissingToolError, Source, Span
 
 MASTER_CHANNELS = ("time", "t", "timestamps")
 """Names of channels that are the clock of their group."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from engine.arrow import import_pyarrow
 from engine.recorded_file import RecordedFile, Samples, require_size, unreadable_error
-from language.problem import Source, Span
-from language.project import display_path
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Source, Span
 
 
 def read_parquet(path: Path) -> RecordedFile:

@@ -8,8 +8,8 @@ import re
 from fractions import Fraction
 from pathlib import Path
 
-from language.experiment import RecordingMap, Window
-from language.problem import Problems
+from language.model.system import RecordingMap, Window
+from language.text.diagnostic import Problems
 
 PART_PATTERN = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+(?:\.\d+)?)")
 

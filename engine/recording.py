@@ -17,9 +17,9 @@ from engine.channel_reader import ChannelReader, require_names
 from engine.recorded_csv import read_csv
 from engine.recorded_file import RecordedFile, require_regular_file
 from engine.recorded_part import file_of, windows_of
-from language.experiment import ColumnMapping, RecordingMap, Window
-from language.problem import Problems, Source
-from language.project import display_path
+from language.model.system import ColumnMapping, RecordingMap, Window
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source
 
 
 @dataclass(frozen=True)

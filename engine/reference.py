@@ -20,8 +20,8 @@ from engine.interpreter import Interpreter, Stepper
 from engine.library_stepper import ScipyMethod, ScipyStepper
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.experiment import Scenario, System
-from language.program import ObserverInfo, Program
+from language.ir.program import ObserverInfo, Program
+from language.model.system import Scenario, System
 
 Reals = NDArray[np.float64]
 

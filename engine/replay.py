@@ -15,12 +15,13 @@ from engine.firing import fired_by_micro_step, mode_names, transition_event
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, SignalArray, Trajectory, column_array, fault_names
-from language.experiment import RecordingMap
-from language.model import CHART, Automaton
-from language.pairing import pair_columns
-from language.problem import Problems, SpecError
-from language.program import Program
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.ir.program import Program
+from language.ir.regions import CHART
+from language.loading.map_pairing import pair_columns
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.text.diagnostic import Problems, SpecError
 
 MAX_TICKS = 20_000_000
 """Most ticks of one replay."""

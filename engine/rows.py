@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.trajectory import SignalArray as Column, column_array
-from language.declaration import Formula
-from language.experiment import Scenario, System
-from language.program import Program, ValueType
-from language.units import display_unit
-from language.wires import output_block
+from language.expressions.units import display_unit
+from language.ir.program import Program, ValueType
+from language.lowering.connection_program import output_block
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
 
 RowValues = tuple[Any, ...]
 

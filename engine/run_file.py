@@ -19,8 +19,8 @@ import numpy as np
 
 from engine.arrow import import_pyarrow
 from engine.trajectory import TIME_HEADER, Event, SignalArray, Trajectory, column_headers
-from language.problem import Problems, Source, Span, SpecError
-from language.project import display_path
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source, Span, SpecError
 
 FORMATS = (".csv", ".parquet")
 FORMAT_VERSION = 1

@@ -8,10 +8,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
-from language.experiment import Scenario, System
-from language.problem import Problems, SpecError
-from language.program import Program
-from language.signal import Stimulus
+from language.ir.program import Program
+from language.model.system import Scenario, Stimulus, System
+from language.text.diagnostic import Problems, SpecError
 
 MAX_INSTANTS = 100_000_000
 """Most ticks, samples and rows of one run: about an hour of the interpreter."""

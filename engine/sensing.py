@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from language.evaluate import apply_function
-from language.signal import Sensor
+from language.model.system import Sensor
+from language.numerics.evaluate import apply_function
 
 NOISE_CHUNK = 1024
 """Noise numbers drawn at once; the stream does not depend on it."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from language.evaluate import divide
+from language.numerics.evaluate import divide
 
 Frame = list[Any]
 ExpressionClosure = Callable[[Frame], Any]

@@ -10,12 +10,16 @@ from typing import Any
 from engine.interpreter import Interpreter, Stepper
 from engine.sensing import SensorRun
 from engine.stimulus import InputSignal
-from language.declaration import Formula
-from language.experiment import Connection, Scenario, System
-from language.program import Program
-from language.signal import DelayedSignal
-from language.syntax import names
-from language.wires import WIRE_RESULT, connection_block, wire_formulas, wires_program
+from language.expressions.syntax_tree import names
+from language.ir.program import Program
+from language.lowering.connection_program import (
+    WIRE_RESULT,
+    connection_block,
+    wire_formulas,
+    wires_program,
+)
+from language.model.declaration import Formula
+from language.model.system import Connection, DelayedSignal, Scenario, System
 
 ReadSignal = Callable[[str], Any]
 

@@ -22,8 +22,8 @@ from engine.starting import programs_of
 from engine.stimulus import resolve_recording
 from engine.surroundings import SystemEnvironment
 from engine.trajectory import Event, Trajectory, fault_names
-from language.experiment import Scenario, System
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
 
 BuildStepper = Callable[[Program], Stepper]
 TickCallback = Callable[[str, Program, Stepper], None]

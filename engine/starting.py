@@ -6,14 +6,14 @@ import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.declaration import Formula
-from language.experiment import Scenario, System
-from language.load import program_of
-from language.model import Automaton
-from language.problem import Source, Span
-from language.program import Program
-from language.syntax import NumberLiteral
-from language.units import NO_UNIT
+from language.expressions.syntax_tree import NumberLiteral
+from language.expressions.units import NO_UNIT
+from language.ir.program import Program
+from language.loading.load import program_of
+from language.model.automaton import Automaton
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
+from language.text.diagnostic import Source, Span
 
 
 def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:

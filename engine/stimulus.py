@@ -8,11 +8,10 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from engine.recording import Channel, Recording, read_recording
-from language.experiment import Scenario, System
-from language.problem import Problems, SpecError
-from language.signal import Stimulus, StimulusPiece
-from language.stimulus import constant_pieces, linear_pieces
-from language.wires import piece_block
+from language.loading.stimulus_reader import constant_pieces, linear_pieces
+from language.lowering.connection_program import piece_block
+from language.model.system import Scenario, Stimulus, StimulusPiece, System
+from language.text.diagnostic import Problems, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
 """The value of a piece's formula, by the name of its block, at a time [s]."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from engine.interpreter import Stepper
 from engine.signals import Signals
-from language.experiment import Connection
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Connection
 
 
 class SystemEnvironment:

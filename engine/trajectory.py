@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from language.missing import MissingToolError
-from language.model import CHART
-from language.program import Program
+from language.ir.program import Program
+from language.ir.regions import CHART
+from language.text.diagnostic import MissingToolError
 
 if TYPE_CHECKING:
     from engine.plot import Picture

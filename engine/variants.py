@@ -16,12 +16,11 @@ from engine.page import DERIVE_BLOCKS
 from engine.schedule import TimeGrid
 from engine.simulate import BuildStepper, simulate
 from engine.trajectory import Event, Trajectory
-from language.experiment import Scenario, System
-from language.number import round_to_type
-from language.operation import FaultBit
-from language.program import Program, unqualified_name
-from language.signal import Stimulus, StimulusPiece
-from language.traversal import walk_ops
+from language.ir.number_type import round_to_type
+from language.ir.ops import FaultBit
+from language.ir.program import Program, unqualified_name
+from language.ir.traversal import walk_ops
+from language.model.system import Scenario, Stimulus, StimulusPiece, System
 
 
 def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> BatchResult:

@@ -20,16 +20,24 @@ from expectation.places import (
     suggest_output,
     suggest_path,
 )
-from language.declaration import Formula
-from language.dimension import TypeChecker
-from language.document import ScalarNode
-from language.experiment import System
-from language.kind import EnumType, ExprType, IntType
-from language.problem import Problems, suggest_name
-from language.scope import NameEnvironment
-from language.signal_kind import signal_kinds
-from language.syntax import ErrorNode, FunctionCall, Name, Not, NumberLiteral, Relation, SyntaxTree
-from language.units import PURE_NUMBER, SECOND, are_compatible
+from language.expressions.syntax_tree import (
+    ErrorNode,
+    FunctionCall,
+    Name,
+    Not,
+    NumberLiteral,
+    Relation,
+    SyntaxTree,
+)
+from language.expressions.units import PURE_NUMBER, SECOND, are_compatible
+from language.loading.signal_types import signal_kinds
+from language.model.declaration import Formula
+from language.model.system import System
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import ScalarNode
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import EnumType, ExprType, IntType
 
 RUNNING_FUNCTIONS = ("count", "first", "rms")
 MODES_HINT = (

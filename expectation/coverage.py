@@ -14,10 +14,11 @@ from engine.stimulus import resolve_recording
 from expectation.decision import COVERED, ConditionCoverage, Decision, decision_of
 from expectation.expected import Test
 from expectation.probe import GUARD_READ_BLOCK, instrument, reached_array
-from language.hoist import run_passes
-from language.load import lower_automaton
-from language.model import CHART, Automaton
-from language.program import Program
+from language.ir.program import Program
+from language.ir.regions import CHART
+from language.loading.load import lower_automaton
+from language.model.automaton import Automaton
+from language.passes.constant_folding import run_passes
 
 STRUCTURE_KEYS = ("modes", "regions", "transitions")
 """Words of a key path that are no names."""

@@ -14,13 +14,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
-from language.document import ScalarNode
-from language.model import Transition
-from language.model_text import format_tree
-from language.operation import Binary, Expr, Unary
-from language.parse import parse_expression
-from language.problem import SpecError
-from language.syntax import BoolLiteral, Logic, Not, SyntaxTree, is_same_expression
+from language.expressions.parser import parse_expression
+from language.expressions.syntax_tree import BoolLiteral, Logic, Not, SyntaxTree, is_same_expression
+from language.ir.ops import Binary, Expr, Unary
+from language.model.automaton import Transition
+from language.model.printer import format_tree
+from language.text.diagnostic import SpecError
+from language.text.document import ScalarNode
 
 DecisionStructure = (
     int

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from language.declaration import Formula
-from language.event_name import ModeEntryEvent
-from language.experiment import Scenario, System
-from language.kind import ExprType
-from language.problem import Source, Span
+from language.loading.event_names import ModeEntryEvent
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
+from language.text.diagnostic import Source, Span
+from language.typecheck.types import ExprType
 
 RegionRef = tuple[str, str]
 """An instance and one of its regions."""

@@ -17,7 +17,7 @@ from expectation.observed import (
     point_at_or_before,
     time_tolerance,
 )
-from language.event_name import ModeEntryEvent
+from language.loading.event_names import ModeEntryEvent
 
 TimeSpans = list[tuple[float, float]]
 TruthSeries = list[tuple[int, float, bool]]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from expectation.trace import CodeLine, citations
-from language.document import Document, MappingNode, ScalarNode, YamlNode
-from language.problem import Span
-from language.tree import find_node
+from language.text.diagnostic import Span
+from language.text.document import Document, MappingNode, ScalarNode, YamlNode
+from language.text.node_edit import find_node
 
 KEYED_SECTIONS = (
     *("modes", "regions", "tables", "parameters", "inputs", "states", "discrete", "equations"),

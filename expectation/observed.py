@@ -21,13 +21,13 @@ from expectation.places import (
     mode_signals,
     path_of_mode,
 )
-from language.evaluate import evaluate
-from language.event_name import ModeEntryEvent
-from language.experiment import System
-from language.kind import EnumType, ExprType, IntType
-from language.lower import is_whole, lower_assigned_value, lower_expression
-from language.mode import IMPLICIT_MODE
-from language.operation import Expr, Ref, Value
+from language.ir.ops import Expr, Ref, Value
+from language.loading.event_names import ModeEntryEvent
+from language.lowering.expressions import is_whole, lower_assigned_value, lower_expression
+from language.model.system import System
+from language.numerics.evaluate import evaluate
+from language.reading.mode_reader import IMPLICIT_MODE
+from language.typecheck.types import EnumType, ExprType, IntType
 
 NO_ROW = -1
 """The row of a point that lies between rows."""

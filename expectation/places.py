@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from expectation.expected import ModePredicate, RegionRef
-from language.event_name import ModeEntryEvent
-from language.experiment import System
-from language.load import lower_automaton
-from language.model import CHART, Automaton
-from language.once import cache_on_owner
-from language.problem import Problems, Span, suggest_name
+from language.ir.regions import CHART
+from language.loading.event_names import ModeEntryEvent
+from language.loading.load import lower_automaton
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton
+from language.model.system import System
+from language.text.diagnostic import Problems, Span, suggest_name
 
 
 def mode_predicates(system: System) -> dict[str, ModePredicate]:

@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from expectation.decision import MAX_CONDITIONS, Decision, match_conditions
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -28,7 +28,7 @@ from language.operation import (
     Value,
     integer,
 )
-from language.program import Program, Variable, mode_variable
+from language.ir.program import Program, Variable, mode_variable
 
 GUARD_READ_BLOCK = "look"
 """The block that reads the guards of the active modes and does nothing else."""

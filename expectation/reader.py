@@ -18,21 +18,21 @@ from expectation.expected import (
 )
 from expectation.places import format_region, require_mode_output, suggest_mode
 from expectation.recording import select_recorded_signals
-from language.declaration import Formula
-from language.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
-from language.event_name import ModeEntryEvent, read_event
-from language.experiment import Scenario, System
-from language.model import CHART
-from language.overlay import without_keys
-from language.problem import Problems, Span, suggest_name
-from language.project import Project, expand_document
-from language.reader import Reader, about_of
-from language.requirement import all_requirements, requirements_of
-from language.scenario import SCENARIO_KEYS, read_scenario
-from language.syntax import ErrorNode
-from language.system import read_system
-from language.units import SECOND, are_compatible
-from language.wiring import INACTIVE
+from language.expressions.syntax_tree import ErrorNode
+from language.expressions.units import SECOND, are_compatible
+from language.ir.regions import CHART
+from language.loading.event_names import ModeEntryEvent, read_event
+from language.loading.scenario_reader import SCENARIO_KEYS, read_scenario
+from language.loading.system_reader import read_system
+from language.lowering.program_builder import INACTIVE
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
+from language.overlays.expand_document import Project, expand_document
+from language.reading.reader import Reader, about_of
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
+from language.text.overlay import without_keys
+from language.text.requirement import all_requirements, requirements_of
 
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
 INLINE_SCENARIO_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))

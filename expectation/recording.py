@@ -9,8 +9,8 @@ from fractions import Fraction
 
 from expectation.expected import Expectation
 from expectation.places import is_chart, mode_signals
-from language.experiment import Scenario, System
-from language.problem import Problems
+from language.model.system import Scenario, System
+from language.text.diagnostic import Problems
 
 MAX_ROWS = 1_000_000
 """More rows are a mistake of a horizon, or of a period."""

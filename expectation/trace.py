@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from expectation.expected import Test
-from language.document import Document, MappingNode, ScalarNode
-from language.requirement import find_requirements
-from language.tree import entries
+from language.text.document import Document, MappingNode, ScalarNode
+from language.text.node_edit import entries
+from language.text.requirement import find_requirements
 
 CITATION = re.compile(
     r"(?:\b([A-Za-z]\w*) )?\b((?:modes|regions|tables|parameters|inputs|states|discrete|equations"

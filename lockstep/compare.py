@@ -16,8 +16,8 @@ from codegen.instructions import InstructionCounts, count_instructions
 from codegen.machine import HOST, Machine
 from engine.firing import fired_transitions
 from engine.interpreter import Stepper
-from language.number import NumberType, shortest_decimal
-from language.program import Program, unqualified_name
+from language.ir.number_type import NumberType, shortest_decimal
+from language.ir.program import Program, unqualified_name
 
 REAL_FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
 """How a record keeps a real; whole numbers and truth values take 8 bytes."""

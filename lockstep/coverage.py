@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from engine.starting import programs_of
 from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
-from language.experiment import Scenario, System
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
 from lockstep.compare import Verdict, skipped_verdict
 
 

@@ -11,7 +11,7 @@ from codegen.fuzzing import Range, WordValues, decode_sequence, run_fuzzer, word
 from codegen.harness import tick_inputs
 from engine.interpreter import Interpreter
 from engine.simulate import CONVERTER_OF_TYPE
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import Difference, TickLog, compare
 
 RUNS, TICKS, SEED = 20_000, 24, 1

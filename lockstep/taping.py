@@ -5,8 +5,8 @@ from __future__ import annotations
 from engine.interpreter import Stepper
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.experiment import Scenario, System
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
 from lockstep.compare import TickLog
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from engine.difference import RunDifference
     from engine.plot import Picture
     from engine.trajectory import Event, Trajectory
-    from language.problem import Problem, SpecError, render_all
+    from language.text.diagnostic import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
     from modewright.calibrations import (
@@ -105,9 +105,9 @@ PLACES = {
     "Event": "engine.trajectory",
     "Fit": "diagnosis.fit",
     "Picture": "engine.plot",
-    "Problem": "language.problem",
+    "Problem": "language.text.diagnostic",
     "RunDifference": "engine.difference",
-    "SpecError": "language.problem",
+    "SpecError": "language.text.diagnostic",
     "Trajectory": "engine.trajectory",
     "Verdict": "lockstep.compare",
     "a2l": "modewright.code",
@@ -126,7 +126,7 @@ PLACES = {
     "diagnose": "modewright.diagnoses",
     "fit": "modewright.diagnoses",
     "graph": "modewright.diagram",
-    "render_all": "language.problem",
+    "render_all": "language.text.diagnostic",
     "save": "modewright.runs",
     "save_diagnosis": "modewright.diagnoses",
     "run_tests": "modewright.tests",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from language.problem import Problem
+from language.text.diagnostic import Problem
 
 
 def annotation_lines(problems: Iterable[Problem]) -> str:

@@ -14,23 +14,27 @@ from codegen.machine import CORTEX_M4F, HOST, MACHINES
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.trajectory import Trajectory
-from language.document import require_kind
-from language.experiment import RecordingMap, Scenario, System
-from language.limit import require_ranges
-from language.load import automaton_of, program_of
-from language.map import read_map
-from language.model import Automaton
-from language.number import NumberType
-from language.page import parse_pages
-from language.problem import Problems, SpecError
-from language.program import Program
-from language.project import Project, add_calibrations, apply_variant, read_document
-from language.scenario import read_scenario
-from language.system import read_system, with_number_type
+from language.ir.number_type import NumberType
+from language.ir.program import Program
+from language.loading.calibration_page_reader import parse_pages
+from language.loading.load import automaton_of, program_of
+from language.loading.recording_map_reader import read_map
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system, with_number_type
+from language.lowering.range_saturation import require_ranges
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap, Scenario, System
+from language.overlays.expand_document import (
+    Project,
+    add_calibrations,
+    apply_variant,
+    read_document,
+)
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import require_kind
 from lockstep.compare import TickLog, Verdict, add_instruction_counts, compare
 from lockstep.coverage import add_notes
 from lockstep.taping import record_ticks
-from modewright.checking import check as check
 from modewright.compiled import run_simulation as run_compiled
 from modewright.documents import Values, load_calibrated_document, parse_values
 

@@ -12,14 +12,18 @@ from codegen.exchange.formats import FORMATS, read_page
 from codegen.exchange.owned import NameFilter
 from codegen.exchange.page import page_characteristics, page_constants, page_name
 from codegen.exchange.taking import ImportedValues, import_values
-from language.document import Document, ScalarNode, YamlNode
-from language.load import automaton_of, program_of
-from language.model import Automaton
-from language.problem import Problem, Problems, Source, Span
-from language.program import Constant, Program
-from language.project import Project
-from language.tree import format_inline
-from language.written import format_calibration, format_value_in_unit, is_exact_literal
+from language.ir.program import Constant, Program
+from language.loading.load import automaton_of, program_of
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project
+from language.overlays.literal_format import (
+    format_calibration,
+    format_value_in_unit,
+    is_exact_literal,
+)
+from language.text.diagnostic import Problem, Problems, Source, Span
+from language.text.document import Document, ScalarNode, YamlNode
+from language.text.node_edit import format_inline
 from modewright.documents import Values, load_calibrated_document, parse_values as as_scalars
 
 

@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from expectation.reader import read_test
-from language.calibration import read_calibration
-from language.document import Document, ScalarNode
-from language.effect import read_effect
-from language.examine import check_warnings
-from language.load import automaton_of, lower_automaton
-from language.map import read_map
-from language.model import Automaton
-from language.numbers_text import format_method_lines
-from language.problem import Problem, Problems, SpecError, sort_problems
-from language.program import Program
-from language.project import Project, add_calibrations, expand_document
-from language.scenario import read_scenario
-from language.system import read_system
+from language.checks.check_warnings import check_warnings
+from language.ir.program import Program
+from language.loading.load import automaton_of, lower_automaton
+from language.loading.recording_map_reader import read_map
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system
+from language.model.automaton import Automaton
+from language.overlays.calibration import read_calibration
+from language.overlays.effect_reader import read_effect
+from language.overlays.expand_document import Project, add_calibrations, expand_document
+from language.programs.solved_numbers_report import format_method_lines
+from language.text.diagnostic import Problem, Problems, SpecError, sort_problems
+from language.text.document import Document, ScalarNode
 from sweep.study_reader import read_study
 
 

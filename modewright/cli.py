@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from language.inside import ALLOW_OUTSIDE_ENV
+from language.text.project_files import ALLOW_OUTSIDE_ENV
 from modewright.commands.a2l import a2l
 from modewright.commands.calibration import calibration
 from modewright.commands.check import check

@@ -19,15 +19,15 @@ from codegen.metrics import Metrics, measure_code as measured
 from codegen.proofs.all import CHECKS, run_checks
 from codegen.proofs.proof import ToolVerdict
 from codegen.source import emit_c_files
-from language.declaration import Input, State
-from language.limit import require_ranges
-from language.load import automaton_of, program_of
-from language.model import Automaton
-from language.number import NumberType
-from language.printing import digest
-from language.program import Program
-from language.project import Project
-from language.system import with_number_type
+from language.ir.number_type import NumberType
+from language.ir.printer import digest
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.loading.system_reader import with_number_type
+from language.lowering.range_saturation import require_ranges
+from language.model.automaton import Automaton
+from language.model.declaration import Input, State
+from language.overlays.expand_document import Project
 from lockstep.compare import MAX_COUNTED_STEPS, TickLog
 from lockstep.fuzzing import RUNS, SEED, TICKS, FuzzReport, fuzz as fuzzed
 from lockstep.taping import record_ticks

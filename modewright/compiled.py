@@ -21,9 +21,9 @@ from engine.starting import programs_of
 from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
 from engine.variants import run_interpreted_batch
-from language.experiment import Scenario, System
-from language.missing import MissingToolError
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
+from language.text.diagnostic import MissingToolError
 
 COMPILE_THRESHOLD = 100_000
 """Steps and ticks from which on a run is compiled unasked: the interpreter takes seconds for them,

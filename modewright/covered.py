@@ -9,7 +9,7 @@ from typing import Any
 
 from expectation.coverage import Coverage, measure_coverage as reached_by, merge_coverages, names_of
 from expectation.decision import COVERED, Decision
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 from modewright.diagram import Arrow, Diagram, ModeBox, ModePath, RegionBox, Shade, graph
 from modewright.tests import find_tests, load_tests
 

@@ -23,10 +23,10 @@ from diagnosis.variant import format_variant, missing_effect_notes
 from diagnosis.wording import summary_lines
 from engine.recorded_part import file_of
 from engine.recording import read_recording
-from language.effect import Effect
-from language.load import automaton_of
-from language.model import Automaton
-from language.project import Project, display_path, expand_document, read_document
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project, display_path, expand_document, read_document
 from modewright.apart import require_disjoint
 from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.garbage import infrequent_gc

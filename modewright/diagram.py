@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from language.document import Document, Entry, MappingNode, SequenceNode, YamlNode
-from language.overlay import apply_overlay, without_keys
-from language.problem import Problems
-from language.transition_table import expand_transition_tables
+from language.reading.transition_table_reader import expand_transition_tables
+from language.text.diagnostic import Problems
+from language.text.document import Document, Entry, MappingNode, SequenceNode, YamlNode
+from language.text.overlay import apply_overlay, without_keys
 from modewright.label import ModeKind, label_lines, mode_kind_of, mode_lines, node_text
 
 ModePath = tuple[str, ...]
@@ -235,8 +235,8 @@ def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> Mod
 
 def graph(reference: str, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton. Raises SpecError with all its problems."""
-    from language.load import automaton_of
-    from language.project import Project, expand_document, read_document
+    from language.loading.load import automaton_of
+    from language.overlays.expand_document import Project, expand_document, read_document
 
     project = Project(root or Path())
     document = read_document(project.path_of(reference))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 from modewright.diagram import Arrow, Diagram, ModeBox, RegionBox, lift_arrow
 from modewright.layers import Edge, Layout, Point, Size, compute_layout
 

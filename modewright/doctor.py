@@ -58,7 +58,7 @@ def _check_dependencies() -> Iterator[HealthCheck]:
 
 def _check_compiler() -> HealthCheck:
     from codegen.build import BuildError, compiler_version
-    from language.missing import MissingToolError
+    from language.text.diagnostic import MissingToolError
 
     try:
         return HealthCheck("C compiler", "ok", compiler_version())

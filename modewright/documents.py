@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from language.document import Document, ScalarNode
-from language.load import command_line_value
-from language.project import Project, add_calibrations, read_document
+from language.loading.load import command_line_value
+from language.overlays.expand_document import Project, add_calibrations, read_document
+from language.text.document import Document, ScalarNode
 
 Values = Mapping[str, str]
 """Parameter values as text with units, by `parameter` or `instance.parameter`."""

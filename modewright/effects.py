@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 from diagnosis.library import EffectDescription, describe_effect, library_effects
 from diagnosis.naming import VERDICT_ALIASES
-from language.document import Document
-from language.load import automaton_of
-from language.problem import Problems, Source, Span, SpecError, suggest_name
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_name
+from language.text.document import Document
 
 if TYPE_CHECKING:
     from engine.plot import Picture

@@ -13,9 +13,8 @@ from typing import Any
 
 import typer
 
-from language.missing import MissingToolError
-from language.problem import SpecError, render_all, sort_problems
-from language.text import escape_invisible, truncate
+from language.text.diagnostic import MissingToolError, SpecError, render_all, sort_problems
+from language.text.sanitise import escape_invisible, truncate
 from modewright.files import OutputError
 from sweep.cluster_error import ClusterError
 

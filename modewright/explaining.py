@@ -7,25 +7,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from language.calibration import read_calibration
-from language.document import Document
-from language.hoist import PASSES
-from language.load import automaton_of, command_line_value, lower_automaton, program_of
-from language.model_text import format_model
-from language.numbers_text import format_solved_numbers
-from language.parameter import parameter_kinds
-from language.printing import format_program
-from language.problem import Problems, SpecError
-from language.project import Project, add_calibrations, expand_document, read_document
-from language.provenance import (
+from language.ir.printer import format_program
+from language.loading.load import automaton_of, command_line_value, lower_automaton, program_of
+from language.loading.system_reader import read_system
+from language.lowering.parameter_bindings import parameter_kinds
+from language.model.printer import format_model
+from language.overlays.calibration import read_calibration
+from language.overlays.expand_document import (
+    Project,
+    add_calibrations,
+    expand_document,
+    read_document,
+)
+from language.passes.constant_folding import PASSES
+from language.programs.solved_numbers_report import format_solved_numbers
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import Document
+from language.text.node_edit import format_inline
+from language.text.provenance import (
     ProvenanceEntry,
     diff_specs,
     format_diff,
     format_spec,
     provenance_entries,
 )
-from language.system import read_system
-from language.tree import format_inline
 
 PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
 Values = Mapping[str, str]

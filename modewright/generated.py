@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from codegen.source import emit_c_files
-from language.load import automaton_of, program_of
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of, program_of
+from language.overlays.expand_document import Project, expand_document, read_document
 from modewright.checking import spec_files
 
 MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import Literal
 
-from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.text import escape_invisible, truncate
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.sanitise import escape_invisible, truncate
 
 MAX_TEXT_LENGTH = 1000
 """Characters of a label; expressions are shorter, other texts are cut."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 from modewright.diagram import Arrow, Diagram, ModeBox, ModePath, RegionBox, lift_arrow
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})

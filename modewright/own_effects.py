@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from diagnosis.layers import PlacedEffect, automaton_with_effects, find_placements, read_effects
-from language.document import Document
-from language.effect import Effect
-from language.problem import Problems, SpecError
-from language.project import Project
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import Document
 
 
 def load_effects(folder: Path) -> tuple[Effect, ...]:

@@ -18,14 +18,13 @@ from diagnosis.guessed_map import guess_map
 from diagnosis.mistakes import find_clock_and_sign_errors
 from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
 from engine.recording import Recording, read_recording
-from language.experiment import RecordingMap
-from language.load import automaton_of
-from language.map import read_map
-from language.missing import MissingToolError
-from language.model import Automaton
-from language.pairing import check_pairing
-from language.problem import Problems, SpecError
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of
+from language.loading.map_pairing import check_pairing
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import MissingToolError, Problems, SpecError
 from modewright.compiled import simulate_resolved
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from importlib.metadata import version
 from pathlib import PurePath
 from typing import Any
 
-from language.codes import code_of, meaning_of
-from language.problem import Problem
+from language.text.diagnostic import Problem
+from language.text.error_codes import code_of, meaning_of
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 

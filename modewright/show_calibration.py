@@ -10,10 +10,10 @@ from rich.markup import escape
 
 from codegen.exchange.desk import Remark
 from codegen.exchange.page import format_constant_value, page_name
-from language.problem import Problem, render_all
-from language.program import Constant, unqualified_name
-from language.text import escape_invisible
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.ir.program import Constant, unqualified_name
+from language.text.diagnostic import Problem, render_all
+from language.text.sanitise import escape_invisible
 from modewright.calibrations import CalibrationPage, ImportedPage, ResolvedPage, SolvedChange
 from modewright.checking import problem_json
 from modewright.console import pluralise

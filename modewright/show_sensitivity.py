@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 from modewright.show import null_nonfinite
 from modewright.show_study import format_number, interval_text, progress_text
 from sweep.sensitivity import MIN_COMPLETE, Index, Sensitivity

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from language.text import escape_invisible
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.text.sanitise import escape_invisible
 from modewright.show import null_nonfinite
 from sweep.summary import Rate, Summary, SummaryLine
 

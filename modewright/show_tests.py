@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 from expectation.expected import Expectation
 from expectation.judging import Outcome
-from language.text import escape_invisible
-from language.units import Dimension
+from language.expressions.units import Dimension
+from language.text.sanitise import escape_invisible
 from modewright.console import pluralise
 from modewright.tests import TestRun
 

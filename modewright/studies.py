@@ -10,11 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from language.document import ScalarNode
-from language.load import command_line_value
-from language.missing import MissingToolError
-from language.problem import Problems, render_problem, sort_problems
-from language.project import Project, read_document
+from language.loading.load import command_line_value
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import MissingToolError, Problems, render_problem, sort_problems
+from language.text.document import ScalarNode
 from modewright.compiled import run_block
 from modewright.files import OutputError
 from sweep import fork_server

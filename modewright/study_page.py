@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from language.units import display_unit
+from language.expressions.units import display_unit
 from modewright.show_sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.show_study import failure_texts, format_number, interval_text
 from sweep.block import DONE

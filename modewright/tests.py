@@ -14,9 +14,9 @@ from engine.trajectory import Trajectory
 from expectation.expected import Test
 from expectation.judging import Outcome, evaluate_test
 from expectation.reader import read_test
-from language.finding import HEAD_PATTERN
-from language.problem import Problems, Source, Span, SpecError
-from language.project import Project
+from language.overlays.expand_document import Project
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.project_files import HEAD_PATTERN
 from modewright.checking import spec_files
 from modewright.compiled import run_in_c
 

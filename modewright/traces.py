@@ -13,14 +13,14 @@ from codegen.source import emit_c_files
 from expectation.expected import Test
 from expectation.key_trace import KeyTraces, build_key_traces
 from expectation.trace import RequirementTrace, trace_requirements
-from language.document import Document, ScalarNode, read_text
-from language.instance import expand_instances
-from language.load import automaton_of, program_of
-from language.model import Automaton
-from language.problem import Problems
-from language.project import Project, expand_document, read_document
-from language.system import read_system
-from language.tree import entries, find_node
+from language.loading.instances import expand_instances
+from language.loading.load import automaton_of, program_of
+from language.loading.system_reader import read_system
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import Problems
+from language.text.document import Document, ScalarNode, read_text
+from language.text.node_edit import entries, find_node
 from modewright.tests import find_tests, load_tests, run_test
 
 HEADINGS = ("name", "id", "requirement")

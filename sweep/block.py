@@ -10,8 +10,8 @@ from fractions import Fraction
 import numpy as np
 
 from engine.batch import Batch, BatchResult, BatchRunner, InputTable
-from language.experiment import Scenario, System
-from language.problem import SpecError
+from language.model.system import Scenario, System
+from language.text.diagnostic import SpecError
 from sweep.case import VariantValues, variant_values_of
 from sweep.measure import Measure, columns_of
 from sweep.measuring import Cell, evaluate_measures

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from language.declaration import Formula
-from language.evaluate import evaluate
-from language.experiment import System
-from language.lower import lower_assigned_value
-from language.operation import Expr, Ref, Value
+from language.ir.ops import Expr, Ref, Value
+from language.lowering.expressions import lower_assigned_value
+from language.model.declaration import Formula
+from language.model.system import System
+from language.numerics.evaluate import evaluate
 from sweep.point import Variant
 from sweep.study import Study, SystemVariant, Target, design_group_size
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.document import MappingNode, ScalarNode, YamlNode
-from language.text import escape_invisible
-from language.tree import format_inline
+from language.text.document import MappingNode, ScalarNode, YamlNode
+from language.text.node_edit import format_inline
+from language.text.sanitise import escape_invisible
 
 Description = Mapping[str, str | Mapping[str, str]]
 """The sections of a study by key: a text, or texts by name."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 from sweep.block import Block
 from sweep.description import Description
 from sweep.measure import StoreColumn, columns_of

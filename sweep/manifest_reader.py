@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from language.names import NAME_PATTERN
-from language.text import escape_invisible, truncate
+from language.expressions.name_rules import NAME_PATTERN
+from language.text.sanitise import escape_invisible, truncate
 from sweep.description import Description
 from sweep.manifest import ARROW_TYPES, MANIFEST_NAME, Design, Manifest, seal_of, store_error
 from sweep.measure import StoreColumn

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from language.declaration import Formula
-from language.event_name import ModeEntryEvent
-from language.problem import Span
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.loading.event_names import ModeEntryEvent
+from language.model.declaration import Formula
+from language.text.diagnostic import Span
 
 SignalKind = Literal["peak", "max", "min", "mean", "rms", "final", "settling", "frequency"]
 Bound = Fraction | str | None

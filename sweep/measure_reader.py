@@ -6,20 +6,27 @@ import dataclasses
 from collections.abc import Sequence
 from fractions import Fraction
 
-from language.declaration import Formula
-from language.difference import read_difference
-from language.dimension import TypeChecker
-from language.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.event_name import ModeEntryEvent, read_event
-from language.experiment import System
-from language.kind import ExprType, IntType
-from language.problem import Problems, Span, suggest_name
-from language.reader import Reader
-from language.rewrite import names_in_text, rename_names
-from language.scope import NameEnvironment
-from language.signal_kind import signal_kinds
-from language.syntax import Name
-from language.units import PURE_NUMBER, SECOND, Dimension, Unit, are_compatible, dimension_product
+from language.expressions.syntax_tree import Name
+from language.expressions.text_rewrite import names_in_text, rename_names
+from language.expressions.units import (
+    PURE_NUMBER,
+    SECOND,
+    Dimension,
+    Unit,
+    are_compatible,
+    dimension_product,
+)
+from language.loading.event_names import ModeEntryEvent, read_event
+from language.loading.signal_types import signal_kinds
+from language.model.declaration import Formula
+from language.model.system import System
+from language.reading.difference_literal import read_difference
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import ExprType, IntType
 from sweep.measure import (
     Bound,
     DelayMeasure,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from language.evaluate import evaluate
-from language.lower import lower_assigned_value, lower_expression
-from language.operation import Ref
+from language.ir.ops import Ref
+from language.lowering.expressions import lower_assigned_value, lower_expression
+from language.numerics.evaluate import evaluate
 from sweep.measure import (
     Bound,
     DelayMeasure,

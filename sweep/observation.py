@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.batch import NO_EVENT, BatchResult, EventKind
-from language.event_name import ModeEntryEvent
+from language.loading.event_names import ModeEntryEvent
 
 Reals = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from engine.band import PALETTE
 from engine.plot import QUANTITIES, Picture
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 from sweep.bins import histogram_bin_edges
 from sweep.measure import StoreColumn
 from sweep.store import Store

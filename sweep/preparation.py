@@ -10,8 +10,8 @@ from fractions import Fraction
 
 from engine.starting import programs_of
 from engine.stimulus import resolve_recording
-from language.experiment import Scenario
-from language.printing import digest as program_digest
+from language.ir.printer import digest as program_digest
+from language.model.system import Scenario
 from sweep.sampling_reader import MAX_POINTS, MAX_SEED
 from sweep.study import ScenarioBinding, Study, SystemVariant, design_group_size
 from sweep.study_reader import signals_of

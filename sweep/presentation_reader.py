@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from language.document import Entry, ScalarNode, YamlNode
-from language.problem import Problems, suggest_name
-from language.reader import Reader
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import Entry, ScalarNode, YamlNode
 from sweep.measure import Measure, columns_of
 from sweep.study import (
     MAX_CONFIDENCE,

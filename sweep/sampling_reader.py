@@ -7,8 +7,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
 
-from language.document import ScalarNode, YamlNode
-from language.reader import Reader
+from language.reading.reader import Reader
+from language.text.document import ScalarNode, YamlNode
 from sweep.study import MORRIS_LEVELS, Distribution, Sampling, SweepVariable, design_group_size
 
 METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")

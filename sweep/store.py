@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from language.problem import Problems, SpecError
+from language.text.diagnostic import Problems, SpecError
 from sweep.block import Block, Row
 from sweep.manifest import MANIFEST_NAME, Manifest, encode_manifest, file_span, store_error
 from sweep.manifest_reader import read_manifest

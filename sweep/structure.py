@@ -8,11 +8,11 @@ from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
-from language.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.experiment import Scenario, System
-from language.project import Project
-from language.scenario import read_scenario
-from language.tree import find_node, put_node
+from language.loading.scenario_reader import read_scenario
+from language.model.system import Scenario, System
+from language.overlays.expand_document import Project
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.node_edit import find_node, put_node
 from sweep.study import TIME_DECIMALS, ScenarioBinding, Target
 
 TargetValues = Iterable[tuple[Target, float]]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
-from language.declaration import Formula
-from language.document import Document
-from language.experiment import Scenario, System
-from language.problem import Span
-from language.units import Unit
+from language.expressions.units import Unit
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
+from language.text.diagnostic import Span
+from language.text.document import Document
 from sweep.description import Description
 from sweep.measure import Measure
 

@@ -9,7 +9,14 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from language.document import (
+from language.expressions.units import SECOND, are_compatible
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import Overrides, read_system, single_instance_system
+from language.model.system import Scenario, System
+from language.overlays.expand_document import Project, expand_document
+from language.reading.reader import TEXT_KEYS, Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import (
     Document,
     Entry,
     MappingNode,
@@ -18,14 +25,7 @@ from language.document import (
     YamlNode,
     require_kind,
 )
-from language.experiment import Scenario, System
-from language.problem import Problems, Span, suggest_name
-from language.project import Project, expand_document
-from language.reader import TEXT_KEYS, Reader
-from language.scenario import read_scenario
-from language.system import Overrides, read_system, single_instance_system
-from language.tree import put_node
-from language.units import SECOND, are_compatible
+from language.text.node_edit import put_node
 from sweep.description import description_of
 from sweep.measure import Measure, SignalMeasure
 from sweep.measure_reader import MeasureReader

@@ -6,10 +6,10 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.document import Document, MappingNode, ScalarNode
-from language.experiment import System
-from language.kind import TypeName
-from language.units import Unit, parse_unit
+from language.expressions.units import Unit, parse_unit
+from language.model.system import System
+from language.text.document import Document, MappingNode, ScalarNode
+from language.typecheck.types import TypeName
 from sweep.study import Target
 
 TIME = parse_unit("s")

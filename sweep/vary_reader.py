@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from language.difference import HINT, LABEL, read_difference
-from language.dimension import TypeChecker
-from language.document import Entry, SequenceNode, YamlNode
-from language.experiment import System
-from language.kind import ExprType
-from language.names import check_name
-from language.problem import Problems, Span, suggest_name
-from language.reader import Reader
-from language.scope import NameEnvironment
-from language.syntax import NumberLiteral
-from language.units import NO_UNIT, Unit
+from language.expressions.name_rules import check_name
+from language.expressions.syntax_tree import NumberLiteral
+from language.expressions.units import NO_UNIT, Unit
+from language.model.system import System
+from language.reading.difference_literal import HINT, LABEL, read_difference
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Entry, SequenceNode, YamlNode
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import ExprType
 from sweep.shape import fault_of_distribution, log_spaced
 from sweep.study import Axis, Distribution, Setting, Shape, SweepVariable, Target
 from sweep.target import TargetInfo

@@ -12,7 +12,7 @@ import pytest
 import typer
 from hypothesis import settings
 
-from language import load
+from language.loading import load
 from modewright.garbage import raise_gc_threshold
 from tests.once import memoise_lowering, memoise_shipped
 

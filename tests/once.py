@@ -11,8 +11,8 @@ from functools import wraps
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from language.model import Automaton
-from language.program import Program
+from language.ir.program import Program
+from language.model.automaton import Automaton
 
 ROOT = Path(__file__).parents[1]
 Given = ParamSpec("Given")

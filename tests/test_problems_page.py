@@ -7,8 +7,8 @@ from collections.abc import Iterable
 
 import pytest
 
-from language.codes import CODES
-from language.problem import render_all
+from language.text.diagnostic import render_all
+from language.text.error_codes import CODES
 from tests.refused.book import ROOT, cases, problems_of
 from tests.refused.kinds import kinds
 from tests.refused.made import GENERATED_CASES
@@ -63,7 +63,7 @@ def first_told(texts: Iterable[str]) -> dict[str, str]:
 
 
 def test_every_kind_has_a_code_and_every_code_a_kind() -> None:
-    """A new kind gets the next free code in `language/codes.py`; codes are never given again."""
+    """A new kind gets the next free code in `language/text/error_codes.py`; codes are never given again."""
     assert set(CODES) == set(kinds())
 
 

@@ -21,8 +21,8 @@ from codegen.asam.description import (
 )
 from codegen.asam.image import Image, ImageError, StructLocation, read_image
 from codegen.rendering import product_version, render
-from language.number import NumberType, shortest_decimal
-from language.program import Program
+from language.ir.number_type import NumberType, shortest_decimal
+from language.ir.program import Program
 
 A2L_TYPES: Mapping[str, tuple[str, int]] = {
     "double": ("FLOAT64_IEEE", 8),

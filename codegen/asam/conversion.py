@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from language.program import TICK_UNIT, Constant, Program, Variable, fired_variable
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.ir.program import TICK_UNIT, Constant, Program, Variable, fired_variable
 
 
 @dataclass(frozen=True)

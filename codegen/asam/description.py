@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from codegen.asam.conversion import COUNT, TRUTH, Conversion, conversion_of
 from codegen.names import CNames, c_type
 from codegen.source import restrict_to_step
-from language.number import MAX_FINITE
-from language.printing import digest
-from language.program import Constant, Program, Variable
-from language.units import display_unit
+from language.expressions.units import display_unit
+from language.ir.number_type import MAX_FINITE
+from language.ir.printer import digest
+from language.ir.program import Constant, Program, Variable
 
 INSTANCE_STRUCT, PAGE_STRUCT = "Self", "Cal"
 """The structures of a module that a tool reads and writes, as the end of their C type."""

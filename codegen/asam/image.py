@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 if TYPE_CHECKING:
     from elftools.dwarf.die import DIE

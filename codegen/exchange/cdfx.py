@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
 from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic, transpose_map
-from language.text import escape_invisible
+from language.text.sanitise import escape_invisible
 
 CATEGORIES = ("VALUE", "CURVE", "MAP")
 """What a characteristic is called, by its number of axes."""

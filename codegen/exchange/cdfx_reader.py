@@ -18,7 +18,7 @@ from codegen.exchange.characteristic import (
 )
 from codegen.exchange.owned import NameFilter
 from codegen.exchange.xml_tree import Element, parse_xml
-from language.problem import Problems, Source
+from language.text.diagnostic import Problems, Source
 
 VALUE_CATEGORIES = ("VALUE", "DEPENDENT_VALUE", "BOOLEAN", "ASCII", "VAL_BLK", "CURVE", "MAP")
 SHARED_AXIS_CATEGORIES = ("COM_AXIS", "RES_AXIS", "CURVE_AXIS")

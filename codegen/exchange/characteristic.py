@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from language.problem import Problems, Source, Span
+from language.text.diagnostic import Problems, Source, Span
 
 NOWHERE = Span(Source(""), 0, 0)
 """The place of what is not read from a file."""

@@ -16,7 +16,7 @@ from codegen.exchange.characteristic import (
     stop_if_many,
 )
 from codegen.exchange.owned import NameFilter
-from language.problem import Problems, Source, Span, suggest_name
+from language.text.diagnostic import Problems, Source, Span, suggest_name
 
 COLUMNS = ("name", "value", "unit", "x", "x_unit", "y", "y_unit")
 REQUIRED_COLUMNS = ("name", "value")

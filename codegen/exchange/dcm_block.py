@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic, transpose_map
-from language.problem import Problems
+from language.text.diagnostic import Problems
 
 SHARED_AXIS = "STUETZSTELLENVERTEILUNG"
 CURVE_KINDS = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")

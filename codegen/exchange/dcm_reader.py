@@ -21,7 +21,7 @@ from codegen.exchange.characteristic import (
 )
 from codegen.exchange.dcm_block import SHARED_AXIS, SIZES, DcmBlock, characteristic_of, is_count
 from codegen.exchange.owned import NameFilter
-from language.problem import Problems, Source, Span, suggest_name
+from language.text.diagnostic import Problems, Source, Span, suggest_name
 
 COMMENTS = ("*", "!", ".")
 WORD = re.compile(r'"[^"]*"|"?[^\s"]+|"')

@@ -8,11 +8,11 @@ from typing import Literal
 
 from codegen.exchange.characteristic import Cell, FileCharacteristic
 from codegen.exchange.exact import parse_cell_number, parse_unit_cell
-from language.declaration import Parameter
-from language.model import Automaton
-from language.number import NumberType, round_to_type, shortest_decimal
-from language.problem import Problems, Span
-from language.units import Unit
+from language.expressions.units import Unit
+from language.ir.number_type import NumberType, round_to_type, shortest_decimal
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.text.diagnostic import Problems, Span
 
 RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
 

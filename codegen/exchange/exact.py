@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from codegen.exchange.characteristic import Cell
-from language.problem import Problems
-from language.symbols import MISSPELLED_UNITS
-from language.text import truncate
-from language.units import Unit, UnitError, are_compatible, parse_unit, unit_hint
+from language.expressions.unit_symbols import MISSPELLED_UNITS
+from language.expressions.units import Unit, UnitError, are_compatible, parse_unit, unit_hint
+from language.text.diagnostic import Problems
+from language.text.sanitise import truncate
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 MAX_EXPONENT = 400

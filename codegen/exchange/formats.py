@@ -14,8 +14,8 @@ from codegen.exchange.dcm import format_dcm
 from codegen.exchange.dcm_reader import read_dcm
 from codegen.exchange.owned import NameFilter
 from codegen.exchange.page_text import decode_text, read_bytes
-from language.finding import display_path
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.project_files import display_path
 
 Reader = Callable[[str, bytes, Problems, NameFilter], PageFile]
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic
 from codegen.names import c_member
 from codegen.source import restrict_to_step
-from language.declaration import LookupTable
-from language.model import Automaton
-from language.number import NumberType, round_to_type, shortest_decimal
-from language.program import TICK_UNIT, Constant, Program, unqualified_name
-from language.units import display_unit
-from language.written import format_exact
+from language.expressions.units import display_unit
+from language.ir.number_type import NumberType, round_to_type, shortest_decimal
+from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.model.automaton import Automaton
+from language.overlays.literal_format import format_exact
+from language.typecheck.lookup_table import LookupTable
 
 STAMP_PREFIX = "solved.stamp_"
 

@@ -6,7 +6,7 @@ import re
 import stat
 from pathlib import Path
 
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_BYTES = 8 * 1024 * 1024
 """Largest file read: the page of a large automaton has some 100 kB."""

@@ -8,12 +8,12 @@ from codegen.exchange.characteristic import Cell, FileAxis, FileCharacteristic
 from codegen.exchange.desk import ImportContext, convert_real, convert_to_si, resolve_unit
 from codegen.exchange.exact import parse_cell_number
 from codegen.exchange.page import axes_of
-from language.declaration import Parameter
-from language.document import YamlNode
-from language.number import round_to_type
-from language.program import Constant
-from language.units import Unit
-from language.written import table_points
+from language.expressions.units import Unit
+from language.ir.number_type import round_to_type
+from language.ir.program import Constant
+from language.model.declaration import Parameter
+from language.overlays.literal_format import table_points
+from language.text.document import YamlNode
 
 
 def read_table(

@@ -23,14 +23,18 @@ from codegen.exchange.exact import parse_cell_number
 from codegen.exchange.owned import NameFilter
 from codegen.exchange.page import page_constants, page_name
 from codegen.exchange.table import read_table
-from language.declaration import Parameter
-from language.document import ScalarNode, YamlNode
-from language.kind import MAX_INT
-from language.model import Automaton
-from language.problem import Problems, suggest_name
-from language.program import TICK_UNIT, Constant, Program, unqualified_name
-from language.units import NO_UNIT, parse_unit
-from language.written import format_exact, format_exact_in_unit, format_value_in_unit
+from language.expressions.units import NO_UNIT, parse_unit
+from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.overlays.literal_format import (
+    format_exact,
+    format_exact_in_unit,
+    format_value_in_unit,
+)
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import ScalarNode, YamlNode
+from language.typecheck.types import MAX_INT
 
 SECOND_UNIT = parse_unit("s")
 TICK_TOLERANCE = Fraction(1, 10**6)

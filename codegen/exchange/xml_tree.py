@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from language.problem import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_DEPTH = 64
 """Deepest nesting: a CDFX file of a structure in a structure has some twenty."""

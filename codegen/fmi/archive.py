@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from codegen.fmi.binary import binary_path, build_binary
 from codegen.fmi.content import emit_fmu_files, read_headers
 from codegen.fmi.variable import Version
-from language.program import Program
+from language.ir.program import Program
 
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time that a zip file can tell: no file in it has another."""

@@ -13,8 +13,8 @@ from codegen.fmi.unit import unit_definitions
 from codegen.fmi.variable import FMI_TYPES, VERSIONS, Version
 from codegen.rendering import product_version as product, render
 from codegen.source import emit_c_files
-from language.printing import digest
-from language.program import Program
+from language.ir.printer import digest
+from language.ir.program import Program
 
 HEADERS: Mapping[Version, tuple[str, ...]] = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),

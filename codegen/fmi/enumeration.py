@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from codegen.names import enumerations
-from language.program import MODE_VARIABLE, ModeInfo, Program, mode_variable
+from language.ir.program import MODE_VARIABLE, ModeInfo, Program, mode_variable
 
 RUN_MODE = "memory.run_mode"
 PREFIX = "type."

@@ -17,10 +17,10 @@ from codegen.fmi.variable import (
 )
 from codegen.names import CNames, c_member, c_type
 from codegen.source import restrict_to_step
-from language.number import shortest_decimal
-from language.operation import Assign, Value
-from language.program import TICK_UNIT, Constant, Program, Variable, unqualified_name
-from language.text import escape_invisible
+from language.ir.number_type import shortest_decimal
+from language.ir.ops import Assign, Value
+from language.ir.program import TICK_UNIT, Constant, Program, Variable, unqualified_name
+from language.text.sanitise import escape_invisible
 
 LOCAL_PREFIXES = (
     "state.",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from language.symbols import BASE_SYMBOLS
-from language.units import UnitError, display_unit, parse_unit
+from language.expressions.unit_symbols import BASE_SYMBOLS
+from language.expressions.units import UnitError, display_unit, parse_unit
 
 SECOND = "s"
 BASE_ORDER = ("kg", "m", "s", "A", "K", "rad")

@@ -10,8 +10,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from codegen.expression import format_literal
-from language.number import NumberType
-from language.operation import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
+from language.ir.number_type import NumberType
+from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 
 Look = Callable[[str], str]
 """The text of a variable: of a truth value a predicate, of anything else a term."""

@@ -14,8 +14,8 @@ from codegen.proofs.stack import check_stack
 from codegen.proofs.strict import check_compiler_warnings
 from codegen.proofs.values import check_values
 from codegen.source import emit_c_files
-from language.model import Automaton
-from language.program import Program
+from language.ir.program import Program
+from language.model.automaton import Automaton
 
 CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
 

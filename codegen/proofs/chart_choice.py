@@ -13,21 +13,21 @@ from dataclasses import dataclass
 
 from codegen.proofs.chart_fault import ChartFault, is_of_fault
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.activation import (
+from language.charts.chart_context import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED, request_variable
+from language.ir.ops import Expr
+from language.ir.program import TransitionInfo
+from language.lowering.chart_activity import is_complete
+from language.lowering.edge_detection import (
     EdgeDetector,
     edge_detectors_by_mode,
     edge_value_ref,
     guard_memory_bindings,
 )
-from language.activity import is_complete
-from language.chart import ChartNode
-from language.charting import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED, request_variable
-from language.event import CURRENT_EVENT
-from language.lower import lower_expression
-from language.model import Mode, Transition
-from language.operation import Expr
-from language.program import TransitionInfo
-from language.transition import wait_ticks
+from language.lowering.event_queue import CURRENT_EVENT
+from language.lowering.expressions import lower_expression
+from language.lowering.transition_infos import wait_ticks
+from language.model.automaton import Mode, Transition
+from language.model.statechart import ChartNode
 
 
 @dataclass(frozen=True)

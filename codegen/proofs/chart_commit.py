@@ -14,12 +14,12 @@ from typing import TypeAlias
 from codegen.proofs.chart_entry import modes_after, outcomes
 from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.activation import edge_detectors_by_mode, start_timers
-from language.chart import Chart, ChartNode, ChartTransition
-from language.charting import history_ref
-from language.event import QUEUE, QUEUE_TAIL
-from language.operation import Assign
-from language.program import LOG_COUNT_VARIABLE, fired_variable
+from language.charts.chart_context import history_ref
+from language.ir.ops import Assign
+from language.ir.program import LOG_COUNT_VARIABLE, fired_variable
+from language.lowering.edge_detection import edge_detectors_by_mode, start_timers
+from language.lowering.event_queue import QUEUE, QUEUE_TAIL
+from language.model.statechart import Chart, ChartNode, ChartTransition
 
 Moved: TypeAlias = Callable[[ChartNode], bool]
 """Whether a node is left, or entered, in a case."""

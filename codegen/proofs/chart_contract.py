@@ -33,9 +33,8 @@ from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.summary import Summary
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.usage import locals_of
-from language.chart import ChartNode
-from language.charting import ChartContext, request_variable, to_identifier
-from language.operation import (
+from language.charts.chart_context import ChartContext, request_variable, to_identifier
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -48,8 +47,9 @@ from language.operation import (
     Store,
     Switch,
 )
-from language.program import Program
-from language.traversal import block_writes, reachable_blocks, walk_ops
+from language.ir.program import Program
+from language.ir.traversal import block_writes, reachable_blocks, walk_ops
+from language.model.statechart import ChartNode
 
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
 STEP, JUMP = "micro_step", "jump"

@@ -12,9 +12,9 @@ from typing import TypeAlias
 
 from codegen.proofs.configuration import Configuration
 from codegen.proofs.summary import Fork, Found
-from language.chart import ChartNode, ChartTransition
-from language.charting import NEVER_LEFT, history_ref
-from language.model import Transition
+from language.charts.chart_context import NEVER_LEFT, history_ref
+from language.model.automaton import Transition
+from language.model.statechart import ChartNode, ChartTransition
 
 Modes: TypeAlias = Mapping[str, Found]
 """The number of the active mode by region; None where a history keeps none."""

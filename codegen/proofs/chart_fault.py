@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.proofs.configuration import Configuration
-from language.chart import ChartNode, ChartTransition
-from language.chart_target import mode_paths
-from language.fault import FAULT_PRIORITY
-from language.limit import FAULT_HAPPENED
-from language.model import CHART, Transition
+from language.ir.regions import CHART
+from language.lowering.fault_mode import FAULT_PRIORITY
+from language.lowering.range_saturation import FAULT_HAPPENED
+from language.model.automaton import Transition
+from language.model.chart_paths import mode_paths
+from language.model.statechart import ChartNode, ChartTransition
 
 
 @dataclass(frozen=True)

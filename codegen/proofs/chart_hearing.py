@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from codegen.proofs.acsl import Look
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.chart import ChartNode
-from language.charting import request_variable, selected_variable
+from language.charts.chart_context import request_variable, selected_variable
+from language.model.statechart import ChartNode
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,13 @@ from codegen.proofs.chart_commit import Commit
 from codegen.proofs.chart_entry import modes_after, outcomes
 from codegen.proofs.chart_fault import ChartFault
 from codegen.proofs.configuration import Configuration, all_of, any_of
-from language.chart import ChartTransition
-from language.charting import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED
-from language.event import CURRENT_EVENT, QUEUE_HEAD, QUEUE_TAIL
-from language.micro_step import HAS_NEXT_STEP, STEP_COUNT
-from language.model import CHART, Transition
-from language.program import LOG_COUNT_VARIABLE
+from language.charts.chart_context import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED
+from language.charts.micro_step import HAS_NEXT_STEP, STEP_COUNT
+from language.ir.program import LOG_COUNT_VARIABLE
+from language.ir.regions import CHART
+from language.lowering.event_queue import CURRENT_EVENT, QUEUE_HEAD, QUEUE_TAIL
+from language.model.automaton import Transition
+from language.model.statechart import ChartTransition
 
 
 @dataclass(frozen=True)

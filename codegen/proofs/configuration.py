@@ -12,16 +12,16 @@ from functools import cached_property
 
 from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames
 from codegen.proofs.acsl import Look, Speech, Unsaid
-from language.chart import ChartNode
-from language.charting import (
+from language.charts.chart_context import (
     NEVER_LEFT,
     ChartContext,
     history_ref,
     request_variable,
     selected_variable,
 )
-from language.model import Transition
-from language.program import Program, mode_variable
+from language.ir.program import Program, mode_variable
+from language.model.automaton import Transition
+from language.model.statechart import ChartNode
 
 
 @dataclass(frozen=True)

@@ -41,12 +41,12 @@ from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.source import emit_c_files, run_c_passes
 from codegen.usage import locals_of
-from language.fault import add_fault_transitions
-from language.model import Automaton
-from language.operation import Count
-from language.program import ModeInfo, Program, TransitionInfo
-from language.situation import chart_context_of
-from language.traversal import block_reads, block_writes, walk_ops
+from language.ir.ops import Count
+from language.ir.program import ModeInfo, Program, TransitionInfo
+from language.ir.traversal import block_reads, block_writes, walk_ops
+from language.lowering.fault_mode import add_fault_transitions
+from language.model.automaton import Automaton
+from language.programs.name_bindings import chart_context_of
 
 PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
 """Outcomes of a mode with many ranges are proven way by way only."""

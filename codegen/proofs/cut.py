@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from language.operation import Block, Loop, RunBlock
-from language.program import Program
-from language.traversal import block_reads, reachable_blocks, walk_ops
+from language.ir.ops import Block, Loop, RunBlock
+from language.ir.program import Program
+from language.ir.traversal import block_reads, reachable_blocks, walk_ops
 
 PASSING = ("input", "is_new", "work", "calibration", "derived")
 """Groups of what each step brings or finds anew."""

@@ -14,8 +14,8 @@ from codegen.names import SOLVED_PREFIX_ON_PAGE, CNames
 from codegen.proofs.outline import Function, function_of
 from codegen.proofs.pointers import is_inside, required
 from codegen.usage import locals_of
-from language.program import Program
-from language.traversal import block_writes, reachable_blocks
+from language.ir.program import Program
+from language.ir.traversal import block_writes, reachable_blocks
 
 LOOP = re.compile(r"^( *)for \(int32_t (\w+) = 0; \w+ < (\d+); \w+\+\+\) \{$", re.M)
 LOCAL = re.compile(r"^    (?!const |return )\w+ (\w+)(?: = [^;]+)?;$", re.M)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 from codegen.proofs.cut import Cutpoint, blocks_of
 from codegen.proofs.terms import Limits, Range
-from language.charting import NEVER_LEFT
-from language.number import round_to_type
-from language.operation import Assign, Binary, Compare, Count, Expr, Ref, Unary, Value
-from language.program import MODE_VARIABLE, Program, mode_variable
-from language.run import RUN_MODE as RUN_MODE
-from language.substitution import direct_expressions, walk_post_order
-from language.traversal import block_writes, walk_ops
-from language.wiring import INACTIVE
+from language.charts.chart_context import NEVER_LEFT
+from language.ir.number_type import round_to_type
+from language.ir.ops import Assign, Binary, Compare, Count, Expr, Ref, Unary, Value
+from language.ir.program import MODE_VARIABLE, Program, mode_variable
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
+from language.ir.traversal import block_writes, walk_ops
+from language.lowering.program_builder import INACTIVE
+from language.programs.model_run import RUN_MODE
 
 LEFT = "memory.left_"
 """What a history holds: which mode was left, `NOT_YET` before that."""

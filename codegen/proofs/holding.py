@@ -10,7 +10,7 @@ from codegen.proofs.cut import CutpointState
 from codegen.proofs.fact import AtMost, Fact, Literal, Same, Within
 from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Limits
-from language.operators import RELATIONS
+from language.numerics.evaluate import RELATIONS
 
 Number = Fraction | float | int | None
 """A number, or a truth value as 0 or 1; None for a NaN."""

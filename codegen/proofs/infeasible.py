@@ -22,20 +22,10 @@ from codegen.proofs.symbolic import SymbolicProgram
 from codegen.proofs.terms import Range
 from codegen.statement import negate_condition, split_loop_guard
 from codegen.usage import locals_of
-from language.operation import (
-    Assign,
-    Binary,
-    Branch,
-    Count,
-    Expr,
-    Loop,
-    Op,
-    Select,
-    Unary,
-)
-from language.program import Program
-from language.substitution import direct_expressions, walk_post_order
-from language.traversal import walk_ops
+from language.ir.ops import Assign, Binary, Branch, Count, Expr, Loop, Op, Select, Unary
+from language.ir.program import Program
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
+from language.ir.traversal import walk_ops
 
 
 @dataclass(frozen=True)

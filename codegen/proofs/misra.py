@@ -10,7 +10,7 @@ from pathlib import Path
 
 from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.tool import run_tool
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 DEVIATIONS = {
     "8.9": "fixed numbers stand together at the head of the file, also where one function alone "

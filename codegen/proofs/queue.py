@@ -17,8 +17,8 @@ from codegen.proofs.fact import (
     truths_of,
 )
 from codegen.proofs.standing import all_of, counts_of, said
-from language.operation import Assign, Item, Op, Store, Value
-from language.program import Program
+from language.ir.ops import Assign, Item, Op, Store, Value
+from language.ir.program import Program
 
 Numbers = Mapping[str, frozenset[int]]
 """The numbers that are put into an array, by its name."""

@@ -13,8 +13,8 @@ from codegen.names import c_type
 from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.sanitizers import build_sanitised, run_sanitised
 from codegen.tool import TOOL_TIMEOUT
-from language.number import MAX_FINITE
-from language.program import Program, Variable
+from language.ir.number_type import MAX_FINITE
+from language.ir.program import Program, Variable
 
 STEPS, SEED = 20_000, 1
 SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, MAX_FINITE["float32"])

@@ -25,21 +25,11 @@ from codegen.proofs.fact import (
     modes_at,
     modes_of,
 )
-from language.number import round_to_type
-from language.operation import (
-    Assign,
-    Compare,
-    Count,
-    Expr,
-    Op,
-    Ref,
-    Switch,
-    Unary,
-    Value,
-)
-from language.program import Program
-from language.substitution import direct_expressions, walk_post_order
-from language.traversal import walk_ops
+from language.ir.number_type import round_to_type
+from language.ir.ops import Assign, Compare, Count, Expr, Op, Ref, Switch, Unary, Value
+from language.ir.program import Program
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
+from language.ir.traversal import walk_ops
 
 Atom = tuple[str, str, float | int | str]
 """A variable, a relation, and a number or another variable."""

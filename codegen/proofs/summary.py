@@ -11,19 +11,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from codegen.proofs.acsl import Look, Speech, Unsaid
-from language.operation import (
-    Assign,
-    Block,
-    Branch,
-    Count,
-    Expr,
-    Op,
-    Ref,
-    RunBlock,
-    Store,
-    Switch,
-)
-from language.traversal import block_writes, reachable_blocks
+from language.ir.ops import Assign, Block, Branch, Count, Expr, Op, Ref, RunBlock, Store, Switch
+from language.ir.traversal import block_writes, reachable_blocks
 
 LONGEST = 20000
 """Characters of a value; a longer one is left open."""

@@ -21,7 +21,7 @@ from codegen.proofs.cut import (
 )
 from codegen.proofs.terms import Terms
 from codegen.statement import split_loop_guard
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -42,8 +42,8 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Program
-from language.traversal import block_writes
+from language.ir.program import Program
+from language.ir.traversal import block_writes
 
 KINDS = ("real", "whole")
 """Of an item of an array, which is a whole number or not."""

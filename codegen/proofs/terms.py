@@ -15,7 +15,7 @@ from itertools import pairwise
 from math import copysign, isfinite
 from typing import Any
 
-from language.number import MAX_FINITE, NumberType, round_to_type
+from language.ir.number_type import MAX_FINITE, NumberType, round_to_type
 
 BEFORE_ONE = {"float64": 1.0 - 2.0**-53, "float32": 1.0 - 2.0**-24}
 """The number before 1."""

@@ -16,11 +16,11 @@ from codegen.proofs.proof import ToolVerdict, tool_version
 from codegen.rendering import render
 from codegen.source import emit_c_files, restrict_to_step
 from codegen.tool import run_tool
-from language.number import MAX_FINITE
-from language.operation import Count, Expr, Item, Loop, Op, Ref, RunBlock, Store
-from language.program import Constant, Program, Variable
-from language.substitution import direct_expressions, walk_post_order
-from language.traversal import walk_ops
+from language.ir.number_type import MAX_FINITE
+from language.ir.ops import Count, Expr, Item, Loop, Op, Ref, RunBlock, Store
+from language.ir.program import Constant, Program, Variable
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
+from language.ir.traversal import walk_ops
 
 KERNEL = (
     *("-machdep", "gcc_x86_32", "-cpp-extra-args=-I. -Dvolatile="),

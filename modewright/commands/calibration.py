@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from language.problem import SpecError, sort_problems
-from language.text import escape_invisible
+from language.text.diagnostic import SpecError, sort_problems
+from language.text.sanitise import escape_invisible
 from modewright.commands.options import Calibrations, Json, Sets, calibration_title, values_of
 from modewright.console import console, progress_spinner, report_written_files
 from modewright.exits import EXIT_CODES

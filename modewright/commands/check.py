@@ -16,7 +16,7 @@ from modewright.exits import MAX_SHOWN, PROBLEMS
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
-    from language.problem import Problem
+    from language.text.diagnostic import Problem
     from modewright.checking import CheckResult
 
 
@@ -79,7 +79,7 @@ def _report_problems(
     problems: Sequence[Problem], specs: int, as_json: bool, as_annotations: bool = False
 ) -> None:
     """Print the problems of some specs: as JSON, as annotations, or for a person."""
-    from language.problem import render_all
+    from language.text.diagnostic import render_all
     from modewright.annotations import annotation_lines
     from modewright.checking import problem_json
 

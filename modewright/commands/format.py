@@ -24,7 +24,7 @@ def format(
     modewright format spec
     modewright format --check spec/plant.yaml
     """
-    from language.document import read_text
+    from language.text.document import read_text
     from modewright.editing.format import format_text
 
     paths = [path for file in files for path in _find_specs(file)]

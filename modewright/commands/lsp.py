@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 
 
 def lsp() -> None:

@@ -80,8 +80,8 @@ def usage_errors() -> Iterator[None]:
 
 def calibration_title(out: Path | None, name: str | None, date: str) -> str:
     """Return the name of the calibration, which can be written as it is asked for."""
-    from language.calibration import DATE
-    from language.names import NAME_PATTERN
+    from language.expressions.name_rules import NAME_PATTERN
+    from language.overlays.calibration import DATE
 
     if out:
         if out.suffix != ".yaml":

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.parse import parse_expression
-from language.problem import Problems, SpecError
-from language.syntax import Negation, NumberLiteral, SyntaxTree, is_same_expression
-from language.units import Dimension, are_compatible
+from language.expressions.parser import parse_expression
+from language.expressions.syntax_tree import Negation, NumberLiteral, SyntaxTree, is_same_expression
+from language.expressions.units import Dimension, are_compatible
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
 from modewright.editing.order import describe_reordering
 from modewright.editing.thing import (
     SUBSECTIONS,

@@ -8,9 +8,9 @@ comment keeps its column as long as two blanks fit before it.
 
 from __future__ import annotations
 
-from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
-from language.problem import Source
-from language.yaml_tree import parse_yaml
+from language.text.diagnostic import Source
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
+from language.text.yaml_parser import parse_yaml
 from modewright.editing.layout import align_values, indent_blocks, space_tokens, strip_blanks
 from modewright.editing.page import tokenise
 

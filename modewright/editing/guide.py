@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.finding import DOCUMENT_KINDS
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.project_files import DOCUMENT_KINDS
 from modewright.editing.shape import (
     Key,
     ListOf,

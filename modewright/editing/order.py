@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from language.document import MappingNode
+from language.text.document import MappingNode
 
 NUMBERED_SECTIONS = {"modes": "numbers of modes move", "faults": "bits of faults move"}
 """Sections whose names are numbered as they come, each after all before it."""

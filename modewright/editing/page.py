@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import yaml
 
-from language.document import lines_of
+from language.text.document import lines_of
 
 OPENING = (yaml.FlowMappingStartToken, yaml.FlowSequenceStartToken)
 CLOSING = (yaml.FlowMappingEndToken, yaml.FlowSequenceEndToken)

@@ -12,13 +12,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from language.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.finding import Project
-from language.overlay import apply_overlay
-from language.problem import Problems, Source, Span, SpecError
-from language.project import expand_document
-from language.reader import NO_SPAN
-from language.tree import put_node
+from language.overlays.expand_document import expand_document
+from language.reading.reader import NO_SPAN
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.node_edit import put_node
+from language.text.overlay import apply_overlay
+from language.text.project_files import Project
 
 
 @contextmanager

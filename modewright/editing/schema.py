@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from language.finding import DOCUMENT_KINDS, NON_HEAD_KEYS
+from language.text.project_files import DOCUMENT_KINDS, NON_HEAD_KEYS
 from modewright.editing.shape import (
     Choice,
     Either,

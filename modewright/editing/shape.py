@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from language.document import MappingNode, ScalarNode, SequenceNode, lines_of
-from language.problem import Source
-from language.tree import entries
-from language.yaml_tree import parse_yaml
+from language.text.diagnostic import Source
+from language.text.document import MappingNode, ScalarNode, SequenceNode, lines_of
+from language.text.node_edit import entries
+from language.text.yaml_parser import parse_yaml
 
 VALUE_TYPES = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
 """What a single value may be."""

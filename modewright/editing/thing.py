@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.document import MappingNode, ScalarNode
-from language.tree import find_node
+from language.text.document import MappingNode, ScalarNode
+from language.text.node_edit import find_node
 
 KeyPath = tuple[str, ...]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from language.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.overlay import apply_overlay, without_keys
-from language.problem import Problems
+from language.text.diagnostic import Problems
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.overlay import apply_overlay, without_keys
 
 
 def expand_templates(root: MappingNode) -> MappingNode:

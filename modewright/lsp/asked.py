@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from language.document import MappingNode, ScalarNode, SequenceNode
-from language.symbols import SYMBOLS, TIME
+from language.expressions.unit_symbols import SYMBOLS, TIME
+from language.text.document import MappingNode, ScalarNode, SequenceNode
 from modewright.editing.guide import Place
 from modewright.lsp.mention import region_of
 from modewright.lsp.namespace import Symbol, SymbolTable

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.finding import DOCUMENT_KINDS, parse_document, source_of
-from language.function import FUNCTION_NAMES
-from language.problem import SpecError
-from language.symbols import SYMBOLS
+from language.expressions.unit_symbols import SYMBOLS
+from language.text.diagnostic import SpecError
+from language.text.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.project_files import DOCUMENT_KINDS, parse_document, source_of
+from language.typecheck.function_calls import FUNCTION_NAMES
 from modewright.editing.guide import Place, kind_of_file, places, root_shape
 from modewright.editing.shape import (
     Choice,

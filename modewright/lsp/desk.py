@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.document import lines_of
+from language.text.document import lines_of
 from modewright.lsp.positions import path_of
 from modewright.lsp.problems import check_quickly
 from modewright.lsp.proving import run_background_check

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.constants import evaluate_exactly
-from language.document import Document, Entry, MappingNode, ScalarNode
-from language.load import load_automaton
-from language.problem import Span, SpecError
-from language.project import display_path
-from language.tree import entries
+from language.loading.load import load_automaton
+from language.lowering.constants import evaluate_exactly
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Span, SpecError
+from language.text.document import Document, Entry, MappingNode, ScalarNode
+from language.text.node_edit import entries
 from modewright.editing.guide import places
 from modewright.editing.shape import Key, ShapeRef, shapes
 from modewright.lsp.mention import Reference, find_references, references_to

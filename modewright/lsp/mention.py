@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from language.model import CHART
-from language.problem import Span
+from language.ir.regions import CHART
+from language.text.diagnostic import Span
 from modewright.lsp.mode_name import NamePart, Resolution, resolve_mode_parts, split_name
 from modewright.lsp.name import QUERIED_KINDS, NameOccurrence
 from modewright.lsp.namespace import Symbol, SymbolTable, column_name, load_symbol_table, mode_path

@@ -1,6 +1,6 @@
 """Mode name: what each part of the name of a mode or region stands for, where it is written.
 
-As in `language/chart_target.py`: a path from the root is exact, else a name is looked for outwards,
+As in `language/model/chart_paths.py`: a path from the root is exact, else a name is looked for outwards,
 a transition's beside its mode first and inside it last.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from language.model import CHART
+from language.ir.regions import CHART
 from modewright.lsp.namespace import Symbol, SymbolTable, mode_path
 
 NamePart = tuple[int, str]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
-from language.parse import parse_balance, parse_expression
-from language.problem import Span, SpecError
-from language.syntax import FunctionCall, Name as Read, Relation, walk
+from language.expressions.parser import parse_balance, parse_expression
+from language.expressions.syntax_tree import FunctionCall, Name as Read, Relation, walk
+from language.text.diagnostic import Span, SpecError
+from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
 from modewright.editing.guide import Place, places
 from modewright.editing.shape import MappingOf, ShapeRef, Value
 

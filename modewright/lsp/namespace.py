@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.document import Document, Entry, MappingNode, ScalarNode
-from language.model import CHART
-from language.problem import Span
-from language.tree import entries
+from language.ir.regions import CHART
+from language.text.diagnostic import Span
+from language.text.document import Document, Entry, MappingNode, ScalarNode
+from language.text.node_edit import entries
 from modewright.editing.guide import places
 from modewright.editing.shape import MappingOf
 from modewright.lsp.world import Workspace, root_text

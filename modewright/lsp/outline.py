@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.document import Entry, MappingNode, SequenceNode, YamlNode
-from language.problem import Span
+from language.text.diagnostic import Span
+from language.text.document import Entry, MappingNode, SequenceNode, YamlNode
 from modewright.editing.guide import places
 from modewright.editing.shape import MappingOf
 from modewright.lsp.positions import range_of

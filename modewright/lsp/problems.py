@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.problem import Problem
+from language.text.diagnostic import Problem
 from modewright.checking import CheckResult, check_without_proofs
 from modewright.lsp.positions import range_of, uri_of
 from modewright.lsp.world import Workspace

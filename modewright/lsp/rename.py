@@ -6,10 +6,10 @@ from pathlib import Path
 
 from lsprotocol import types
 
-from language.model import CHART
-from language.names import check_name
-from language.problem import Problems
-from language.project import display_path
+from language.expressions.name_rules import check_name
+from language.ir.regions import CHART
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems
 from modewright.lsp.hover import reference_at
 from modewright.lsp.mention import Reference, find_references, references_to
 from modewright.lsp.namespace import load_symbol_table

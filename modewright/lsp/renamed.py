@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from language.problem import Problem, Span
+from language.text.diagnostic import Problem, Span
 from modewright.checking import check_without_proofs
 from modewright.lsp.mention import references_to
 from modewright.lsp.namespace import Symbol

@@ -9,7 +9,7 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 from modewright.editing.format import format_text
 from modewright.lsp.completion import complete
 from modewright.lsp.desk import OpenDocuments

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.document import Document, ScalarNode
-from language.finding import Project
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
+from language.text.document import Document, ScalarNode
+from language.text.project_files import Project
 from modewright.lsp.name import NameOccurrence, find_names
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from codegen.asam.description import ModuleDescription
 from codegen.source import emit_c_files
 from codegen.tool import ARM_COMPILER
-from language.program import Program
+from language.ir.program import Program
 
 HOST = ("gcc", "-no-pie")
 CORTEX = (ARM_COMPILER, "-mcpu=cortex-m4", "-mthumb", "-nostartfiles", "--specs=nosys.specs")

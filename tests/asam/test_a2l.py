@@ -14,7 +14,7 @@ from codegen.asam.description import describe_module
 from codegen.asam.image import ImageError
 from codegen.exchange.page import page_constants, page_name
 from codegen.tool import ARM_COMPILER
-from language.program import Program
+from language.ir.program import Program
 from modewright.api import program as shipped
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

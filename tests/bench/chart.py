@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from codegen.build import FLAGS, find_compiler
 from codegen.source import emit_c_files
 from engine.interpreter import Interpreter
-from language.number import NumberType
-from language.program import Program
+from language.ir.number_type import NumberType
+from language.ir.program import Program
 from modewright.api import program as program_of_spec
 
 HERE = Path(__file__).resolve().parent

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from tests.bench import in_c, ours, with_scipy
-from tests.bench.manoeuvre import CHATTER as CHATTER, TIP_OUT as TIP_OUT, Manoeuvre
+from tests.bench.manoeuvre import TIP_OUT, Manoeuvre
 from tests.bench.showing import errors_of, format_ratio
 from tests.bench.timing import time_interleaved
 from tests.bench.variants import FINE, Sweep

@@ -23,7 +23,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullLocator
 
-from language.signal import Stimulus, StimulusPiece
+from language.model.system import Stimulus, StimulusPiece
 from tests.verify.processor import peak_megabytes
 from tests.verify.store import ROOT, write_json
 

@@ -18,8 +18,8 @@ from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.stimulus import resolve_recording
 from engine.trajectory import Trajectory
-from language.experiment import Scenario, System
-from language.program import Program
+from language.ir.program import Program
+from language.model.system import Scenario, System
 from tests.bench.manoeuvre import NOMINAL, Manoeuvre
 from tests.bench.truth import Solution
 

@@ -10,8 +10,8 @@ import pytest
 
 from codegen.border import MAX_PER_CHANGE, NEIGHBOUR_COUNT, generate_boundary_sequences
 from codegen.mcdc import EXPORTER, measure_mcdc
-from language.number import ROUNDING_FUNCTIONS, NumberType
-from language.program import Program
+from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType
+from language.ir.program import Program
 from tests.language.making import program
 
 BELT = """language: 1

@@ -16,7 +16,7 @@ from codegen.build import (
     run_executable,
 )
 from codegen.harness import build_executable, compared_variables, tick_inputs
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
 

@@ -10,8 +10,8 @@ import pytest
 from cantools.database import Database
 
 from codegen.can_database import emit_dbc
-from language.printing import digest
-from language.program import unqualified_name
+from language.ir.printer import digest
+from language.ir.program import unqualified_name
 from modewright.api import program
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

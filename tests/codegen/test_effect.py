@@ -12,7 +12,7 @@ from codegen.proofs.contract import write_contracts
 from codegen.proofs.effect import add_effect_contracts, add_loop_assigns, called_by, places_of
 from codegen.proofs.outline import function_of, outline_except
 from codegen.source import emit_c_files, run_c_passes
-from language.program import Program
+from language.ir.program import Program
 from modewright.api import program
 
 JUMPS = ("jump_drive", "jump_gap", "jump_coast")

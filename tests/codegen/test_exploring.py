@@ -11,7 +11,7 @@ from codegen import exploring
 from codegen.exploring import generate_corpus, page_scalars
 from codegen.fuzzing import FUZZER_COMPILER
 from codegen.mcdc import EXPORTER, measure_mcdc
-from language.program import Program
+from language.ir.program import Program
 from modewright.api import program as program_named
 from tests.language.making import program
 

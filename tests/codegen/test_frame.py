@@ -10,7 +10,7 @@ from codegen.frame import select_noinline_blocks
 from codegen.proofs.stack import LIMIT
 from codegen.source import emit_c_files, run_c_passes
 from codegen.tool import ARM_COMPILER
-from language.number import NumberType
+from language.ir.number_type import NumberType
 from modewright.api import program
 from modewright.code import metrics
 

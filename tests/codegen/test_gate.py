@@ -12,9 +12,9 @@ from codegen.gate import LATCH, LATCH_EACH, WITHIN, fold_range_check, merge_rang
 from codegen.mathematics import emit_math_files
 from codegen.names import C_REAL_TYPE
 from codegen.source import emit_c_files
-from language.evaluate import evaluate
-from language.number import NumberType
-from language.operation import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
+from language.ir.number_type import NumberType
+from language.ir.ops import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
+from language.numerics.evaluate import evaluate
 from modewright.api import program as shipped
 from tests.language.making import program
 

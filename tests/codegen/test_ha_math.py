@@ -7,8 +7,8 @@ import random
 
 import pytest
 
-from language.evaluate import ELEMENTARY, Scalar, apply_function
-from language.functions import FUNCTIONS
+from language.numerics.evaluate import ELEMENTARY, Scalar, apply_function
+from language.numerics.function_table import FUNCTIONS
 from lockstep.compare import TickLog, compare
 from modewright.api import program
 from tests.lockstep.programs import Tick, record_ticks
@@ -96,7 +96,7 @@ def test_every_function_has_the_same_bits_in_c(tape: TickLog) -> None:
 
 @pytest.mark.parametrize("function", SIGNALS)
 def test_the_interpreter_has_the_bits_of_check_time(tape: TickLog, function: str) -> None:
-    """Parameters are derived by language/evaluate.py, equations by the interpreter."""
+    """Parameters are derived by language/numerics/evaluate.py, equations by the interpreter."""
     position = tape.names.index(f"equation.{SIGNALS[function]}")
     for u, record in zip(arguments()[:2000], tape.values, strict=False):
         expected: Scalar = apply_function(function, [u])

@@ -11,7 +11,7 @@ import pytest
 from codegen.mcdc import EXPORTER, add_infeasibility_proofs, measure_mcdc
 from codegen.proofs.infeasible import decision_sites, prove_infeasible, unshare_expressions
 from codegen.source import run_c_passes
-from language.program import Program
+from language.ir.program import Program
 from modewright import code
 from modewright.api import program as program_named
 from tests.language.making import program

@@ -11,10 +11,10 @@ import pytest
 from codegen.leap import FastPathMode, add_fast_path
 from codegen.source import emit_c_files, restrict_to_step
 from engine.interpreter import Interpreter
-from language.number import NUMBER_TYPES, NumberType
-from language.operation import Branch
-from language.program import Program
-from language.traversal import block_reads, names_used, walk_ops
+from language.ir.number_type import NUMBER_TYPES, NumberType
+from language.ir.ops import Branch
+from language.ir.program import Program
+from language.ir.traversal import block_reads, names_used, walk_ops
 from lockstep.compare import TickLog, compare
 from modewright.api import program as shipped
 from tests.language.making import program

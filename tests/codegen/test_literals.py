@@ -17,8 +17,8 @@ from hypothesis import example, given, strategies as st
 import modewright as mw
 from codegen.build import compile_program, run_executable
 from codegen.expression import format_literal
-from language.number import NUMBER_TYPES, NumberType, round_to_type
-from language.units import parse_unit
+from language.expressions.units import parse_unit
+from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
 from modewright.api import program
 
 COUNT = 2000

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from codegen.border import NEIGHBOUR_COUNT
 from codegen.mcdc import EXPORTER, McdcCoverage, measure_mcdc
 from codegen.source import emit_c_files
-from language.program import Program
+from language.ir.program import Program
 from modewright import code
 from modewright.cli import app
 from tests.language.making import program

@@ -9,7 +9,7 @@ from codegen.lean import slice_to_outputs
 from codegen.predictor import Predictor, build_predictor, columns_of
 from codegen.source import restrict_to_step
 from engine.interpreter import Interpreter
-from language.program import Program
+from language.ir.program import Program
 from tests.language.making import program
 
 TEXT = """language: 1

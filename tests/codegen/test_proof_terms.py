@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from codegen.proofs.terms import Real, Terms
-from language.evaluate import BINARY_OPERATIONS, ELEMENTARY_BY_TYPE
-from language.number import MAX_FINITE, NumberType, round_to_type
+from language.ir.number_type import MAX_FINITE, NumberType, round_to_type
+from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY_BY_TYPE
 
 NUMBERS: tuple[NumberType, ...] = ("float64", "float32")
 SOME = (0.0, -0.0, 1.0, -1.5, 3.0, 1e30)

@@ -15,12 +15,12 @@ from codegen.mathematics import emit_math_files
 from codegen.names import CNames
 from codegen.rendering import product_version
 from codegen.source import emit_c_files
-from language.load import program_of
-from language.operation import Assign
-from language.printing import digest
-from language.program import Program
-from language.reserved import reserved_words
-from language.traversal import walk_ops
+from language.expressions.name_rules import reserved_words
+from language.ir.ops import Assign
+from language.ir.printer import digest
+from language.ir.program import Program
+from language.ir.traversal import walk_ops
+from language.loading.load import program_of
 from modewright.api import load, program
 
 GOLDEN = Path(__file__).parent / "golden"

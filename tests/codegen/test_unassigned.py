@@ -9,7 +9,7 @@ import pytest
 
 from codegen.source import emit_c_files
 from codegen.unassigned import find_unassigned_reads
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -24,7 +24,7 @@ from language.operation import (
     integer,
     real,
 )
-from language.program import Program, Variable
+from language.ir.program import Program, Variable
 from modewright.api import program as shipped
 
 A, B = Ref("work.a"), Ref("work.b")

@@ -12,10 +12,10 @@ from codegen.build import FLAGS, WARNINGS, find_compiler
 from codegen.names import CNames
 from codegen.source import emit_c_files
 from engine.interpreter import Interpreter
-from language.load import automaton_of, program_of
-from language.model import Automaton
-from language.program import Program
-from language.project import Project, read_document
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project, read_document
 from tests.conformance.translation import Case, translate_case
 
 Active = frozenset[str]

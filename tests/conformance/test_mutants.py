@@ -11,10 +11,14 @@ from typing import Any
 
 import pytest
 
-from language import entering, leaving, selecting
-from language.chart import Chart, ChartNode
-from language.charting import ChartContext
-from language.operation import Assign, Block, Op, Value
+from language.charts import (
+    entry_blocks as entering,
+    exit_blocks as leaving,
+    transition_selection as selecting,
+)
+from language.charts.chart_context import ChartContext
+from language.ir.ops import Assign, Block, Op, Value
+from language.model.statechart import Chart, ChartNode
 from tests.conformance.random_chart import random_case
 from tests.conformance.running import load_case, run_interpreted
 from tests.conformance.test_statecharts import RAW, SHOWING
@@ -63,7 +67,7 @@ def _outer_first(patch: pytest.MonkeyPatch) -> None:
         chart = dataclasses.replace(charting.chart, order="outer_first")
         return old(dataclasses.replace(charting, chart=chart))
 
-    patch.setattr("language.micro_step.selection_blocks", blocks)
+    patch.setattr("language.charts.micro_step.selection_blocks", blocks)
 
 
 def _all_wishes(patch: pytest.MonkeyPatch) -> None:
@@ -95,7 +99,7 @@ def _still_active(patch: pytest.MonkeyPatch) -> None:
         ops = old(charting, transition, way)
         return tuple(op for op in ops if not _sets(op, numbers))
 
-    patch.setattr("language.micro_step.lower_entry_set", enter)
+    patch.setattr("language.charts.micro_step.lower_entry_set", enter)
 
 
 def _sets(op: Op, numbers: set[int | None]) -> bool:

@@ -26,10 +26,10 @@ from diagnosis.search import CandidateFit
 from diagnosis.selection import Selection
 from diagnosis.uncertain import FreeParameter, free_parameters_of
 from diagnosis.verdict import Verdict
-from language.document import Document
-from language.effect import added_names
-from language.map import read_map
-from language.project import Project, expand_document, read_document
+from language.loading.recording_map_reader import read_map
+from language.overlays.effect_reader import added_names
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.document import Document
 
 BASE = "blind_driveline"
 MOVED = 0.2

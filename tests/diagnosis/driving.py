@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from diagnosis.free_run import simulate_free_run
 from engine.recording import Channel, Recording
-from language.document import Document
-from language.experiment import RecordingMap
-from language.finding import parse_document
-from language.load import automaton_of, command_line_value
-from language.map import read_map
-from language.model import Automaton
-from language.problem import Source
-from language.project import Project
+from language.loading.load import automaton_of, command_line_value
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project
+from language.text.diagnostic import Source
+from language.text.document import Document
+from language.text.project_files import parse_document
 
 Values = NDArray[np.float64]
 Spoil = Callable[[Values, dict[str, Values]], None]

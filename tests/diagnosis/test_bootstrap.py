@@ -31,8 +31,8 @@ from diagnosis.prediction import measured_noise_levels
 from diagnosis.replicate import simulate_replicate
 from diagnosis.series import SampledRecording
 from diagnosis.threshold import DEFAULT_THRESHOLD, Thresholds, format_thresholds, read_thresholds
-from language.load import automaton_of
-from language.project import expand_document
+from language.loading.load import automaton_of
+from language.overlays.expand_document import expand_document
 from modewright.diagnoses import diagnose
 from tests.language.making import ROOT, SHIPPED, document
 

@@ -14,8 +14,8 @@ from diagnosis.evidence import likelihood_gain
 from diagnosis.layers import find_placements, shipped_effects
 from diagnosis.level import disturbance_units, fit_base, fit_with_noise, recalibrate
 from diagnosis.series import SampledRecording, decimate
-from language.load import automaton_of
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of
+from language.overlays.expand_document import Project, expand_document, read_document
 from tests.language.making import ROOT
 
 PERIOD = Fraction(1, 200)

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.library import describe_effect, library_effects
 from diagnosis.signature import simulate_signature
-from language.project import expand_document, read_document
+from language.overlays.expand_document import expand_document, read_document
 from modewright.cli import app
 from modewright.exits import run_with_exit_code
 from tests.diagnosis.spinning import MAP, SPEC

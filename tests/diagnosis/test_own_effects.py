@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from language.problem import SpecError
-from language.project import Project, expand_document, read_document
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import SpecError
 from modewright.own_effects import explain_unplaceable, load_effects
 
 EFFECT = """language: 1

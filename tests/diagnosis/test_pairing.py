@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from language.finding import parse_document
-from language.map import read_map
-from language.pairing import check_pairing
-from language.problem import Problems, Source
-from language.project import Project
+from language.loading.map_pairing import check_pairing
+from language.loading.recording_map_reader import read_map
+from language.overlays.expand_document import Project
+from language.text.diagnostic import Problems, Source
+from language.text.project_files import parse_document
 from tests.diagnosis.driving import MAP, driveline
 
 WHEEL = "  wheel:  {compare: w_w, unit: rad/s, blank: skip}\n"

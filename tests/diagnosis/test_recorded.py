@@ -11,11 +11,11 @@ import pytest
 import modewright as mw
 from diagnosis.free_run import FreeRun, simulate_free_run
 from engine.recording import read_recording, split_by_windows
-from language.experiment import RecordingMap
-from language.load import automaton_of, command_line_value
-from language.map import read_map
-from language.model import Automaton
-from language.project import Project, read_document
+from language.loading.load import automaton_of, command_line_value
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project, read_document
 
 PROJECT = Project(Path())
 RPM = math.pi / 30

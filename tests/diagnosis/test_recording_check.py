@@ -14,7 +14,7 @@ from diagnosis.finding import Finding, format_findings
 from diagnosis.free_run import OutputComparison
 from diagnosis.needs import EFFECT_NEEDS, NEED_DESCRIPTIONS
 from diagnosis.recording_check import check_recordings
-from language.project import Project
+from language.overlays.expand_document import Project
 from tests.diagnosis.checking import check, finding_keys
 from tests.diagnosis.driving import (
     Spoil,

@@ -16,7 +16,7 @@ from diagnosis.rival import (
     near_best,
 )
 from diagnosis.search import CandidateFit
-from language.project import Project
+from language.overlays.expand_document import Project
 from tests.diagnosis.accepting import acceptable_layers, make_dossier
 
 LEFT_OUT = 50.0

@@ -57,7 +57,9 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
         "diagnosis.selection.rescreen_after_refit", lambda _, m, u, tried, *__: (None, tried)
     )
     monkeypatch.setattr("diagnosis.selection.choose_form", lambda _, m, u, best, tried: best)
-    monkeypatch.setattr("diagnosis.selection.exchange_effects", lambda _, m, before, *__: (before, m))
+    monkeypatch.setattr(
+        "diagnosis.selection.exchange_effects", lambda _, m, before, *__: (before, m)
+    )
     monkeypatch.setattr("diagnosis.selection.meets_stopping_rule", lambda *_: False)
     monkeypatch.setattr("diagnosis.selection.eliminate_backward", lambda _, kept, *__: kept)
     monkeypatch.setattr("diagnosis.selection.rejects_bounds", many)

@@ -12,11 +12,11 @@ from diagnosis.candidate import compile_candidate
 from diagnosis.case import Case, read_series
 from diagnosis.series import has_feedthrough
 from engine.recorded_part import overlap
-from language.load import automaton_of
-from language.map import read_map
-from language.model import Automaton
-from language.problem import SpecError
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import SpecError
 
 PROJECT = Project(Path())
 

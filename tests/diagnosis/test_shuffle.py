@@ -23,10 +23,10 @@ from diagnosis.shuffle import (
     analyse_oscillation,
 )
 from diagnosis.shuffle_picture import draw_oscillation
-from language.finding import parse_document
-from language.load import automaton_of
-from language.problem import Source
-from language.project import Project, expand_document
+from language.loading.load import automaton_of
+from language.overlays.expand_document import Project, expand_document
+from language.text.diagnostic import Source
+from language.text.project_files import parse_document
 from tests.language.making import ROOT
 from tests.open_generator.case import simulate_cases, stream
 from tests.open_generator.recording import sample_recording

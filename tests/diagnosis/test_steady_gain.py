@@ -11,7 +11,7 @@ from scipy.linalg import solve_discrete_are
 
 from codegen.predictor import Predictor
 from diagnosis.candidate import compile_candidate
-from language.project import Project, expand_document, read_document
+from language.overlays.expand_document import Project, expand_document, read_document
 
 RNG = np.random.default_rng(5)
 SEEN = 2

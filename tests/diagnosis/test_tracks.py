@@ -19,8 +19,8 @@ from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.candidate import Candidate
 from diagnosis.layers import find_placements, shipped_effects
 from diagnosis.series import SampledRecording
-from language.load import automaton_of, program_of
-from language.project import Project, expand_document, read_document
+from language.loading.load import automaton_of, program_of
+from language.overlays.expand_document import Project, expand_document, read_document
 from tests.diagnosis.conftest import SOON
 from tests.diagnosis.test_estimation import OUTPUTS, PERIOD
 from tests.language.making import ROOT

@@ -11,7 +11,7 @@ import pytest
 
 import modewright as mw
 from engine.recording import Channel, Recording
-from language.experiment import ColumnMapping
+from language.model.system import ColumnMapping
 from modewright.workable import MAX_SAMPLES, MAX_VALUE, MIN_SAMPLES, LazyRecordings, unusable_reason
 from tests.diagnosis.driving import read_recording_map
 

@@ -12,7 +12,7 @@ import modewright as mw
 from diagnosis.layers import PlacedEffect
 from diagnosis.naming import quantities_of
 from diagnosis.variant import format_variant, variant_name
-from language.project import Project
+from language.overlays.expand_document import Project
 from tests.diagnosis.accepting import BASE, make_dossier
 
 NAME = variant_name(BASE)

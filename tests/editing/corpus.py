@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from language.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.problem import SpecError
-from language.project import read_document
+from language.overlays.expand_document import read_document
+from language.text.diagnostic import SpecError
+from language.text.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = ("spec", "tests/rules", "tests/data", "tests/refused", "tests/language")

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from language.finding import parse_document, source_of
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
+from language.text.project_files import parse_document, source_of
 from modewright.cli import app
 from modewright.editing.difference import SpecChange, diff_documents
 from modewright.editing.show_difference import diff_html

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from language.finding import source_of
-from language.problem import SpecError
-from language.project import parse_document
+from language.overlays.expand_document import parse_document
+from language.text.diagnostic import SpecError
+from language.text.project_files import source_of
 from modewright.cli import app
 from modewright.editing.format import format_text
 from modewright.editing.page import tokenise

@@ -11,17 +11,17 @@ import jsonschema
 import pytest
 
 from expectation.reader import read_test
-from language.automaton import read_automaton
-from language.calibration import read_calibration
-from language.document import Document, MappingNode, YamlNode
-from language.effect import read_effect
-from language.finding import DOCUMENT_KINDS
-from language.map import read_map
-from language.problem import Problems, Span, SpecError
-from language.project import Project, expand_document, read_document
-from language.reader import Reader
-from language.scenario import read_scenario
-from language.system import read_system
+from language.loading.automaton_reader import read_automaton
+from language.loading.recording_map_reader import read_map
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system
+from language.overlays.calibration import read_calibration
+from language.overlays.effect_reader import read_effect
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, SpecError
+from language.text.document import Document, MappingNode, YamlNode
+from language.text.project_files import DOCUMENT_KINDS
 from modewright.editing.guide import places
 from modewright.editing.schema import json_schema, schema_text
 from modewright.editing.shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from engine.recording import Channel, Recording, read_recording
-from language.experiment import RecordingMap
-from language.map import read_map
-from language.problem import Problem, SpecError, render_all
-from language.project import Project, read_document
+from language.loading.recording_map_reader import read_map
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import Problem, SpecError, render_all
 
 Read = Callable[..., Recording]
 RenderProblems = Callable[..., str]

@@ -12,13 +12,13 @@ from engine.interpreter import Stepper
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay, used_columns
 from engine.trajectory import Event
-from language.experiment import RecordingMap
-from language.load import automaton_of, program_of
-from language.map import read_map
-from language.model import Automaton
-from language.problem import Problems
-from language.program import Program
-from language.project import Project, apply_variant, read_document
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project, apply_variant, read_document
+from language.text.diagnostic import Problems
 
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "tests/data/paper"

@@ -14,8 +14,7 @@ from engine.adjustment import bind_parameters
 from engine.batch import Batch, BatchResult, InputTable, SignalStatistic
 from engine.simulate import simulate
 from engine.variants import run_interpreted_batch
-from language.experiment import Scenario
-from language.signal import StimulusPiece
+from language.model.system import Scenario, StimulusPiece
 from modewright.api import load
 
 RULES = Path(__file__).parent.parent / "rules"

@@ -13,7 +13,7 @@ import modewright as mw
 from engine.library_stepper import ScipyMethod
 from engine.reference import simulate_with_scipy
 from engine.simulate import simulate
-from language.experiment import Instance, Scenario, System
+from language.model.system import Instance, Scenario, System
 from modewright.api import load
 from tests.language.making import ROOT
 

@@ -1,4 +1,4 @@
-"""Interpreter: each operation of a Program means what language/operation.py says, bit for bit."""
+"""Interpreter: each operation of a Program means what language/ir/ops.py says, bit for bit."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.functions import FUNCTIONS
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Block,
@@ -38,7 +37,8 @@ from language.operation import (
     real,
     subtract,
 )
-from language.program import Constant, Program, Variable
+from language.ir.program import Constant, Program, Variable
+from language.numerics.function_table import FUNCTIONS
 
 ARITHMETIC = """
 1 / 0 = inf; 1 / -0.0 = -inf; -1 / 0 = -inf; -1 / -0.0 = inf; inf / -0.0 = -inf; 0 / 0 = nan;

@@ -22,9 +22,8 @@ from engine.planned_batch import CompiledBatchCache, run_compiled_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.variants import run_interpreted_batch
-from language.assembly import SimulationAssembly
-from language.experiment import Scenario, ScheduledCalibration, System
-from language.signal import StimulusPiece
+from language.model.system import Scenario, ScheduledCalibration, StimulusPiece, System
+from language.programs.simulation_assembly import SimulationAssembly
 from modewright.api import load
 from modewright.compiled import run_batch, run_simulation
 from tests.language.making import ROOT

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from engine.recording import Recording, read_recording
-from language.map import read_map
-from language.missing import MissingToolError
-from language.problem import SpecError
-from language.project import Project, read_document
+from language.loading.recording_map_reader import read_map
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import MissingToolError, SpecError
 from tests.engine.reading import render_problems
 
 DBC = """\

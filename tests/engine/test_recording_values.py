@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.recording import read_recording
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 from tests.engine.reading import GOOD, HEAD, RenderProblems, render_problems, write_map
 
 

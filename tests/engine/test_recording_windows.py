@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from engine.recording import Recording, read_recording, split_by_windows
-from language.map import read_map
-from language.problem import SpecError
-from language.project import Project, read_document
+from language.loading.recording_map_reader import read_map
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import SpecError
 from tests.engine.reading import render_problems
 
 HEAD = "language: 1\nmap: bench\ntime: {column: t_s, unit: s}\ncolumns: {a: {to: u, unit: A}}\n"

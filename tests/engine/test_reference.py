@@ -19,13 +19,13 @@ from engine.reference import reference_numbers, simulate_reference, with_referen
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.trajectory import Event, Trajectory
-from language.experiment import Scenario, System
-from language.load import program_of
-from language.model import Automaton
-from language.program import Program
-from language.project import Project, read_document
-from language.scenario import read_scenario
-from language.system import read_system
+from language.ir.program import Program
+from language.loading.load import program_of
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system
+from language.model.automaton import Automaton
+from language.model.system import Scenario, System
+from language.overlays.expand_document import Project, read_document
 from tests.engine.runaway import RUNAWAY
 
 Alone = Callable[[str, str], tuple[System, Scenario]]

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from language.problem import SpecError
-from language.project import Project
+from language.overlays.expand_document import Project
+from language.text.diagnostic import SpecError
 from tests.engine.reading import render_problems
 from tests.engine.replaying import (
     LoadedReplay,

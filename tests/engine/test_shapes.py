@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from engine import shapes
-from language.evaluate import evaluate
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Compare,
@@ -27,6 +26,7 @@ from language.operation import (
     multiply,
     real,
 )
+from language.numerics.evaluate import evaluate
 from tests.engine.test_interpreter import RESULT, A, B, C, interpreter, run_block
 
 NUMBERS = {"input.a": 0.1, "input.b": -0.3, "input.c": 7e-17}

@@ -12,10 +12,10 @@ import modewright as mw
 from engine.interpreter import Stepper
 from engine.sensing import FirstOrderLag, noise_stream
 from engine.simulate import simulate
-from language.program import Program
-from language.project import Project, read_document
-from language.scenario import read_scenario
-from language.system import read_system
+from language.ir.program import Program
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system
+from language.overlays.expand_document import Project, read_document
 from tests.language.making import project_of
 
 SENSED = """language: 1

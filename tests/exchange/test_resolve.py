@@ -13,8 +13,8 @@ from codegen.build import compile_program, flags_at_level
 from codegen.exchange.formats import read_page
 from codegen.expression import format_literal
 from codegen.source import emit_c_files
-from language.number import round_to_type
-from language.problem import Problems
+from language.ir.number_type import round_to_type
+from language.text.diagnostic import Problems
 from modewright.api import program
 from modewright.calibrations import export_calibration, import_calibration, resolve_calibration
 from tests.exchange.tuned import replace_line, run_command, write_project

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from codegen.exchange.formats import FORMATS
-from language.number import NumberType, round_to_type, shortest_decimal
-from language.program import unqualified_name
+from language.ir.number_type import NumberType, round_to_type, shortest_decimal
+from language.ir.program import unqualified_name
 from modewright.calibrations import CalibrationPage, export_calibration, import_calibration
 from tests.exchange.tuned import NUMBERS, constant_bits, write_project
 

@@ -6,8 +6,8 @@ import struct
 from functools import partial
 from pathlib import Path
 
-from language.number import NumberType
-from language.program import Constant
+from language.ir.number_type import NumberType
+from language.ir.program import Constant
 from modewright.calibrations import CalibrationPage
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

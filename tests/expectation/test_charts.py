@@ -13,8 +13,8 @@ from engine.simulate import simulate
 from expectation.coverage import instrument_programs, measure_coverage
 from expectation.expected import Test
 from expectation.judging import evaluate_test
-from language.operation import Store
-from language.traversal import walk_ops
+from language.ir.ops import Store
+from language.ir.traversal import walk_ops
 from modewright import tests
 from modewright.covered import coverage_diagram
 from modewright.diagram import ModeBox

@@ -14,10 +14,10 @@ from engine.simulate import simulate
 from engine.starting import automata_of
 from engine.stimulus import resolve_recording
 from expectation.coverage import Coverage, instrument_programs, measure_coverage, merge_coverages
-from language.load import load_automaton
-from language.operation import Store
-from language.project import Project
-from language.traversal import walk_ops
+from language.ir.ops import Store
+from language.ir.traversal import walk_ops
+from language.loading.load import load_automaton
+from language.overlays.expand_document import Project
 from modewright import tests
 from modewright.cli import app
 from modewright.covered import coverage_diagram

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from expectation.decision import Decision, decision_of
-from language.load import load_automaton
-from language.project import Project
+from language.loading.load import load_automaton
+from language.overlays.expand_document import Project
 from tests.expectation.latching import AUTOMATON
 
 A, B, C, D = 1, 2, 4, 8

@@ -15,7 +15,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from codegen.fmi.variable import Version
 from codegen.harness import tick_inputs, tunable_constants
-from language.program import Program, unqualified_name
+from language.ir.program import Program, unqualified_name
 from lockstep.compare import TickLog
 
 Values = Mapping[str, float]

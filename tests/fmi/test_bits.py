@@ -16,7 +16,7 @@ from codegen.fmi.archive import build_fmu
 from codegen.fmi.variable import Version
 from engine.interpreter import Interpreter
 from engine.page import calibrate
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import TickLog
 from modewright.api import program
 from tests.codegen.waiting import waiting_automaton

@@ -9,19 +9,9 @@ from collections.abc import Callable
 
 import mpmath
 
-from language.functions import FUNCTIONS
-from language.operation import (
-    Assign,
-    Binary,
-    Call,
-    Compare,
-    Expr,
-    Ref,
-    Select,
-    Unary,
-    Value,
-)
-from language.program import Function, unqualified_name
+from language.ir.ops import Assign, Binary, Call, Compare, Expr, Ref, Select, Unary, Value
+from language.ir.program import Function, unqualified_name
+from language.numerics.function_table import FUNCTIONS
 
 Real = Callable[..., float]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from engine.interpreter import Interpreter
-from language.program import Program
+from language.ir.program import Program
 from tests.language.making import program, project_of
 
 MODEL = """language: 1

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from engine.interpreter import Interpreter
-from language.document import Document, ScalarNode
-from language.load import automaton_of, program_of
-from language.model import Automaton
-from language.parse import parse_expression
-from language.problem import Problem, Problems, Source, Span, SpecError
-from language.program import Program
-from language.project import Project, parse_document, read_document
-from language.syntax import SyntaxTree
-from language.units import Dimension, parse_unit
+from language.expressions.parser import parse_expression
+from language.expressions.syntax_tree import SyntaxTree
+from language.expressions.units import Dimension, parse_unit
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project, parse_document, read_document
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
+from language.text.document import Document, ScalarNode
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = Project(ROOT)

@@ -7,23 +7,16 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from language.affine import jacobian
-from language.constants import constant_values, parameter_constants
-from language.continuous import lower_continuous_automaton
-from language.field import VectorField, field_blocks
-from language.lower import lower_expression
-from language.matrix import Matrix
-from language.model import Automaton
-from language.operation import (
-    Assign,
-    Block,
-    Expr,
-    Ref,
-    Select,
-    Value,
-)
-from language.parameter import constant_bindings
-from language.problem import Problems
+from language.integration.vector_field import VectorField, field_blocks
+from language.ir.ops import Assign, Block, Expr, Ref, Select, Value
+from language.lowering.constants import constant_values, parameter_constants
+from language.lowering.expressions import lower_expression
+from language.lowering.parameter_bindings import constant_bindings
+from language.model.automaton import Automaton
+from language.numerics.affine_form import jacobian
+from language.numerics.matrix import Matrix
+from language.programs.continuous_program import lower_continuous_automaton
+from language.text.diagnostic import Problems
 from tests.language.making import automaton, load_shipped, tree
 
 STATES = ("x", "v", "z")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from language.aliases import KEY_ALIASES, key_alias_hint
+from language.expressions.migration_hints import KEY_ALIASES, key_alias_hint
 
 SCHEMA = Path(__file__).parent.parent.parent / "spec" / "modewright.schema.json"
 

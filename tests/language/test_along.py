@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from language.along import LieDerivative
-from language.evaluate import evaluate
-from language.moment import GuardSnapshot
-from language.operation import Expr
+from language.ir.ops import Expr
+from language.numerics.evaluate import evaluate
+from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.lie_derivative import LieDerivative
 from tests.language.making import automaton, tree
 
 SPEC = """language: 1

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from language.dimension import TypeChecker
-from language.evaluate import evaluate
-from language.lower import lower_expression
-from language.problem import Problems
-from language.scope import NameEnvironment
-from language.syntax import NumberLiteral
-from language.units import Dimension
+from language.expressions.syntax_tree import NumberLiteral
+from language.expressions.units import Dimension
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
+from language.text.diagnostic import Problems
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
 from tests.language.making import automaton, dimension, problem_labels, problem_lines, tree
 
 UNITS = {

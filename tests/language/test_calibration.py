@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from language.load import load_automaton
-from language.project import Project, read_document
-from language.system import read_system
+from language.loading.load import load_automaton
+from language.loading.system_reader import read_system
+from language.overlays.expand_document import Project, read_document
 from modewright import explaining
 from tests.language.making import problem_lines, project_of
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from language.load import load_automaton
+from language.loading.load import load_automaton
 from tests.language.making import automaton, problem_lines, project_of
 
 CONTINUOUS = """language: 1

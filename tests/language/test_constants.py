@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.constants import (
+from language.ir.number_type import round_to_type
+from language.ir.ops import Assign
+from language.ir.program import Program, TransitionInfo
+from language.lowering.constants import (
     constant_values,
     evaluate_constant,
     evaluate_exactly,
     parameter_constants,
 )
-from language.declaration import Formula
-from language.model import Automaton
-from language.number import round_to_type
-from language.operation import Assign
-from language.parameter import parameter_kinds, parameter_order
-from language.problem import Problems
-from language.program import Program, TransitionInfo
-from language.wait import MAX_WAIT_TICKS
+from language.lowering.parameter_bindings import parameter_kinds, parameter_order
+from language.lowering.wait_ticks import MAX_WAIT_TICKS
+from language.model.automaton import Automaton
+from language.model.declaration import Formula
+from language.text.diagnostic import Problems
 from tests.language.making import (
     automaton,
     load_shipped,

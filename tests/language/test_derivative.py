@@ -5,12 +5,12 @@ from __future__ import annotations
 import mpmath
 import pytest
 
-from language.derivative import differentiate
-from language.evaluate import evaluate
-from language.lower import lower_expression
-from language.operation import Ref
-from language.simplify import is_one, is_zero, substitute_names
-from language.syntax import Name, SyntaxTree, names
+from language.expressions.differentiate import differentiate
+from language.expressions.simplify import is_one, is_zero, substitute_names
+from language.expressions.syntax_tree import Name, SyntaxTree, names
+from language.ir.ops import Ref
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
 from tests.language.making import raised_problems, tree
 
 NAMES = {name: Ref(name) for name in ("x", "z")}

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.load import lower_automaton, program_of
-from language.program import Program
+from language.ir.program import Program
+from language.loading.load import lower_automaton, program_of
 from tests.language.making import load_shipped, problem_lines, program, project_of, solve_constants
 
 MODEL = """language: 1

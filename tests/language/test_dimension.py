@@ -7,14 +7,7 @@ import math
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from language.dimension import TypeChecker
-from language.evaluate import evaluate
-from language.kind import ExprType
-from language.lower import lower_expression
-from language.operation import Expr, Value
-from language.problem import Problems
-from language.scope import NameEnvironment
-from language.syntax import (
+from language.expressions.syntax_tree import (
     Arithmetic,
     Conditional,
     FunctionCall,
@@ -24,7 +17,14 @@ from language.syntax import (
     Relation,
     SyntaxTree,
 )
-from language.units import Dimension
+from language.expressions.units import Dimension
+from language.ir.ops import Expr, Value
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
+from language.text.diagnostic import Problems
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import ExprType
 from tests.language.making import NOWHERE, automaton, dimension, problem_lines, tree
 
 UNITS = {"x": "m", "v": "m/s", "m": "kg", "F": "N", "t": "s", "c": "1", "i": "A", "Tk": "K"}

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import MAX_BYTES, MappingNode, ScalarNode, SequenceNode, read_text
-from language.problem import Source
-from language.yaml_tree import MAX_DEPTH, parse_yaml
+from language.text.diagnostic import Source
+from language.text.document import MAX_BYTES, MappingNode, ScalarNode, SequenceNode, read_text
+from language.text.yaml_parser import MAX_DEPTH, parse_yaml
 from tests.language.making import automaton, problem_lines, raised_problems
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from language.eigen import dominant_entry, eigenvalues
-from language.matrix import Matrix
+from language.numerics.eigenvalues import dominant_entry, eigenvalues
+from language.numerics.matrix import Matrix
 
 ROUNDING = 1e-13
 """Of the norm of the matrix: hundreds of roundings of 1e-16."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from language.printing import block_lines, format_program
+from language.ir.printer import block_lines, format_program
 from tests.language.making import automaton, problem_lines, program, stepper
 
 CART = """language: 1

@@ -11,7 +11,7 @@ import mpmath
 import pytest
 from hypothesis import example, given, settings, strategies as st
 
-from language.functions import FUNCTIONS
+from language.numerics.function_table import FUNCTIONS
 from tests.language.computing import PYTHON, bits, neighbours_of, stated_error, ulp_error
 
 POINTS = 50_000

@@ -9,20 +9,15 @@ from fractions import Fraction
 import mpmath
 import pytest
 
-from language import elementary, exponent, logarithm, tangent
-from language.functions import FUNCTIONS
-from language.operation import (
-    Assign,
-    Binary,
-    Call,
-    Compare,
-    Expr,
-    Ref,
-    Select,
-    Unary,
-    Value,
+from language.ir.ops import Assign, Binary, Call, Compare, Expr, Ref, Select, Unary, Value
+from language.ir.program import unqualified_name
+from language.numerics import (
+    exp as exponent,
+    log as logarithm,
+    sin_cos_tanh as elementary,
+    tan_atan2 as tangent,
 )
-from language.program import unqualified_name
+from language.numerics.function_table import FUNCTIONS
 from tests.language.computing import polynomial
 from tests.language.test_elementary import WORST_ANGLE
 

@@ -10,11 +10,11 @@ import struct
 import mpmath
 import pytest
 
-from language.evaluate import apply_function
-from language.functions import FUNCTIONS, FUNCTIONS_BY_TYPE
-from language.number import round_to_float32
-from language.operation import Assign, Value
-from language.traversal import walk_ops
+from language.ir.number_type import round_to_float32
+from language.ir.ops import Assign, Value
+from language.ir.traversal import walk_ops
+from language.numerics.evaluate import apply_function
+from language.numerics.function_table import FUNCTIONS, FUNCTIONS_BY_TYPE
 from tests.language.computing import EXACT
 
 POINTS = 3000

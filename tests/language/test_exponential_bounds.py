@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.exponential import MAX_STEP_NORM
-from language.program import Program
-from language.taylor import taylor_term_count
+from language.integration.exponential import MAX_STEP_NORM
+from language.integration.taylor_bound import taylor_term_count
+from language.ir.program import Program
 from tests.language.flowing import Flow
 from tests.language.making import problem_lines, program, project_of, raised_problems
 

@@ -7,10 +7,10 @@ import re
 import pytest
 from hypothesis import given, strategies as st
 
-from language.evaluate import evaluate
-from language.guards import are_syntactically_exclusive
-from language.lower import lower_expression
-from language.operation import Expr, Value
+from language.checks.check_guard_overlap import are_syntactically_exclusive
+from language.ir.ops import Expr, Value
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
 from tests.language.making import automaton, problem_lines, raised_problems, tree
 
 TEXT = """language: 1

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from engine.interpreter import Interpreter
-from language.hoist import fold_parameters, hoist_inputs, run_passes
-from language.load import lower_automaton
-from language.operation import Assign
-from language.printing import format_expr
-from language.program import Program
-from language.traversal import walk_ops
+from language.ir.ops import Assign
+from language.ir.printer import format_expr
+from language.ir.program import Program
+from language.ir.traversal import walk_ops
+from language.loading.load import lower_automaton
+from language.passes.constant_folding import fold_parameters, hoist_inputs, run_passes
 from tests.language.making import automaton
 
 TEXT = """language: 1

@@ -9,7 +9,7 @@ from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from engine.interpreter import Interpreter
-from language.instant import change_moments
+from language.observers.input_change import change_moments
 from lockstep.compare import compare
 from tests.language.test_recursive import STATES, A, Matrix, covariance, make_program, step, ticks
 from tests.lockstep.programs import record_ticks

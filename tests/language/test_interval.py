@@ -7,12 +7,12 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from language.evaluate import evaluate
-from language.interval import UNBOUNDED, Interval
-from language.lower import lower_expression
-from language.operation import Ref
-from language.ranging import RangeAnalysis
-from language.syntax import SyntaxTree, TreeNumbering
+from language.expressions.syntax_tree import SyntaxTree, TreeNumbering
+from language.ir.ops import Ref
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
+from language.typecheck.interval import UNBOUNDED, Interval
+from language.typecheck.range_analysis import RangeAnalysis
 from tests.language.making import tree
 
 RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from engine.interpreter import Interpreter
-from language.load import automaton_of, lower_automaton
-from language.program import Program
-from language.project import read_document
+from language.ir.program import Program
+from language.loading.load import automaton_of, lower_automaton
+from language.overlays.expand_document import read_document
 from tests.language.making import ROOT, program, project_of, solve_constants, stepper
 
 Matrix = NDArray[np.float64]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from language.document import MAX_BYTES
+from language.text.document import MAX_BYTES
 
 READ_TWICE = 60
 """Steps of a chain in which each equation reads the one before twice: 2^60 parts if put in."""

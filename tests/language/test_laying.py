@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from language.document import ScalarNode
-from language.load import load_automaton, program_of
-from language.project import Project, expand_document, read_document
-from language.tree import find_node
+from language.loading.load import load_automaton, program_of
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.document import ScalarNode
+from language.text.node_edit import find_node
 from tests.language.making import problem_lines, project_of
 
 CART = """language: 1

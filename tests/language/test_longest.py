@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from language.longest import max_operations
-from language.operation import Assign, Branch, Compare, Loop, Ref, RunBlock, Switch, add, real
+from language.ir.operation_count import max_operations
+from language.ir.ops import Assign, Branch, Compare, Loop, Ref, RunBlock, Switch, add, real
 
 X = Ref("state.x")
 ONE = Assign("state.x", add(X, real(1.0)))  # an addition and a store: 2

@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import pytest
 
-from language.experiment import ColumnMapping, RecordingMap
-from language.map import column_dimension, read_map
-from language.project import read_document
+from language.loading.recording_map_reader import column_dimension, read_map
+from language.model.system import ColumnMapping, RecordingMap
+from language.overlays.expand_document import read_document
 from tests.language.making import SHIPPED, dimension, document, problem_lines, raised_problems
 
 TEXT = """language: 1

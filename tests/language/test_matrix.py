@@ -9,7 +9,7 @@ from filterpy.common import van_loan_discretization
 from hypothesis import example, given, strategies as st
 from numpy.typing import NDArray
 
-from language.matrix import (
+from language.numerics.matrix import (
     Matrix,
     expm,
     expm_integral,
@@ -18,7 +18,7 @@ from language.matrix import (
     solve,
     transpose,
 )
-from language.riccati import discretise_noise, steady_kalman_gain
+from language.numerics.riccati import discretise_noise, steady_kalman_gain
 
 CLOSE = 1e-9
 """Asked of every number that is printed into C; measured differences are below 1e-11."""

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.load import automaton_of, program_of
-from language.program import Program, StabilityLimit
-from language.project import read_document
-from language.stability import largest_stable_step
+from language.integration.stability_limit import largest_stable_step
+from language.ir.program import Program, StabilityLimit
+from language.loading.load import automaton_of, program_of
+from language.overlays.expand_document import read_document
 from tests.language.flowing import Flow
 from tests.language.making import problem_lines, project_of, raised_problems
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from language.names import check_file_name, check_name, report_case_collisions
-from language.problem import Problems
-from language.reserved import reserved_words
+from language.expressions.name_rules import (
+    check_file_name,
+    check_name,
+    report_case_collisions,
+    reserved_words,
+)
+from language.text.diagnostic import Problems
 from tests.language.making import NOWHERE
 
 

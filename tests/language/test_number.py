@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 from hypothesis import example, given, strategies as st
 
-from language.evaluate import BINARY_OPERATIONS, evaluate
-from language.number import round_to_float32, round_to_type, shortest_decimal
-from language.operation import Binary, Call, Value, real
+from language.ir.number_type import round_to_float32, round_to_type, shortest_decimal
+from language.ir.ops import Binary, Call, Value, real
+from language.numerics.evaluate import BINARY_OPERATIONS, evaluate
 
 SINGLES = st.floats(width=32)
 LARGEST = (2.0 - 2.0**-23) * 2.0**127

@@ -8,14 +8,14 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
-from language.declaration import Formula
-from language.graph import format_cycle
-from language.model import Mode
-from language.operation import Assign
-from language.order import equation_order, report_cycle
-from language.problem import Problems
-from language.program import unqualified_name
-from language.syntax import names
+from language.expressions.syntax_tree import names
+from language.ir.ops import Assign
+from language.ir.program import unqualified_name
+from language.model.automaton import Mode
+from language.model.declaration import Formula
+from language.model.evaluation_order import equation_order, report_cycle
+from language.model.graphs import format_cycle
+from language.text.diagnostic import Problems
 from tests.language.making import (
     NOWHERE,
     problem_labels,

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.load import automaton_of
-from language.model import Automaton
-from language.overlay import apply_overlay, without_keys
-from language.problem import Problem, Problems, Source
-from language.project import read_document
-from language.syntax import structural_key
-from language.yaml_tree import parse_yaml
+from language.expressions.syntax_tree import structural_key
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.overlays.expand_document import read_document
+from language.text.diagnostic import Problem, Problems, Source
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.overlay import apply_overlay, without_keys
+from language.text.yaml_parser import parse_yaml
 from tests.language.making import automaton, problem_lines, project_of, raised_problems, tree
 
 Plain = str | list[str] | dict[str, "Plain"]

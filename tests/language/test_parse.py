@@ -8,11 +8,9 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import ScalarNode
-from language.parse import parse_balance, parse_expression
-from language.problem import Source
-from language.quantity import parse_decimal_literal
-from language.syntax import (
+from language.expressions.number_literal import parse_decimal_literal
+from language.expressions.parser import parse_balance, parse_expression
+from language.expressions.syntax_tree import (
     Arithmetic,
     BoolLiteral,
     Conditional,
@@ -28,8 +26,10 @@ from language.syntax import (
     structural_key,
     walk,
 )
-from language.units import NO_UNIT, parse_unit
-from language.yaml_tree import parse_yaml
+from language.expressions.units import NO_UNIT, parse_unit
+from language.text.diagnostic import Source
+from language.text.document import ScalarNode
+from language.text.yaml_parser import parse_yaml
 from tests.language.making import NOWHERE, raised_problems, scalar, tree
 
 SUM, PRODUCT, SIGN, POWER, ATOM = 5, 6, 7, 8, 9

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from language.parse import MAX_EXPRESSION_LENGTH, parse_balance
-from language.syntax import Name
+from language.expressions.parser import MAX_EXPRESSION_LENGTH, parse_balance
+from language.expressions.syntax_tree import Name
 from tests.language.making import raised_problems, scalar, tree
 
 NO_PRODUCT = "there is no implied multiplication"

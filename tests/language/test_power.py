@@ -9,9 +9,9 @@ from collections.abc import Callable
 import mpmath
 import pytest
 
-from language.evaluate import apply_function
-from language.functions import FUNCTIONS
-from language.number import NumberType, round_to_float32
+from language.ir.number_type import NumberType, round_to_float32
+from language.numerics.evaluate import apply_function
+from language.numerics.function_table import FUNCTIONS
 from tests.language import test_elementary_single as of_single
 from tests.language.computing import PYTHON, stated_error, ulp_error
 

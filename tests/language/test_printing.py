@@ -8,8 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from language.load import automaton_of, program_of
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Branch,
@@ -29,8 +28,9 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.printing import block_lines, digest, format_expr, format_program
-from language.project import read_document
+from language.ir.printer import block_lines, digest, format_expr, format_program
+from language.loading.load import automaton_of, program_of
+from language.overlays.expand_document import read_document
 from tests.language.making import SHIPPED, load_shipped, program
 
 X, Y = Ref("state.x"), Ref("state.y")

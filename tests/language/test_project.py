@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from language.document import Document
-from language.load import automaton_of, load_automaton
-from language.problem import Problems, Source, Span
-from language.project import (
+from language.loading.load import automaton_of, load_automaton
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system
+from language.overlays.expand_document import (
     Project,
     apply_variant,
     display_path,
@@ -17,8 +17,8 @@ from language.project import (
     lineage,
     read_document,
 )
-from language.scenario import read_scenario
-from language.system import read_system
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document
 from modewright.api import check
 from tests.language.making import SHIPPED, document, problem_lines, project_of, raised_problems
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from engine.interpreter import Interpreter
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import compare
 from tests.language.making import program
 from tests.lockstep.programs import record_ticks

@@ -9,8 +9,8 @@ import pytest
 from filterpy.common import van_loan_discretization
 
 from engine.interpreter import Interpreter
-from language.operation import Block, Branch, Compare, Loop, Ref, RunBlock, Value
-from language.traversal import walk_ops
+from language.ir.ops import Block, Branch, Compare, Loop, Ref, RunBlock, Value
+from language.ir.traversal import walk_ops
 from lockstep.compare import compare
 from modewright.api import program as shipped_program
 from tests.language.making import problem_lines, program, project_of

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.operation import Assign, Ref
-from language.program import Program
-from language.resting import ever_varying_states, varying_states, written_states
-from language.run import SATURATION_BLOCK
-from language.traversal import block_writes, reachable_blocks
+from language.ir.ops import Assign, Ref
+from language.ir.program import Program
+from language.ir.traversal import block_writes, reachable_blocks
+from language.model.constant_states import ever_varying_states, varying_states, written_states
+from language.programs.model_run import SATURATION_BLOCK
 from tests.language.making import automaton, load_shipped, program, project_of
 
 CART = """\

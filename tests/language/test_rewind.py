@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.run import SATURATION_BLOCK
-from language.traversal import reachable_blocks
+from language.ir.traversal import reachable_blocks
+from language.programs.model_run import SATURATION_BLOCK
 from tests.language.making import program, project_of
 
 LANE = """\

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, strategies as st
 
-from language.parse import parse_balance, parse_expression
-from language.rewrite import (
+from language.expressions.parser import parse_balance, parse_expression
+from language.expressions.syntax_tree import names, structural_key
+from language.expressions.text_rewrite import (
     join_summands,
     names_in_text,
     rename_names,
@@ -14,7 +15,6 @@ from language.rewrite import (
     split_summands,
     substitute_reads,
 )
-from language.syntax import names, structural_key
 from tests.language.making import scalar
 
 leaves = st.sampled_from(["a", "b", "ab", "m", "x_1", "2", "0.5", "3 m", "2.0e-3 N*m", "5 1/s"])

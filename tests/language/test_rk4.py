@@ -12,8 +12,8 @@ import pytest
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.experiment import Instance, Scenario, System
-from language.rk4 import TERMS
+from language.integration.rk4 import TERMS
+from language.model.system import Instance, Scenario, System
 from tests.language.making import NOWHERE, automaton, program, stepper
 
 LOGISTIC = """language: 1

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.experiment import Scenario, System
-from language.literal import evaluate_literal
-from language.project import read_document
-from language.scenario import MAX_HORIZON, read_scenario
-from language.system import read_system
-from language.units import parse_unit
+from language.expressions.constant_literal import evaluate_literal
+from language.expressions.units import parse_unit
+from language.loading.scenario_reader import MAX_HORIZON, read_scenario
+from language.loading.system_reader import read_system
+from language.model.system import Scenario, System
+from language.overlays.expand_document import read_document
 from tests.language.making import (
     SHIPPED,
     dimension,

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from language.halfspace import is_disproved_by_bounds
-from language.lower import lower_expression
-from language.operation import Expr, Ref
-from language.question import SolverQuery, VariableDomain
-from language.solver import Solver
+from language.ir.ops import Expr, Ref
+from language.lowering.expressions import lower_expression
+from language.smt.linear_bounds import is_disproved_by_bounds
+from language.smt.query import SolverQuery, VariableDomain
+from language.smt.z3_backend import Solver
 from tests.language.making import tree
 
 SOLVER = Solver()

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from language.document import ScalarNode
-from language.experiment import System
-from language.system import read_system
+from language.loading.system_reader import read_system
+from language.model.system import System
+from language.text.document import ScalarNode
 from tests.language.making import document, problem_lines, project_of, raised_problems
 
 PLANT = """language: 1

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from language.experiment import System
-from language.project import read_document
-from language.system import read_system
+from language.loading.system_reader import read_system
+from language.model.system import System
+from language.overlays.expand_document import read_document
 from tests.language.making import SHIPPED, project_of, raised_problems, scalar
 from tests.language.test_system import FILTER, JOINED, PAIR, PLANT, read_rig, system_problem_lines
 

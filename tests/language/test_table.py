@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.interpolation import Interpolation
+from language.numerics.interpolation import Interpolation
 from tests.language.making import automaton, problem_lines, program
 
 SPEC = """language: 1

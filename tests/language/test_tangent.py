@@ -9,8 +9,8 @@ import mpmath
 import pytest
 from hypothesis import given, strategies as st
 
-from language.evaluate import floor
-from language.functions import FUNCTIONS
+from language.numerics.evaluate import floor
+from language.numerics.function_table import FUNCTIONS
 from tests.language.computing import PYTHON, bits, stated_error, ulp_error
 
 POINTS = 40_000

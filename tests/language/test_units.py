@@ -10,8 +10,8 @@ import pint
 import pytest
 from hypothesis import given, strategies as st
 
-from language.symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
-from language.units import (
+from language.expressions.unit_symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
+from language.expressions.units import (
     NO_UNIT,
     Dimension,
     UnitError,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from language.load import load_automaton
-from language.page import parse_pages
-from language.project import read_document
-from language.system import read_system
+from language.loading.calibration_page_reader import parse_pages
+from language.loading.load import load_automaton
+from language.loading.system_reader import read_system
+from language.overlays.expand_document import read_document
 from tests.language.making import problem_lines, project_of
 
 PLANT = """language: 1

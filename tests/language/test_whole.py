@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import pytest
 
-from language.dimension import TypeChecker
-from language.evaluate import evaluate
-from language.kind import IntType
-from language.lower import lower_expression
-from language.operation import Ref
-from language.problem import Problems
-from language.scope import NameEnvironment
-from language.units import PURE_NUMBER
+from language.expressions.units import PURE_NUMBER
+from language.ir.ops import Ref
+from language.lowering.expressions import lower_expression
+from language.numerics.evaluate import evaluate
+from language.text.diagnostic import Problems
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import IntType
 from tests.language.making import tree
 
 RANGES = {"i": IntType(-3, 2), "j": IntType(1, 4), "k": IntType(-1, 5)}

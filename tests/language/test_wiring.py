@@ -7,9 +7,7 @@ import re
 
 import pytest
 
-from language.functions import FUNCTIONS
-from language.load import program_of
-from language.operation import (
+from language.ir.ops import (
     Assign,
     Binary,
     Branch,
@@ -26,9 +24,11 @@ from language.operation import (
     Value,
     real,
 )
-from language.program import Program
-from language.traversal import expr_names, names_used, walk_ops
-from language.wiring import finalise_program
+from language.ir.program import Program
+from language.ir.traversal import expr_names, names_used, walk_ops
+from language.loading.load import program_of
+from language.lowering.program_builder import finalise_program
+from language.numerics.function_table import FUNCTIONS
 from tests.language.making import load_shipped, program, stepper
 
 TEXT = """language: 1

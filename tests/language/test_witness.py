@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import pytest
 from hypothesis import given, strategies as st
 
-from language.evaluate import evaluate
-from language.inquiry import QueryEngine, Witness
-from language.lower import lower_expression
-from language.model import Automaton
-from language.moment import GuardSnapshot
-from language.operation import Expr, Value
+from language.ir.ops import Expr, Value
+from language.lowering.expressions import lower_expression
+from language.model.automaton import Automaton
+from language.numerics.evaluate import evaluate
+from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.query_engine import QueryEngine, Witness
 from tests.language.making import SHIPPED, automaton, problem_lines, raised_problems, tree
 
 STOP = """language: 1

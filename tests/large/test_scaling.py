@@ -10,8 +10,8 @@ from types import FrameType
 import pytest
 
 import modewright as mw
-from language.check_size import MAX_EQUATIONS, MAX_TRANSITIONS
-from language.problem import Problem, Problems, Source, Span, SpecError
+from language.checks.check_automaton import MAX_EQUATIONS, MAX_TRANSITIONS
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from tests.large import shapes
 
 MOST_GROWTH = 6.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from language.number import NumberType
-from language.operation import (
+from language.ir.number_type import NumberType
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -18,7 +18,7 @@ from language.operation import (
     Value,
     integer,
 )
-from language.program import (
+from language.ir.program import (
     Constant,
     ModeInfo,
     OutputWire,
@@ -27,7 +27,7 @@ from language.program import (
     ValueType,
     Variable,
 )
-from language.wiring import finalise_program
+from language.lowering.program_builder import finalise_program
 
 PERIOD = Fraction(1, 100)
 MODES = ("rest", "move", "stop")
@@ -119,7 +119,7 @@ def _init() -> Block:
 
 
 def _step(blocks: dict[str, Block]) -> Block:
-    """Advance, jump and update, as language/sampled.py prints them."""
+    """Advance, jump and update, as language/programs/sampled_program.py prints them."""
 
     def each(verb: str) -> Switch:
         names = [(number, f"{verb}_{mode}") for number, mode in enumerate(MODES)]

@@ -9,8 +9,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from language.elementary import round_to_nearest
-from language.operation import (
+from language.ir.ops import (
     Binary,
     Call,
     Compare,
@@ -24,6 +23,7 @@ from language.operation import (
     real,
     subtract,
 )
+from language.numerics.sin_cos_tanh import round_to_nearest
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 

@@ -12,8 +12,8 @@ from typing import TypeVar
 from hypothesis import strategies as st
 
 from engine.interpreter import Interpreter
-from language.number import NumberType
-from language.operation import (
+from language.ir.number_type import NumberType
+from language.ir.ops import (
     Assign,
     Block,
     Branch,
@@ -33,7 +33,7 @@ from language.operation import (
     real,
     subtract,
 )
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import TickLog
 from tests.lockstep.assembly import (
     CONDITIONS,

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from hypothesis import strategies as st
 
-from language.number import NUMBER_TYPES
+from language.ir.number_type import NUMBER_TYPES
 from tests.lockstep.expressions import Draw
 
 PERIOD_MS = 10

@@ -11,8 +11,8 @@ import pytest
 
 from codegen.machine import HOST
 from codegen.source import emit_c_files
-from language.evaluate import apply_function
-from language.program import Program
+from language.ir.program import Program
+from language.numerics.evaluate import apply_function
 from lockstep.compare import Difference, TickLog, compare
 from tests.lockstep.heater import PERIOD, column, heater_tape, temperature
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import Verdict, compare
 from modewright.api import program
 from tests.lockstep.heater import column

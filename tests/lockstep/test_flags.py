@@ -22,8 +22,8 @@ from codegen.build import (
 )
 from codegen.harness import write_harness
 from codegen.source import emit_c_files
-from language.number import NUMBER_TYPES, NumberType, shortest_decimal
-from language.system import with_number_type
+from language.ir.number_type import NUMBER_TYPES, NumberType, shortest_decimal
+from language.loading.system_reader import with_number_type
 from lockstep import taping
 from lockstep.compare import TickLog, compare
 from modewright.api import load, program

@@ -17,7 +17,7 @@ from codegen.fuzzing import (
 )
 from codegen.harness import tick_inputs
 from codegen.source import emit_c_files
-from language.program import Program, unqualified_name
+from language.ir.program import Program, unqualified_name
 from lockstep.fuzzing import fuzz
 from modewright import code
 from modewright.api import program

@@ -9,11 +9,11 @@ import pytest
 
 from codegen.source import emit_c_files
 from engine.simulate import simulate
-from language.number import NUMBER_TYPES, NumberType, round_to_type
-from language.page import parse_pages
-from language.problem import SpecError
-from language.program import Program
-from language.system import with_number_type
+from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
+from language.ir.program import Program
+from language.loading.calibration_page_reader import parse_pages
+from language.loading.system_reader import with_number_type
+from language.text.diagnostic import SpecError
 from lockstep.compare import TickLog, compare
 from lockstep.taping import record_ticks
 from modewright.api import load, lockstep

@@ -6,13 +6,13 @@ from typing import get_args
 
 from hypothesis import HealthCheck, Phase, given, note, settings, strategies as st
 
-from language.evaluate import BINARY_OPERATIONS, ELEMENTARY
-from language.functions import FUNCTIONS
-from language.number import NUMBER_TYPES
-from language.operation import Assign, Expr, Op
-from language.printing import format_expr
-from language.program import Program
-from language.traversal import names_used, walk_ops
+from language.ir.number_type import NUMBER_TYPES
+from language.ir.ops import Assign, Expr, Op
+from language.ir.printer import format_expr
+from language.ir.program import Program
+from language.ir.traversal import names_used, walk_ops
+from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY
+from language.numerics.function_table import FUNCTIONS
 from lockstep.compare import compare
 from tests.lockstep.programs import Tick, programs, record_ticks, ticks
 

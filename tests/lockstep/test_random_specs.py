@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from hypothesis import HealthCheck, given, note, settings, strategies as st
 
-from language.number import NUMBER_TYPES, NumberType
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.compare import compare
 from tests.lockstep.chance.batch import FLAGS
 from tests.lockstep.chance.healthy import ReferenceRun

@@ -8,7 +8,7 @@ import struct
 import pytest
 
 from engine.interpreter import Interpreter
-from language.number import NumberType, round_to_type
+from language.ir.number_type import NumberType, round_to_type
 from lockstep.compare import TickLog, compare
 from modewright.api import program
 from tests.lockstep.heater import column

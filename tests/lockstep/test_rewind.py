@@ -9,10 +9,10 @@ from random import Random
 import pytest
 
 from engine.interpreter import Interpreter
-from language.load import load_automaton, program_of
-from language.number import NUMBER_TYPES
-from language.program import Program
-from language.project import Project
+from language.ir.number_type import NUMBER_TYPES
+from language.ir.program import Program
+from language.loading.load import load_automaton, program_of
+from language.overlays.expand_document import Project
 from lockstep.compare import TickLog
 from tests.language.making import ROOT
 from tests.lockstep.chance.batch import Batch

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from language.missing import MissingToolError
+from language.text.diagnostic import MissingToolError
 from modewright.commands.lsp import lsp
 from modewright.lsp.mention import references_to
 from modewright.lsp.namespace import load_symbol_table

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from lsprotocol import types
 
-from language.problem import Source, Span
+from language.text.diagnostic import Source, Span
 from modewright.lsp import problems
 from modewright.lsp.completion import complete
 from modewright.lsp.hover import hover as hover_at

@@ -14,8 +14,8 @@ import numpy as np
 from codegen.comment import sanitise_comment
 from engine.plot import Panel, PlotLine, draw_picture
 from engine.trajectory import Trajectory
-from language.problem import Problem, Source, Span, render_problem
-from language.project import parse_document
+from language.overlays.expand_document import parse_document
+from language.text.diagnostic import Problem, Source, Span, render_problem
 from modewright.checking import problem_json
 from modewright.diagram import diagram_of
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from language.problem import Problem, Source, Span
+from language.text.diagnostic import Problem, Source, Span
 from modewright.annotations import annotation_lines
 from modewright.sarif import to_sarif
 

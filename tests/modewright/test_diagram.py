@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 import modewright as mw
-from language.problem import Source, SpecError
-from language.project import parse_document
+from language.overlays.expand_document import parse_document
+from language.text.diagnostic import Source, SpecError
 from modewright.cli import app
 from modewright.diagram import Diagram, diagram_of
 from modewright.exits import run_with_exit_code

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from language.load import load_automaton, program_of
-from language.printing import digest
-from language.project import Project
+from language.ir.printer import digest
+from language.loading.load import load_automaton, program_of
+from language.overlays.expand_document import Project
 from modewright.cli import app
 from modewright.explaining import compare_specs, explain_spec, spec_differences_json, spec_json
 from tests.language.making import ROOT, SHIPPED, project_of

@@ -13,7 +13,7 @@ import pytest
 
 import modewright as mw
 from codegen.comment import MAX_COMMENT_LENGTH
-from language.text import INVISIBLE_CATEGORIES
+from language.text.sanitise import INVISIBLE_CATEGORIES
 from tests.modewright.printers import HOSTILE, PRINTERS
 
 TEXTS = [pytest.param(text, id=name) for name, text in HOSTILE.items()]

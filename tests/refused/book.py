@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 
 import modewright as mw
-from language.problem import Problem, SpecError
+from language.text.diagnostic import Problem, SpecError
 from modewright import studies
 
 HERE = Path(__file__).parent

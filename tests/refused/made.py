@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from language.document import MAX_BYTES
-from language.yaml_tree import MAX_DEPTH
+from language.text.document import MAX_BYTES
+from language.text.yaml_parser import MAX_DEPTH
 
 SPEC = """language: 1
 automaton: made

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from engine.batch import Batch, BatchResult, EventKind
-from language.problem import Problems, Source
-from language.project import Project, parse_document, read_document
+from language.overlays.expand_document import Project, parse_document, read_document
+from language.text.diagnostic import Problems, Source
 from sweep.block import Block
 from sweep.executor import BlockResult, SerialExecutor
 from sweep.preparation import prepare_study

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from language.event_name import ModeEntryEvent
-from language.model import CHART
-from language.problem import Source, Span
+from language.ir.regions import CHART
+from language.loading.event_names import ModeEntryEvent
+from language.text.diagnostic import Source, Span
 from sweep.measure import (
     DelayMeasure,
     EventMeasure,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 from sweep.design import STRIDE, morris_points
 from sweep.draw import draw_values
 from sweep.moments import scale_to_squarable

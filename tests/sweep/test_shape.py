@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from language.problem import Problems, SpecError
+from language.text.diagnostic import Problems, SpecError
 from sweep.shape import log_spaced
 from tests.sweep.laying import make_study
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.variants import run_interpreted_batch
-from language.project import Project, read_document
+from language.overlays.expand_document import Project, read_document
 from sweep.block import Block, compute_rows
 from sweep.case import variant_values_of
 from sweep.point import variants_of

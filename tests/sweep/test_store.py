@@ -13,7 +13,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 from sweep.manifest import MANIFEST_NAME, seal_of
 from sweep.rows_file import fault_of
 from sweep.store import Store, read_store

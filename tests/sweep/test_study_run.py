@@ -20,7 +20,7 @@ import pytest
 
 from engine.batch import Batch, BatchResult
 from engine.variants import run_interpreted_batch
-from language.problem import SpecError
+from language.text.diagnostic import SpecError
 from sweep.block import Block, Row
 from sweep.executor import BlockResult, SerialExecutor
 from sweep.manifest import Manifest, manifest_of

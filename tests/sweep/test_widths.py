@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from language.problem import SpecError
-from language.project import Project, read_document
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import SpecError
 from sweep.measure import SignalMeasure
 from sweep.picture import draw_pictures
 from sweep.study import Axis, Distribution

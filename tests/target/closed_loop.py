@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from language.number import NumberType
-from language.system import with_number_type
+from language.ir.number_type import NumberType
+from language.loading.system_reader import with_number_type
 from lockstep.compare import TickLog
 from lockstep.taping import record_ticks
 from modewright.api import load

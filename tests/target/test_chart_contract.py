@@ -16,11 +16,11 @@ from codegen.proofs.chart_contract import (
 )
 from codegen.source import emit_c_files, run_c_passes
 from codegen.tool import DEBIAN_PACKAGES
-from language.charting import ChartContext
-from language.load import load_automaton, program_of
-from language.operation import Switch
-from language.project import Project
-from language.situation import chart_context_of
+from language.charts.chart_context import ChartContext
+from language.ir.ops import Switch
+from language.loading.load import load_automaton, program_of
+from language.overlays.expand_document import Project
+from language.programs.name_bindings import chart_context_of
 from modewright.api import program
 from tests.language.making import automaton
 

@@ -11,7 +11,7 @@ import pytest
 from codegen.build import FLAGS, BuildError, flags_at_level
 from codegen.machine import CORTEX_M4F, run_in_qemu
 from codegen.tool import ARM_COMPILER, EMULATOR
-from language.number import NUMBER_TYPES, NumberType
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.compare import TickLog, compare
 from modewright.api import lockstep, program
 from tests.lockstep.programs import record_ticks

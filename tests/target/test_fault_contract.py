@@ -17,12 +17,12 @@ from codegen.proofs.chart_contract import (
 )
 from codegen.source import emit_c_files, run_c_passes
 from codegen.tool import DEBIAN_PACKAGES
-from language import fault
-from language.chart import Chart
-from language.fault import add_fault_transitions
-from language.load import program_of
-from language.model import Automaton, Mode
-from language.situation import chart_context_of
+from language.loading.load import program_of
+from language.lowering import fault_mode as fault
+from language.lowering.fault_mode import add_fault_transitions
+from language.model.automaton import Automaton, Mode
+from language.model.statechart import Chart
+from language.programs.name_bindings import chart_context_of
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(
@@ -148,23 +148,27 @@ def elsewhere(automaton: Automaton, chart: Chart) -> Chart:
 WAY_OUT, WAYS = fault._add_fault_transition, fault._add_chart_transitions
 LOWERED: dict[str, tuple[str, object, str]] = {
     "a mode has no way to it": (
-        "language.fault._add_fault_transition",
+        "language.lowering.fault_mode._add_fault_transition",
         forgetful,
         "select_transitions_1",
     ),
     "its ways lead to another": (
-        "language.fault._add_chart_transitions",
+        "language.lowering.fault_mode._add_chart_transitions",
         elsewhere,
         "select_transitions_1",
     ),
-    "outer modes go before it": ("language.selecting.FAULT_FIRST", 99, "select_transitions_1"),
+    "outer modes go before it": (
+        "language.charts.transition_selection.FAULT_FIRST",
+        99,
+        "select_transitions_1",
+    ),
     "what it leaves goes on": (
-        "language.selecting._is_left_by_fault",
+        "language.charts.transition_selection._is_left_by_fault",
         lambda charting, region: False,
         "select_transitions_2",
     ),
     "it stands still while a fault lasts": (
-        "language.selecting._is_left_by_fault",
+        "language.charts.transition_selection._is_left_by_fault",
         lambda charting, region: region.path != "chart",
         "select_transitions_3",
     ),

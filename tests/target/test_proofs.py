@@ -17,9 +17,9 @@ from codegen.proofs.strict import check_compiler_warnings
 from codegen.proofs.wp import KERNEL
 from codegen.source import emit_c_files
 from codegen.tool import DEBIAN_PACKAGES, run_tool
-from language.load import load_automaton
-from language.program import Program
-from language.project import Project
+from language.ir.program import Program
+from language.loading.load import load_automaton
+from language.overlays.expand_document import Project
 from modewright.api import program
 from modewright.code import prove
 

@@ -11,7 +11,7 @@ from codegen.proofs.contract import check_contracts
 from codegen.proofs.outline import function_of, move_scratch_to_parameter
 from codegen.source import emit_c_files
 from codegen.tool import DEBIAN_PACKAGES
-from language.load import program_of
+from language.loading.load import program_of
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(

@@ -19,13 +19,13 @@ from fractions import Fraction
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.starting import programs_of
-from language.load import program_of
-from language.number import NUMBER_TYPES, NumberType
-from language.printing import digest
-from language.program import Program
-from language.signal import Stimulus
-from language.stimulus import constant_pieces
-from language.system import single_instance_system, with_number_type
+from language.ir.number_type import NUMBER_TYPES, NumberType
+from language.ir.printer import digest
+from language.ir.program import Program
+from language.loading.load import program_of
+from language.loading.stimulus_reader import constant_pieces
+from language.loading.system_reader import single_instance_system, with_number_type
+from language.model.system import Stimulus
 from lockstep.compare import TickLog, compare
 from modewright.api import Loaded, load
 from tests.verify.store import ROOT, write_json

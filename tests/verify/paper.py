@@ -10,7 +10,7 @@ import time
 from functools import partial
 from typing import Any
 
-from language.longest import max_operations
+from language.ir.operation_count import max_operations
 from modewright.api import program
 from modewright.code import instructions as counted_of, metrics
 from tests.paper.claims import PUBLISHED

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from codegen.source import emit_c_files
-from language.printing import digest
-from language.program import Program
+from language.ir.printer import digest
+from language.ir.program import Program
 from tests.lockstep.chance.spec import Spec
 from tests.verify.store import ROOT, Figure, write_json
 

@@ -11,7 +11,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from language.number import NUMBER_TYPES
+from language.ir.number_type import NUMBER_TYPES
 from tests.lockstep.chance.batch import Batch
 from tests.lockstep.chance.chart_hits import KINDS, ChartHits, reload_automaton
 from tests.lockstep.chance.charts import chart_of

@@ -10,7 +10,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from language.number import NUMBER_TYPES
+from language.ir.number_type import NUMBER_TYPES
 from tests.lockstep.chance.batch import Batch
 from tests.lockstep.chance.kinds import spec_of
 from tests.lockstep.chance.quality import Quality, measure_quality

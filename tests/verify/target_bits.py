@@ -13,7 +13,7 @@ from functools import partial
 
 from codegen.build import flags_at_level
 from codegen.machine import CORTEX_M4F, HOST, Machine
-from language.number import NUMBER_TYPES, NumberType
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.compare import TickLog, compare
 from tests.target.closed_loop import record_driveline, record_supervisor
 from tests.verify.store import ROOT, Figure, measure_figures

@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 
 from diagnosis.layers import PlacedEffect
-from language.problem import SpecError
-from language.project import Project
+from language.overlays.expand_document import Project
+from language.text.diagnostic import SpecError
 from tests.diagnosis.accepting import acceptable_layers
 from tests.diagnosis.variant_run import run_variant
 from tests.verify.store import ROOT, Figure, measure_figures

@@ -11,7 +11,7 @@ from pathlib import Path
 from codegen.build import compiler_version, find_compiler, flags_at_level
 from codegen.harness import write_harness
 from codegen.objects import is_shared, object_of
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import TickLog, Verdict, compare_output
 
 FLAGS = (*flags_at_level("O1"), "-w")

@@ -8,13 +8,18 @@ from pathlib import Path
 
 from engine.firing import fired_transitions
 from engine.interpreter import Interpreter
-from language.chart import Chart
-from language.charting import NEVER_LEFT, history_ref, request_variable, selected_variable
-from language.limit import MICRO_STEP_LIMIT_FAULT
-from language.load import automaton_of
-from language.model import Automaton, Transition
-from language.program import Program
-from language.project import Project, read_document
+from language.charts.chart_context import (
+    NEVER_LEFT,
+    history_ref,
+    request_variable,
+    selected_variable,
+)
+from language.ir.program import Program
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton, Transition
+from language.model.declaration import MICRO_STEP_LIMIT_FAULT
+from language.model.statechart import Chart
+from language.overlays.expand_document import Project, read_document
 from tests.lockstep.chance.charts import OWN
 from tests.lockstep.chance.spec import Spec
 

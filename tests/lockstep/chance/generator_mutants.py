@@ -10,8 +10,8 @@ import pytest
 
 from codegen import expression as printed
 from codegen.statement import StatementEmitter
-from language.number import NumberType
-from language.operation import Binary, Compare, Expr
+from language.ir.number_type import NumberType
+from language.ir.ops import Binary, Compare, Expr
 from tests.lockstep.chance.mutant import Mutant, Patch, attribute, drop_lines
 
 
@@ -72,10 +72,14 @@ GENERATOR = (
         attribute("codegen.expression._emit_binary", _reciprocal),
     ),
     Mutant(
-        "literals have 15 digits", "generator", attribute("codegen.expression.shortest_decimal", _rough(15))
+        "literals have 15 digits",
+        "generator",
+        attribute("codegen.expression.shortest_decimal", _rough(15)),
     ),
     Mutant(
-        "literals have 16 digits", "generator", attribute("codegen.expression.shortest_decimal", _rough(16))
+        "literals have 16 digits",
+        "generator",
+        attribute("codegen.expression.shortest_decimal", _rough(16)),
     ),
     Mutant(
         "parentheses are missing", "generator", attribute("codegen.expression._emit_operand", _bare)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from engine.closures import BlockCompiler
-from language.number import NUMBER_TYPES
-from language.program import Program
+from language.ir.number_type import NUMBER_TYPES
+from language.ir.program import Program
 from lockstep.compare import TickLog, Verdict, compare_output
 from tests.lockstep.chance.batch import QUICK, Batch
 from tests.lockstep.chance.kinds import spec_of

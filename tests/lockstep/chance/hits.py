@@ -15,7 +15,7 @@ import yaml
 
 from engine.interpreter import Interpreter
 from engine.trajectory import Event
-from language.program import Program, TransitionInfo
+from language.ir.program import Program, TransitionInfo
 from tests.lockstep.chance.probe import ORDER, SWITCH, TWO
 from tests.lockstep.chance.spec import Spec
 

@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import pytest
 
-from language.operation import Block, Branch, Loop, Op, Switch
-from language.program import Program
+from language.ir.ops import Block, Branch, Loop, Op, Switch
+from language.ir.program import Program
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 Change = Callable[[Op], Block]

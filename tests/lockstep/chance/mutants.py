@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from engine.arithmetic import ARITHMETIC_OF_TYPE
-from language.number import NUMBER_TYPES
-from language.operation import Assign, Block, Branch, Op, Ref, RunBlock, Value
-from language.program import Program, Variable
+from language.ir.number_type import NUMBER_TYPES
+from language.ir.ops import Assign, Block, Branch, Op, Ref, RunBlock, Value
+from language.ir.program import Program, Variable
 from tests.lockstep.chance.mutant import Mutant, Patch, attribute, item, rewrite_operations
 
 ACTIONS = "engine.actions"
@@ -172,7 +172,9 @@ INTERPRETER = (
         attribute(f"{ACTIONS}.count_while", _count(1, False)),
     ),
     Mutant(
-        "a counter is not cleared", "interpreter", attribute(f"{ACTIONS}.count_while", _count(0, True))
+        "a counter is not cleared",
+        "interpreter",
+        attribute(f"{ACTIONS}.count_while", _count(0, True)),
     ),
     Mutant(
         "a fault bit wipes out the others",

@@ -11,10 +11,10 @@ import pytest
 from engine.actions import StatementClosure
 from engine.closures import BlockCompiler
 from engine.shapes import ExpressionClosure
-from language.evaluate import BINARY_OPERATIONS, ELEMENTARY
-from language.functions import FUNCTIONS
-from language.operation import Assign, Binary, Call, Compare, Expr, Op, Unary
-from language.program import Program
+from language.ir.ops import Assign, Binary, Call, Compare, Expr, Op, Unary
+from language.ir.program import Program
+from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY
+from language.numerics.function_table import FUNCTIONS
 from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import Spec
 

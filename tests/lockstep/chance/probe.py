@@ -8,20 +8,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from language.operation import (
-    Assign,
-    Block,
-    Branch,
-    Compare,
-    Expr,
-    FaultBit,
-    Op,
-    Ref,
-    add,
-    integer,
-)
-from language.program import Program, Variable
-from language.traversal import walk_ops
+from language.ir.ops import Assign, Block, Branch, Compare, Expr, FaultBit, Op, Ref, add, integer
+from language.ir.program import Program, Variable
+from language.ir.traversal import walk_ops
 from tests.lockstep.chance.mutant import rewrite_block
 
 ENABLED = "probe.enabled"

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from engine.interpreter import Interpreter
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import TickLog
 from tests.lockstep.chance.hits import BROKEN, INPUTS, LAST, RULES, Hits
 from tests.lockstep.chance.operations import KINDS, count_executed

@@ -9,7 +9,7 @@ from random import Random
 from engine.continuous import ContinuousRun, SimulationStopped
 from engine.interpreter import Interpreter
 from engine.trajectory import Event
-from language.program import Program
+from language.ir.program import Program
 from lockstep.compare import TickLog
 from tests.lockstep.chance.spec import Spec
 from tests.lockstep.chance.stimulus import Tick, ticks

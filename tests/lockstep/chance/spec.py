@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from language.limit import require_ranges
-from language.load import automaton_of, program_of
-from language.number import NumberType
-from language.program import Program
-from language.project import Project, read_document
+from language.ir.number_type import NumberType
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.lowering.range_saturation import require_ranges
+from language.overlays.expand_document import Project, read_document
 
 SHORT: Mapping[NumberType, str] = {"float64": "f64", "float32": "f32"}
 

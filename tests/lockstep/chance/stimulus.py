@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from random import Random
 
-from language.evaluate import INTEGER_OF_NAN
+from language.numerics.evaluate import INTEGER_OF_NAN
 from tests.lockstep.chance.spec import Aim, Spec
 
 SUBNORMAL = 5e-324

@@ -1,0 +1,1 @@
+"""Lowering of charts: selection of transitions, exit, entry, micro-steps."""

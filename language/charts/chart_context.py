@@ -1,0 +1,126 @@
+"""Charting: what the parts of a micro-step of a chart share - names, numbers, variables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from language.ir.ops import Expr, Ref
+from language.ir.program import TransitionInfo
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.statechart import Chart, ChartNode, ChartTransition
+
+NEVER_LEFT = -128
+"""What a history holds before its mode was left once."""
+IS_FIRST_STEP = Ref("work.is_first")
+IS_STEP_LIMIT_REACHED = Ref("work.is_over")
+"""Whether a micro-step is the first of its tick; whether no further one is allowed."""
+
+
+@dataclass(frozen=True)
+class ChartContext:
+    """A chart that is lowered; `now` are its names without equations, `everywhere` with them."""
+
+    automaton: Automaton
+    chart: Chart
+    transition_infos: Mapping[str, TransitionInfo]
+    base_bindings: Mapping[str, Expr]
+    bindings: Mapping[str, Expr]
+    queue_capacity: int
+
+    @property
+    def has_several_micro_steps(self) -> bool:
+        """Tell whether a tick may have more than one micro-step."""
+        return self.chart.micro_steps > 1
+
+    @property
+    def may_reach_limit(self) -> bool:
+        """Tell whether a tick may reach its bound."""
+        return self.has_several_micro_steps or self.queue_capacity > 1
+
+    def mode_of(self, node: ChartNode) -> Mode | None:
+        """Return what holds and happens in a node; None for regions of the root."""
+        return self.automaton.modes_by_key.get(node.mode_key)
+
+    def info_of(self, transition: Transition) -> TransitionInfo:
+        """Return the number and timer of a transition."""
+        return self.transition_infos[transition.key]
+
+    def transitions_of(self, node: ChartNode) -> tuple[Transition, ...]:
+        """Return the transitions of a node."""
+        mode = self.mode_of(node)
+        return mode.transitions if mode else ()
+
+    def transitions_in(self, region: str) -> list[tuple[Transition, ChartTransition]]:
+        """Return the transitions whose source is in a region."""
+        nodes = (node for node in self.chart.nodes if node.region == region)
+        return [
+            (way, self.chart.transitions[way.key])
+            for node in nodes
+            for way in self.transitions_of(node)
+        ]
+
+    @cached_property
+    def all_transitions(self) -> list[tuple[Transition, ChartTransition]]:
+        """All transitions, those of outer regions first."""
+        return [
+            pair for region in self.chart.regions for pair in self.transitions_in(region.region)
+        ]
+
+    @cached_property
+    def history_nodes(self) -> frozenset[int]:
+        """The nodes of which something is kept when they are left."""
+        nodes = self.chart.nodes
+        found = {node.parent for node in nodes if node.kind == "history"}
+        deep = [node.parent for node in nodes if node.history == "deep"]
+        for transition, way in self.all_transitions:
+            if transition.history:
+                found.update(way.targets)
+                deep += way.targets if transition.history == "deep" else ()
+        for outer in deep:
+            inner = (r for r in self.chart.regions if nodes[outer].contains(r.index))
+            found.update(region.index for region in inner if region.kind == "compound")
+        return frozenset(found)
+
+    @cached_property
+    def timer_keeping_nodes(self) -> frozenset[int]:
+        """The nodes that some transition may enter with their wait counters as they were."""
+        found: set[int] = set()
+        for transition, way in self.all_transitions:
+            if transition.memory == "continue" and way.domain is not None:
+                domain = self.chart.nodes[way.domain]
+                for node in self.chart.nodes[domain.index + 1 : domain.last_descendant + 1]:
+                    if any(self.chart.are_nested(node.index, target) for target in way.targets):
+                        found.add(node.index)
+        return frozenset(found)
+
+
+def to_identifier(text: str) -> str:
+    """Return a path as part of the name of a variable."""
+    return text.replace(".", "_")
+
+
+def request_variable(region: str) -> str:
+    """Return the variable of the transition that a region wishes to take, 0 for none."""
+    return f"work.wish_{to_identifier(region)}"
+
+
+def selected_variable(region: str) -> str:
+    """Return the variable of the transition that a region takes, 0 for none."""
+    return f"work.takes_{to_identifier(region)}"
+
+
+def history_ref(node: ChartNode) -> Ref:
+    """Return the variable of what a node was left in."""
+    return Ref(f"memory.left_{to_identifier(node.path)}")
+
+
+def exit_flag(node: ChartNode) -> Ref:
+    """Return whether a node is left in this micro-step."""
+    return Ref(f"work.exit_{to_identifier(node.path)}")
+
+
+def entry_flag(node: ChartNode) -> Ref:
+    """Return whether a node is entered in this micro-step."""
+    return Ref(f"work.enter_{to_identifier(node.path)}")

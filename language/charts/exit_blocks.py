@@ -1,0 +1,65 @@
+"""Leaving: what a chart forgets, keeps and does when nodes are left, the innermost first."""
+
+from __future__ import annotations
+
+from language.charts.chart_context import ChartContext, exit_flag, history_ref, to_identifier
+from language.ir.ops import Assign, Block, Op, Ref, RunBlock, Switch, Value, integer
+from language.ir.program import mode_variable
+from language.lowering.edge_detection import edge_detectors_by_mode
+from language.model.statechart import ChartNode
+
+
+def exit_blocks(context: ChartContext) -> dict[str, Block]:
+    """Return `leave_<node>`: what is active inside a node that some transition leaves, and
+    `quit_<region>`: a region with what is active inside it.
+    """
+    chart = context.chart
+    blocks: dict[str, Block] = {}
+    for index in sorted(chart.exited_domains(way for _, way in context.all_transitions)):
+        node = chart.nodes[index]
+        blocks[f"leave_{to_identifier(node.path)}"] = _exit_active_nodes(context, node, node.index)
+    for region in chart.regions:
+        if chart.parent_region(region):
+            blocks[_run_region_exit(region).block] = _exit_active_nodes(context, region, None)
+    return blocks
+
+
+def run_exit_block(node: ChartNode) -> RunBlock:
+    """Return what leaves the inside of a node."""
+    return RunBlock(f"leave_{to_identifier(node.path)}")
+
+
+def _run_region_exit(region: ChartNode) -> RunBlock:
+    return RunBlock(f"quit_{to_identifier(region.path)}")
+
+
+def _exit_active_nodes(context: ChartContext, node: ChartNode, stop_index: int | None) -> Block:
+    """What is active in a node, the innermost first, up to one that stays."""
+    cases = []
+    for leaf in context.chart.leaves_of(node):
+        ops: list[Op] = [_run_region_exit(region) for region in context.chart.child_regions(leaf)]
+        for each in context.chart.region_ancestors(leaf):
+            if each.index == stop_index:
+                break
+            ops += _exit_node(context, each)
+        if ops and leaf.number is not None:
+            cases.append((leaf.number, tuple(ops)))
+    return (Switch(mode_variable("memory.mode", node.region), tuple(cases)),) if cases else ()
+
+
+def _exit_node(context: ChartContext, node: ChartNode) -> list[Op]:
+    """What leaving one node means at once; its exit comes as a stage."""
+    ops: list[Op] = []
+    mode = context.mode_of(node)
+    if node.index in context.history_nodes:
+        now = Ref(mode_variable("memory.mode", node.region), True)
+        ops.append(Assign(history_ref(node).name, now if node.kind == "compound" else integer(1)))
+    if mode is None:
+        return ops
+    if mode.exit:
+        ops.append(Assign(exit_flag(node).name, Value(True)))
+    if node.index not in context.timer_keeping_nodes:
+        timers = [context.info_of(way).timer for way in mode.transitions]
+        ops += [Assign(timer, integer(0)) for timer in timers if timer]
+    edges = edge_detectors_by_mode(context.automaton).get(mode.key, ())
+    return [*ops, *(Assign(edge.armed_variable, Value(False)) for edge in edges)]

@@ -1,0 +1,317 @@
+"""Selecting: which transitions of a chart a micro-step takes (rules 3 and 15).
+
+Each region wishes for one: that of the outermost or of the innermost of its active modes that has
+one enabled, by `order`. Then the wishes are heard from the innermost regions on, as by SCXML (2015,
+`removeConflictingTransitions`): of two that leave the same mode the one from further inside stays,
+else the one heard first; regions side by side are heard in the order of their `priority`.
+"""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Sequence
+
+from language.charts.chart_context import (
+    IS_FIRST_STEP,
+    IS_STEP_LIMIT_REACHED,
+    ChartContext,
+    request_variable,
+    selected_variable,
+    to_identifier,
+)
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Compare,
+    Count,
+    Expr,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    Value,
+    integer,
+)
+from language.ir.program import Variable, mode_variable
+from language.ir.regions import CHART
+from language.lowering.chart_activity import is_complete
+from language.lowering.edge_detection import (
+    detect_edges,
+    edge_detectors_by_mode,
+    guard_memory_bindings,
+)
+from language.lowering.event_queue import event_condition
+from language.lowering.expressions import lower_expression
+from language.lowering.fault_mode import FAULT_PRIORITY as FAULT_FIRST
+from language.lowering.range_saturation import FAULT_HAPPENED
+from language.lowering.transition_infos import wait_ticks
+from language.model.automaton import Mode, Transition
+from language.model.region_queries import transitions_by_priority
+from language.model.statechart import ChartNode
+
+EMPTY_SPAN = (1, 0)
+"""First and last node of an inside that is empty."""
+
+
+def selection_blocks(context: ChartContext) -> dict[str, Block]:
+    """Return `count_<mode>`, `choose_<mode>` of modes, `select_transitions` and `hear`."""
+    blocks: dict[str, Block] = {}
+    for node in context.chart.nodes:
+        mode = context.mode_of(node)
+        if mode and mode.transitions:
+            counts, chosen = _timers_and_choice(context, node, mode)
+            if counts:
+                blocks[f"count_{to_identifier(node.path)}"] = counts
+            blocks[f"choose_{to_identifier(node.path)}"] = chosen
+    regions = context.chart.regions
+    ops: list[Op] = [Assign(request_variable(region.region), integer(0)) for region in regions]
+    for region in regions:
+        ops += _request_in_region(context, region, blocks)
+    blocks["select_transitions"] = tuple(ops)
+    if len(regions) > 1:
+        blocks.update(_conflict_resolution_blocks(context))
+    return blocks
+
+
+def selection_variables(context: ChartContext) -> list[Variable]:
+    """Return the variables of wishes and of what is taken."""
+    found = []
+    for region in context.chart.regions:
+        name = region.region
+        found += [
+            Variable(
+                request_variable(name),
+                "whole",
+                about="transition that the region wishes for, 0: none",
+            ),
+            Variable(selected_variable(name), "whole", about="transition that it takes, 0: none"),
+            Variable(_span_first(region), "whole", about="first node of what its wish leaves"),
+            Variable(_span_last(region), "whole", about="last node of what its wish leaves"),
+            Variable(_is_resolved_variable(region), "truth", about="its wish was decided on"),
+        ]
+    return [
+        *found,
+        Variable("work.keeps", "truth", about="no transition that is taken leaves the same"),
+        Variable(IS_FIRST_STEP.name, "truth", about="this is the first micro-step of the tick"),
+        Variable(IS_STEP_LIMIT_REACHED.name, "truth", about="no further micro-step is allowed"),
+    ]
+
+
+def _timers_and_choice(context: ChartContext, node: ChartNode, mode: Mode) -> tuple[Block, Block]:
+    """Return the counters and edges of a mode's transitions, and the choice among them."""
+    automaton = context.automaton
+    edges = tuple(detect_edges(automaton, mode, context.bindings))
+    known = ChainMap(guard_memory_bindings(automaton, mode), dict(context.bindings))
+    counts: list[Op] = []
+    later: list[Op] = []
+    chain: Block = ()
+    for _, transition in reversed(transitions_by_priority(mode)):
+        info = context.info_of(transition)
+        enabled = _enabled_condition(
+            context, node, transition, lower_expression(transition.when.tree, known)
+        )
+        if info.timer:
+            timer = Ref(info.timer)
+            key = f"{automaton.name} {transition.when.key}"
+            counts.insert(0, Count(info.timer, enabled, info.timer_limit, key))
+            begin = (Assign(info.timer, integer(1)),)
+            begun = (Branch(Compare("==", timer, integer(0)), begin),)
+            later.insert(0, Branch(enabled, begun, (Assign(info.timer, integer(0)),)))
+            enabled = Compare(">", timer, wait_ticks(info))
+        take = Assign(request_variable(node.region), integer(info.number), info.key)
+        chain = (Branch(enabled, (take,), chain),)
+    return _count_waits(context, mode, edges, tuple(counts), tuple(later)), chain
+
+
+def _count_waits(
+    context: ChartContext, mode: Mode, edges: Block, counts: Block, restarts: Block
+) -> Block:
+    """A tick counts once; a wait that begins in a later micro-step begins there (rule 4)."""
+    if not context.has_several_micro_steps or not (edges or counts):
+        return (*edges, *counts)
+    found = edge_detectors_by_mode(context.automaton).get(mode.key, ())
+    over = tuple(Assign(f"work.edge_{edge.number}", Value(False)) for edge in found)
+    return (
+        Branch(
+            IS_FIRST_STEP,
+            (*edges, *counts),
+            (Branch(IS_STEP_LIMIT_REACHED, over, (*edges, *restarts)),),
+        ),
+    )
+
+
+def _enabled_condition(
+    context: ChartContext, node: ChartNode, transition: Transition, guard: Expr
+) -> Expr:
+    event = event_condition(context.chart, transition)
+    if transition.is_completion:
+        return is_complete(context.chart, node, "memory.mode")
+    if event is None:
+        return guard
+    return event if guard == Value(True) else Binary("and", event, guard)
+
+
+def _request_in_region(context: ChartContext, region: ChartNode, blocks: dict[str, Block]) -> Block:
+    """What a region wishes for in each of its innermost modes."""
+    cases = []
+    for leaf in context.chart.leaves(region.region):
+        assert leaf.number is not None
+        ops = _request_in_leaf(context, leaf, blocks)
+        if ops:
+            cases.append((leaf.number, ops))
+    found: Block = (Switch(mode_variable("memory.mode", region.region), tuple(cases)),)
+    if not cases:
+        return ()
+    return (
+        (Branch(Ref(FAULT_HAPPENED), (), found),) if _is_left_by_fault(context, region) else found
+    )
+
+
+def _is_left_by_fault(context: ChartContext, region: ChartNode) -> bool:
+    """Tell whether a fault leaves a region: the mode of the chart that holds it has a way out."""
+    holding = [leaf for leaf in context.chart.leaves(CHART) if leaf.contains(region.index)]
+    return any(
+        way.priority == FAULT_FIRST for leaf in holding for way in context.transitions_of(leaf)
+    )
+
+
+def _request_in_leaf(context: ChartContext, leaf: ChartNode, blocks: dict[str, Block]) -> Block:
+    chain = [n for n in context.chart.region_ancestors(leaf) if context.transitions_of(n)]
+    names = [to_identifier(node.path) for node in chain]
+    ops: list[Op] = [RunBlock(f"count_{name}") for name in names if f"count_{name}" in blocks]
+    order = names if context.chart.order == "inner_first" else names[::-1]
+    chosen: Block = ()
+    none = Compare("==", Ref(request_variable(leaf.region)), integer(0))
+    for name in reversed(order):
+        more: Block = (Branch(none, chosen),) if chosen else ()
+        chosen = (RunBlock(f"choose_{name}"), *more)
+    fault = next((w for w in context.transitions_of(leaf) if w.priority == FAULT_FIRST), None)
+    if fault and context.chart.order == "outer_first" and len(names) > 1:
+        at_once = Assign(request_variable(leaf.region), integer(context.info_of(fault).number))
+        chosen = (Branch(Ref(FAULT_HAPPENED), (at_once,), chosen),)
+    return (*ops, *chosen)
+
+
+def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
+    """Return `hear`, which makes of the wishes what is taken, and `hear_<region>`."""
+    regions = context.chart.regions
+    pairs = {region.index: _conflicting_regions(context, region) for region in regions}
+    conflicts = any(pairs.values())
+    blocks: dict[str, Block] = {}
+    ops: list[Op] = []
+    for region in regions:
+        ops.append(Assign(selected_variable(region.region), integer(0)))
+        ops.append(Assign(_is_resolved_variable(region), Value(False)))
+        if conflicts:
+            ops += _set_exit_span(context, region)
+        blocks[f"hear_{to_identifier(region.region)}"] = _resolve_request(
+            context, region, pairs[region.index]
+        )
+    for region in regions:
+        ops += _resolve_in_leaf(context, region)
+    blocks["hear"] = tuple(ops)
+    return blocks
+
+
+def _conflicting_regions(context: ChartContext, region: ChartNode) -> list[ChartNode]:
+    """Return the regions with a transition that leaves something that one of this region leaves."""
+    chart = context.chart
+    own = chart.exited_domains(way for _, way in context.transitions_in(region.region))
+    found = []
+    for other in chart.regions:
+        theirs = chart.exited_domains(way for _, way in context.transitions_in(other.region))
+        if other is not region and any(chart.are_nested(a, b) for a in own for b in theirs):
+            found.append(other)
+    return found
+
+
+def _set_exit_span(context: ChartContext, region: ChartNode) -> Block:
+    """Set the first and last node of what the wish of a region leaves."""
+    cases = []
+    for transition, way in context.transitions_in(region.region):
+        low, high = EMPTY_SPAN
+        if way.domain is not None:
+            low, high = way.domain, context.chart.nodes[way.domain].last_descendant
+        ops = (Assign(_span_first(region), integer(low)), Assign(_span_last(region), integer(high)))
+        cases.append((context.info_of(transition).number, ops))
+    return (
+        Assign(_span_first(region), integer(EMPTY_SPAN[0])),
+        Assign(_span_last(region), integer(EMPTY_SPAN[1])),
+        Switch(request_variable(region.region), tuple(cases)),
+    )
+
+
+def _resolve_request(
+    context: ChartContext, region: ChartNode, conflicting: Sequence[ChartNode]
+) -> Block:
+    """Take the wish of a region unless one that is taken already leaves the same."""
+    keeps = Ref("work.keeps")
+    take: list[Op] = [
+        Assign(selected_variable(region.region), Ref(request_variable(region.region)))
+    ]
+    ops: list[Op] = [Assign(_is_resolved_variable(region), Value(True))]
+    if conflicting:
+        ops.append(Assign(keeps.name, Value(True)))
+    for other in conflicting:
+        is_taken = Compare("!=", Ref(selected_variable(other.region)), integer(0))
+        clash = Binary("and", is_taken, _spans_overlap(region, other))
+        if context.chart.is_region_inside(region, other):
+            take.insert(0, Branch(clash, (Assign(selected_variable(other.region), integer(0)),)))
+        else:
+            ops.append(Branch(clash, (Assign(keeps.name, Value(False)),)))
+    return (*ops, Branch(keeps, tuple(take))) if conflicting else (*ops, *take)
+
+
+def _spans_overlap(left: ChartNode, right: ChartNode) -> Expr:
+    """Tell whether one of two insides begins in the other."""
+
+    def begins(inner: ChartNode, outer: ChartNode) -> Expr:
+        low = Ref(_span_first(inner))
+        after = Compare("<=", Ref(_span_first(outer)), low)
+        return Binary("and", after, Compare("<=", low, Ref(_span_last(outer))))
+
+    some = Binary(
+        "and",
+        Compare("<=", Ref(_span_first(left)), Ref(_span_last(left))),
+        Compare("<=", Ref(_span_first(right)), Ref(_span_last(right))),
+    )
+    return Binary("and", some, Binary("or", begins(left, right), begins(right, left)))
+
+
+def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
+    """In its innermost modes without regions, a region is heard: its own wish or one around it."""
+    chart = context.chart
+    plain = [leaf for leaf in chart.leaves(region.region) if leaf.kind == "atomic"]
+    around = [region]
+    while (outer := chart.parent_region(around[-1])) is not None:
+        around.append(outer)
+    if chart.order == "outer_first":
+        around.reverse()
+    ops: Block = ()
+    for each in reversed(around):
+        if not context.transitions_in(each.region):
+            continue
+        fresh = Branch(
+            Ref(_is_resolved_variable(each)), (), (RunBlock(f"hear_{to_identifier(each.region)}"),)
+        )
+        ops = (
+            Branch(Compare("!=", Ref(request_variable(each.region)), integer(0)), (fresh,), ops),
+        )
+    cases = tuple((leaf.number, ops) for leaf in plain if leaf.number is not None)
+    if not ops or not cases:
+        return ()
+    return (Switch(mode_variable("memory.mode", region.region), cases),)
+
+
+def _span_first(region: ChartNode) -> str:
+    return f"work.low_{to_identifier(region.region)}"
+
+
+def _span_last(region: ChartNode) -> str:
+    return f"work.high_{to_identifier(region.region)}"
+
+
+def _is_resolved_variable(region: ChartNode) -> str:
+    return f"work.heard_{to_identifier(region.region)}"

@@ -1,0 +1,1 @@
+"""Checks of a model: determinism, reachability, ranges, writers, instantaneous cycles."""

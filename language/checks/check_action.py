@@ -1,0 +1,101 @@
+"""Check of actions: assignments, and what a transition says - its target, guard, wait, resets."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from language.checks.check_rewind import check_rewind
+from language.checks.check_single_writer import check_memory_continue
+from language.expressions.name_rules import NAME_PATTERN
+from language.expressions.syntax_tree import EDGE_FUNCTIONS, MEMORY_FUNCTIONS, TIME_FUNCTIONS, names
+from language.expressions.units import SECOND
+from language.lowering.parameter_bindings import parameter_kinds
+from language.lowering.wait_ticks import tunable_wait
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.declaration import Formula
+from language.text.diagnostic import Problems, suggest_name
+from language.typecheck.infer import TypeChecker
+
+
+def check_assignments(
+    automaton: Automaton,
+    formulas: Mapping[str, Formula],
+    check: TypeChecker,
+    problems: Problems,
+) -> None:
+    """Report assignments to what is not carried, and values of another kind."""
+    for name, formula in formulas.items():
+        kind = check.environment.types.get(name)
+        if not NAME_PATTERN.fullmatch(name):
+            continue  # told where it was read
+        if name not in automaton.state_variables:
+            hint = _assignment_hint(automaton, name) or suggest_name(
+                name, automaton.state_variables
+            )
+            label = f"`{name}` is not a state or discrete variable"
+            problems.error("name", formula.span, label, hint)
+        elif kind is not None:
+            check.check_assignment(formula.tree, kind, name)
+
+
+def _assignment_hint(automaton: Automaton, name: str) -> str:
+    """Return what is done with a known name that is not assigned."""
+    if automaton.statechart and name in automaton.statechart.events:
+        return f"it is an event: a transition raises it, `raise: {name}`"
+    if name in automaton.inputs:
+        return "it is an input, which is only read: `discrete` declares what is written"
+    if name in automaton.parameters:
+        return "it is a parameter, which stays: `discrete` declares what is written"
+    return ""
+
+
+def check_mode_transitions(
+    automaton: Automaton,
+    mode: Mode,
+    check: TypeChecker,
+    parameter_check: TypeChecker,
+    problems: Problems,
+) -> None:
+    """Report mistakes in the transitions and invariants of a mode; `parameter_check` knows parameters."""
+    remembered = frozenset(
+        MEMORY_FUNCTIONS if automaton.is_sampled else ("delay", *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
+    )
+    guards = dataclasses.replace(check.environment, memory_functions=remembered)
+    guard = TypeChecker(guards, problems)
+    for transition in mode.transitions:
+        _check_target(automaton, transition, problems)
+        guard.check_condition(transition.when.tree, "when")
+        if transition.wait:
+            parameter_check.check_quantity(transition.wait.tree, SECOND, "wait")
+            if tunable_wait(automaton, transition.wait) is None:
+                _check_fixed_time(automaton, transition.wait, problems)
+        check_assignments(automaton, transition.reset, check, problems)
+        if transition.rewind:
+            check.check_condition(transition.rewind.until.tree, "until")
+            parameter_check.check_quantity(transition.rewind.within.tree, SECOND, "within")
+            _check_fixed_time(automaton, transition.rewind.within, problems)
+            check_rewind(automaton, transition, problems)
+        if transition.memory == "continue" and automaton.statechart is None:
+            check_memory_continue(automaton, transition, problems)
+    for invariant in mode.invariants.values():
+        check.check_condition(invariant.condition.tree, "that")
+
+
+def _check_target(automaton: Automaton, transition: Transition, problems: Problems) -> None:
+    """In a chart its own check looks targets up."""
+    region = automaton.region(transition.region)
+    if automaton.statechart is None and transition.target not in region.modes:
+        label = f"there is no mode `{transition.target}`"
+        if automaton.regions:
+            label += f" in region `{region.name}`"
+        hint = suggest_name(transition.target, region.modes)
+        problems.error("name", transition.span, label, hint)
+
+
+def _check_fixed_time(automaton: Automaton, time: Formula, problems: Problems) -> None:
+    for read in names(time.tree):
+        parameter = automaton.parameters.get(read.path)
+        if parameter and parameter_kinds(automaton)[read.path] != "fixed":
+            label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
+            problems.error("wait", read.span, label)

@@ -1,0 +1,314 @@
+"""Check of transitions: what never fires - dead, shadowed, a wait that never elapses - and waits
+that are nearer to each other than a period. Warnings: nothing of it is ambiguous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from fractions import Fraction
+
+from language.ir.ops import Compare, Expr, Ref, Unary, Value, integer, real
+from language.lowering.constants import evaluate_exactly
+from language.lowering.wait_ticks import seconds_to_ticks, tunable_wait, wait_range_in_ticks
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.declaration import Formula, Range
+from language.model.region_queries import transitions_by_priority
+from language.model.transition_precedence import (
+    covers_events,
+    inner_preceding_transitions,
+    is_guard_portable,
+    possible_events,
+    preceding_transitions,
+)
+from language.reading.transition_table_reader import STAY
+from language.smt.guard_snapshot import TIME_IN_MODE, GuardSnapshot
+from language.smt.query_engine import QueryEngine
+from language.text.diagnostic import Problems, Span, SpecError
+
+PRIORITY_HINT = "give it a smaller priority, or "
+ORDER_HINT = "let the other guard exclude it, choose the other `order`, or "
+
+
+def check_dead_transitions(
+    automaton: Automaton, query_engine: QueryEngine, problems: Problems
+) -> set[str]:
+    """Warn of transitions that never fire; return the keys of them."""
+    dead_transitions: set[str] = set()
+    for mode in automaton.all_modes:
+        guards = _ModeGuards(automaton, mode, query_engine)
+        for _, transition in transitions_by_priority(mode):
+            if _waits_for_unraised_event(automaton, transition):
+                names = " or ".join(f"`{name}`" for name in transition.events)
+                label = f"this never fires: nothing raises {names}, and no input is it"
+                one = transition.events[0]
+                hint = f"`raise: {one}` on a transition, or `events: {{{one}: {{from: input}}}}`"
+                problems.warning("dead", transition.span, label, hint)
+                dead_transitions.add(transition.key)
+                continue
+            if guards.report_inner_shadow(transition, problems):
+                dead_transitions.add(transition.key)
+                continue
+            if not guards.never_fires(transition):
+                continue
+            if guards.never_holds(transition):
+                if transition.is_completion:
+                    continue  # language/checks/check_chart.py
+                label = f"{_describe_guard(transition)} never holds within the declared ranges"
+                hint = "they exclude it, with the equations of the mode: correct one of them"
+                problems.warning("dead", _span_of(transition, transition.when), label, hint)
+            elif not guards.report_shadow(transition, problems):
+                continue
+            dead_transitions.add(transition.key)
+    return dead_transitions
+
+
+def _waits_for_unraised_event(automaton: Automaton, transition: Transition) -> bool:
+    """Tell whether a transition waits for events that never come."""
+    return bool(transition.events) and not possible_events(automaton) & {*transition.events}
+
+
+def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
+    """Warn of two waits that differ by less than a period (rule 10)."""
+    if automaton.period is None:
+        return
+    for mode in automaton.all_modes:
+        guards = _ModeGuards(automaton, mode, query_engine)
+        for earlier, later in _waiting_pairs(mode):
+            if any(tunable_wait(automaton, way.wait) for way in (earlier, later)):
+                continue
+            first, second = (_wait_seconds(automaton, way) for way in (earlier, later))
+            apart = abs(first - second)
+            if first and second and 0 < apart < automaton.period:
+                if guards.are_exclusive(earlier, later):
+                    continue
+                times = [f"{float(time) * 1e3:g} ms" for time in (second, first, automaton.period)]
+                label = f"{times[0]} are nearer to the {times[1]} of `{earlier.name}` "
+                label += f"than a period of {times[2]}"
+                hint = "which of them elapses first may differ between simulation and target"
+                assert later.wait
+                problems.warning("near", _span_of(later, later.wait), label, hint)
+
+
+def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems: Problems) -> None:
+    """Warn of modes that only transitions which never fire leave; those of superstates count."""
+    superstates = {mode.key for mode in automaton.superstates}
+    for mode in automaton.all_modes:
+        ways = [way for each in _enclosing_modes(automaton, mode) for way in each.transitions]
+        if (
+            mode.key not in superstates
+            and ways
+            and all(way.key in dead_transitions for way in ways)
+        ):
+            label = f"mode `{mode.name}` cannot be left: none of its transitions ever fires"
+            problems.warning("stuck", mode.span, label)
+
+
+def _enclosing_modes(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
+    """Yield a mode and those that it stands in."""
+    yield mode
+    chart = automaton.statechart
+    own = next(node for node in chart.nodes if node.mode_key == mode.key) if chart else None
+    for node in chart.ancestors(own) if chart and own else ():
+        if node.mode_key != mode.key and node.mode_key in automaton.modes_by_key:
+            yield automaton.modes_by_key[node.mode_key]
+
+
+class _ModeGuards:
+    """The guards of one mode at one moment."""
+
+    def __init__(self, automaton: Automaton, mode: Mode, query_engine: QueryEngine) -> None:
+        self.automaton = automaton
+        self.mode = mode
+        self.query_engine = query_engine
+        self.snapshot = GuardSnapshot(automaton, mode)
+        self.guards: dict[str, Expr | None] = {}
+        self.waits: dict[str, Fraction] = {}
+        for transition in mode.transitions:
+            self.guard_of(transition)
+
+    def guard_of(self, transition: Transition) -> Expr | None:
+        """Return a guard, None if it has no form that questions can be asked of."""
+        if transition.key not in self.guards:
+            self.guards[transition.key] = None
+            with suppress(KeyError, SpecError):
+                self.guards[transition.key] = self._lower_guard(transition)
+        return self.guards[transition.key]
+
+    def wait_of(self, transition: Transition) -> Fraction:
+        """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
+
+        At most, where that is tunable.
+        """
+        if transition.key not in self.waits:
+            self.waits[transition.key] = _longest_wait(self.automaton, transition)
+        return self.waits[transition.key]
+
+    def _lower_guard(self, transition: Transition) -> Expr | None:
+        source = self.automaton.source_mode(transition)
+        if source.key == self.mode.key:
+            return self.snapshot.lower_guard(transition)
+        if not is_guard_portable(transition):
+            return None
+        return self.snapshot.in_enclosing_mode(source).lower_guard(transition)
+
+    def are_incompatible(self, *conditions: Expr | None) -> bool:
+        """Tell whether conditions never hold together, whatever the tunables are."""
+        found = [condition for condition in conditions if condition is not None]
+        if len(found) < len(conditions):
+            return False
+        return self.query_engine.is_unsatisfiable(
+            self.query_engine.build_query(self.snapshot.path, found)
+        )
+
+    def report_inner_shadow(self, transition: Transition, problems: Problems) -> bool:
+        """Warn of a superstate's transition before which one inside always fires."""
+        found = list(inner_preceding_transitions(self.automaton, self.mode))
+        held = self.wait_of(transition)
+        for leaf, ways in found:
+            inside = _ModeGuards(self.automaton, leaf, self.query_engine)
+            first = [way for way in ways if not self.wait_of(way)]
+            first = [way for way in first if covers_events(self.automaton, way, transition)]
+            others = [_negate(guard) for guard in map(inside.guard_of, first) if guard is not None]
+            if not others or not inside.are_incompatible(inside.guard_of(transition), *others):
+                return False
+        what = "one of the transitions inside, which win by `order`, fires"
+        return bool(found) and _report_shadow(transition, what, bool(held), problems, ORDER_HINT)
+
+    def never_fires(self, transition: Transition) -> bool:
+        """Tell whether a guard never holds where none does that comes first.
+
+        Where that is not so it is neither dead nor shadowed: one question for most transitions.
+        """
+        held = self.wait_of(transition)
+        others = (_negate(self.guard_of(way)) for way in self._earlier_transitions(transition))
+        return self.are_incompatible(self.guard_of(transition), *self._active_for(held), *others)
+
+    def never_holds(self, transition: Transition) -> bool:
+        """Tell whether a guard never holds."""
+        return self.are_incompatible(self.guard_of(transition))
+
+    def are_exclusive(self, first: Transition, second: Transition) -> bool:
+        """Tell whether two guards never hold together."""
+        return self.are_incompatible(self.guard_of(first), self.guard_of(second))
+
+    def report_shadow(self, transition: Transition, problems: Problems) -> bool:
+        """Warn of a transition before which others always fire; tell whether it was so."""
+        guard = self.guard_of(transition)
+        if guard is None:
+            return False
+        before = {way.key for way in preceding_transitions(self.automaton, self.mode, transition)}
+        wait = _shortest_wait(self.automaton, transition)
+        first = self._earlier_transitions(transition)
+        at_once = [way for way in first if way.key in before and not self.wait_of(way)]
+        lasted = self._active_for(wait)
+        for way in first:
+            own = self._active_for(wait - self.wait_of(way)) if way.key in before else ()
+            if self.are_incompatible(guard, *own, _negate(self.guard_of(way))):
+                what, hint = f"`{way.name}` fires", PRIORITY_HINT
+                if way.source != transition.source:
+                    what, hint = (
+                        f"`{way.name}` of `{way.source}`, which is around it, fires",
+                        ORDER_HINT,
+                    )
+                return _report_shadow(transition, what, bool(wait), problems, hint)
+        others = [_negate(self.guard_of(way)) for way in at_once]
+        if len(others) > 1 and self.are_incompatible(guard, *lasted, *others):
+            names = ", ".join(f"`{way.name}`" for way in at_once)
+            what = f"one of {names} fires"
+            return _report_shadow(transition, what, bool(wait), problems, PRIORITY_HINT)
+        return False
+
+    def _earlier_transitions(self, transition: Transition) -> list[Transition]:
+        """Return the transitions that fire first wherever both guards hold from one time on."""
+        wait = _shortest_wait(self.automaton, transition)
+        before = {
+            way.key: way for way in preceding_transitions(self.automaton, self.mode, transition)
+        }
+        own = self.mode.transitions
+        along = {way.key: way for way in own if covers_events(self.automaton, way, transition)}
+        ways = {**along, **before}.values()
+        return [
+            way
+            for way in ways
+            if self.guard_of(way) is not None and self._fires_before(way, before, wait)
+        ]
+
+    def _fires_before(
+        self, other: Transition, before: Mapping[str, Transition], wait: Fraction
+    ) -> bool:
+        own = self.wait_of(other)
+        if not wait:
+            return not own and other.key in before
+        leaves = bool(other.targets) and not other.internal
+        return (leaves and own < wait) or (own == wait and other.key in before)
+
+    def _active_for(self, wait: Fraction) -> tuple[Expr, ...]:
+        """Return that the mode has been active for a wait, where its age matters."""
+        if not wait or TIME_IN_MODE not in self.snapshot.path.domains:
+            return ()
+        is_sampled = self.automaton.is_sampled
+        limit = integer(int(wait)) if is_sampled else real(wait)
+        return (Compare(">=", Ref(TIME_IN_MODE, is_sampled), limit),)
+
+
+def _report_shadow(
+    transition: Transition, what: str, waits: bool, problems: Problems, hint: str
+) -> bool:
+    other = f"write `{STAY}`" if transition.is_table_cell else "remove it"
+    if waits:
+        label = f"this wait never elapses: {what} before, whenever the guard holds"
+        assert transition.wait
+        place = _span_of(transition, transition.wait)
+        problems.warning("timer", place, label, f"wait for less, or {other}")
+    else:
+        label = f"this never fires: {what} first, whenever {_describe_guard(transition)} holds"
+        problems.warning("shadowed", _span_of(transition, transition.when), label, hint + other)
+    return True
+
+
+def _span_of(transition: Transition, formula: Formula) -> Span:
+    """Return where a formula stands; of a transition table its cell: other rows share it."""
+    return transition.span if transition.is_table_cell else formula.span
+
+
+def _describe_guard(transition: Transition) -> str:
+    return f"the guard of `{transition.name}`" if transition.is_table_cell else "this"
+
+
+def _wait_seconds(automaton: Automaton, transition: Transition) -> Fraction:
+    """Return how long a guard has to hold [s]."""
+    return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
+
+
+def _shortest_wait(automaton: Automaton, transition: Transition) -> Fraction:
+    """Return how long a guard has to hold at least: ticks of a sampled automaton, else [s]."""
+    return _wait_range(automaton, transition)[0]
+
+
+def _longest_wait(automaton: Automaton, transition: Transition) -> Fraction:
+    """Return the same at most: it differs where the wait is tunable."""
+    return _wait_range(automaton, transition)[1]
+
+
+def _wait_range(automaton: Automaton, transition: Transition) -> Range:
+    tunable = tunable_wait(automaton, transition.wait)
+    if tunable:
+        return wait_range_in_ticks(automaton, automaton.parameters[tunable])
+    wait = _wait_seconds(automaton, transition)
+    held = Fraction(seconds_to_ticks(automaton, wait)) if automaton.period else wait
+    return held, held
+
+
+def _waiting_pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
+    """Yield each two transitions of a mode that wait."""
+    waiting = [way for way in mode.transitions if way.wait]
+    for position, later in enumerate(waiting):
+        for earlier in waiting[:position]:
+            yield earlier, later
+
+
+def _negate(condition: Expr | None) -> Expr | None:
+    if isinstance(condition, Value):
+        return Value(not condition.value)
+    return None if condition is None else Unary("not", condition)

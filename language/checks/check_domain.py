@@ -1,0 +1,185 @@
+"""Check of domains: a divisor that may be 0, a square root or logarithm of what may be below 0.
+
+Intervals decide most; where they cannot, the solver is asked, with the conditions around the place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Literal
+
+from language.expressions.balance_form import coefficient_of
+from language.expressions.syntax_tree import SyntaxTree, TreeNumbering
+from language.ir.ops import Compare, Unary, real
+from language.ir.regions import CHART
+from language.lowering.delay_buffers import action_formulas
+from language.lowering.parameter_bindings import parameter_order
+from language.model.automaton import Automaton, Mode
+from language.model.evaluation_order import equation_order
+from language.model.region_queries import equation_formulas
+from language.model.truth_table import truth_table_formulas
+from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.query_engine import QueryEngine
+from language.text.diagnostic import Problems, SpecError
+from language.typecheck.interval import UNBOUNDED, Interval
+from language.typecheck.range_analysis import RangeAnalysis
+
+HINTS = {
+    "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
+    "root": "`sqrt(max(..., 0))`, or exclude it by an enclosing `if`",
+    "log": "`log(max(..., 0.001))`, or exclude it by an enclosing `if`",
+    "power": "`pow(max(..., 0), ...)`, or exclude it by an enclosing `if`",
+    "inverse power": "`pow(max(..., 0.001), ...)`, or exclude it by an enclosing `if`",
+}
+LABELS = {
+    "divisor": "this divisor may be 0",
+    "root": "this may be below 0, which has no square root",
+    "log": "this may be 0 or below, which has no logarithm",
+    "power": "this may be below 0, and `pow` takes bases of 0 and more",
+    "inverse power": "this may be 0 or below, which has no power of a degree below 0",
+}
+OUTSIDE_RELATION: Mapping[str, Literal["==", "<", "<="]] = {
+    **{"divisor": "==", "root": "<", "log": "<="},
+    **{"power": "<", "inverse power": "<="},
+}
+"""How what is outside of each domain compares with 0."""
+
+
+def check_domains(automaton: Automaton, problems: Problems) -> None:
+    """Report divisors and roots whose declared ranges go beyond their domain."""
+    fixed: dict[str, Interval] = {}
+    likeness = TreeNumbering()
+    for mode in automaton.all_modes:
+        domains = _ModeDomainChecker(automaton, mode, problems, fixed, likeness)
+        if not fixed:
+            fixed.update({name: domains.interval_of(name) for name in parameter_order(automaton)})
+        domains.check()
+        if mode is automaton.all_modes[0]:
+            domains.check_initial_values()
+
+
+class _ModeDomainChecker:
+    """The intervals of the names of one mode, each equation's found once."""
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        mode: Mode,
+        problems: Problems,
+        fixed: Mapping[str, Interval],
+        likeness: TreeNumbering,
+    ) -> None:
+        self.automaton = automaton
+        self.mode = mode
+        self.problems = problems
+        self.formulas = equation_formulas(mode)
+        self.intervals: dict[str, Interval] = dict(fixed)
+        self.range_analysis = RangeAnalysis(
+            self.interval_of, self._table_interval, likeness, self._report
+        )
+        self.unreported_range_analysis = self.range_analysis.unreported
+
+    def check(self) -> None:
+        ranging = self.range_analysis
+        for name in equation_order(self.mode):
+            self.interval_of(name)
+        tables = self.automaton.tables if self.mode.region == CHART else ()
+        for formula in (*action_formulas(self.mode), *truth_table_formulas(tables)):
+            ranging.analyse(formula.tree)
+        for balance in self.mode.flow.values():
+            ranging.analyse(balance.right)
+            factor = coefficient_of(balance.left, balance.state)
+            if factor is not None and not isinstance(factor, SpecError):
+                interval = ranging.analyse(factor)
+                if interval.contains_zero:
+                    self._report("divisor", factor, interval)
+        self._check_densities()
+
+    def _check_densities(self) -> None:
+        """Warn of spectral densities of an observer that the ranges of what they read let be
+        negative.
+        """
+        noise = self.mode.observer.process_noise if self.mode.observer else {}
+        for name, formula in noise.items():
+            found = self.unreported_range_analysis.analyse(formula.tree)
+            if found.is_certain and found.low < 0.0:
+                label = f"the density of `{name}` may be negative: from {found.low:g} on"
+                help = "its square, its `abs`, or `max(0, ...)`"
+                self.problems.warning("observer", formula.span, label, help)
+
+    def check_initial_values(self) -> None:
+        """Report start values that lie outside of their range, whatever tunables are."""
+        for state in self.automaton.state_variables.values():
+            if state.range:
+                start, (low, high) = (
+                    self.unreported_range_analysis.analyse(state.initial.tree),
+                    map(float, state.range),
+                )
+                if start.high < low or start.low > high:
+                    label = f"`{state.name}` starts outside of its range"
+                    self.problems.error("range", state.initial.span, label)
+
+    def interval_of(self, name: str) -> Interval:
+        """Return the interval of a name; called in order, so that a long chain needs no stack.
+
+        What is outside a domain in one of the mode's own equations is reported.
+        """
+        if name not in self.intervals:
+            self.intervals[name] = UNBOUNDED
+            self.intervals[name] = self._compute_interval(name)
+        return self.intervals[name]
+
+    def _compute_interval(self, name: str) -> Interval:
+        automaton = self.automaton
+        parameter = automaton.parameters.get(name)
+        if parameter is not None and parameter.derived:
+            return self.unreported_range_analysis.analyse(parameter.derived.tree)
+        if parameter is not None and parameter.kind == "fixed" and parameter.value is not None:
+            return Interval(float(parameter.value), float(parameter.value), True)
+        thing = parameter or automaton.inputs.get(name) or automaton.state_variables.get(name)
+        if thing is not None:
+            limits = thing.range
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else UNBOUNDED
+        ranging = (
+            self.range_analysis if name in self.mode.equations else self.unreported_range_analysis
+        )
+        parts = [ranging.analyse(formula.tree) for formula in self.formulas.get(name, ())]
+        if not parts:
+            return UNBOUNDED
+        result = parts[0]
+        for part in parts[1:]:
+            result = result.hull(part)
+        return result
+
+    def _table_interval(self, name: str) -> Interval:
+        parameter = self.automaton.parameters[name]
+        if parameter.kind == "tunable" or parameter.table is None:
+            limits = parameter.range
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else UNBOUNDED
+        values = parameter.table.values
+        return Interval(float(min(values)), float(max(values)), True)
+
+    def _report(self, what: str, tree: SyntaxTree, interval: Interval) -> None:
+        if not interval.is_certain:
+            return
+        if self._is_excluded(what, tree):
+            return
+        span = f"{interval.low:.4g} to {interval.high:.4g}"
+        label = f"{LABELS[what]}: it lies from {span}"
+        self.problems.error("domain", tree.span, label, HINTS[what])
+
+    def _is_excluded(self, what: str, tree: SyntaxTree) -> bool:
+        """Tell whether what is around a place excludes what is outside of the domain there."""
+        with suppress(KeyError, SpecError):
+            snapshot = GuardSnapshot(self.automaton, self.mode)
+            around = [
+                (snapshot.lower_expression(part), holds)
+                for part, holds in self.range_analysis.branch_path
+            ]
+            conditions = [part if holds else Unary("not", part) for part, holds in around]
+            value = snapshot.lower_expression(tree)
+            conditions.append(Compare(OUTSIDE_RELATION[what], value, real(0)))
+            inquiry = QueryEngine(self.automaton)
+            return inquiry.is_unsatisfiable(inquiry.build_query(snapshot.path, conditions))
+        return False

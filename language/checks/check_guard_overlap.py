@@ -1,0 +1,96 @@
+"""Guards: transitions of one mode that can be enabled together need priorities (rule 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.expressions.syntax_tree import Not, Relation, SyntaxTree, is_same_expression
+from language.model.automaton import Automaton, Mode, Transition
+from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.query import SolverQuery
+from language.smt.query_engine import QueryEngine, Witness
+from language.text.diagnostic import Problems, SpecError
+
+EXCLUSIVE_RELATIONS = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
+"""Relations that exclude each other between the same two sides."""
+
+
+MAX_OVERLAPS = 1000
+"""Pairs told of in one mode; who has so many gives priorities to all."""
+
+
+def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
+    """Report pairs of one priority that are not proven disjoint, with a witness if one is found."""
+    for mode in automaton.all_modes:
+        reported = 0
+        for earlier, later in _overlap_candidates(mode):
+            reported += _report_overlap(automaton, mode, earlier, later, query_engine, problems)
+            if reported == MAX_OVERLAPS:
+                break
+
+
+def _overlap_candidates(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
+    for position, later in enumerate(mode.transitions):
+        for earlier in mode.transitions[:position]:
+            same = (later.priority or 0) == (earlier.priority or 0)
+            apart = earlier.events and later.events and not {*earlier.events} & {*later.events}
+            if (
+                same
+                and not apart
+                and not are_syntactically_exclusive(earlier.when.tree, later.when.tree)
+            ):
+                yield earlier, later
+
+
+def are_syntactically_exclusive(left: SyntaxTree, right: SyntaxTree) -> bool:
+    """Tell whether two guards exclude each other by their form: `a < b` and `a >= b`, `not g`."""
+    if isinstance(right, Not) and is_same_expression(right.operand, left):
+        return True
+    if isinstance(left, Not) and is_same_expression(left.operand, right):
+        return True
+    if isinstance(left, Relation) and isinstance(right, Relation):
+        opposed = right.operator in EXCLUSIVE_RELATIONS.get(left.operator, ())
+        return (
+            opposed
+            and is_same_expression(left.left, right.left)
+            and is_same_expression(left.right, right.right)
+        )
+    return False
+
+
+def _report_overlap(
+    automaton: Automaton,
+    mode: Mode,
+    earlier: Transition,
+    later: Transition,
+    query_engine: QueryEngine,
+    problems: Problems,
+) -> bool:
+    """Report a pair unless it is proven disjoint; tell whether it was reported."""
+    query = _overlap_query(automaton, mode, earlier, later, query_engine)
+    found = query_engine.answer_for_all_tunables(query) if query else "open"
+    if found == "never":
+        return False
+    label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
+    if isinstance(found, Witness):
+        at = f"at {found.text}" if found.text else "at one instant"
+        label = f"`{earlier.name}` and `{later.name}` are both enabled {at}"
+    hint = "give them different priorities: the smallest wins"
+    problems.error("priority", later.when.span, label, hint)
+    return True
+
+
+def _overlap_query(
+    automaton: Automaton,
+    mode: Mode,
+    earlier: Transition,
+    later: Transition,
+    query_engine: QueryEngine,
+) -> SolverQuery | None:
+    """Return the question whether two guards can hold together; None where they have no form."""
+    snapshot = GuardSnapshot(automaton, mode)
+    try:
+        guards = [snapshot.lower_guard(way) for way in (earlier, later)]
+    except (KeyError, SpecError):
+        return None
+    return query_engine.build_query(snapshot.path, guards)

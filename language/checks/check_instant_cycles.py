@@ -1,0 +1,238 @@
+"""Check of cycles: transitions that go round for ever at one instant (rules 7, 9 and 12).
+
+A way round is reported where it is taken twice from some values and, from these, as often as the
+bound of micro-steps is passed: then a run stops there, for certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from itertools import islice
+
+from language.expressions.syntax_tree import Name, Relation, SyntaxTree, walk
+from language.ir.ops import Expr, Unary
+from language.lowering.constants import evaluate_exactly
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.graphs import strongly_connected_components
+from language.smt.guard_snapshot import GuardSnapshot, SymbolicPath
+from language.smt.linear_bounds import is_disproved_by_bounds
+from language.smt.query_engine import QueryEngine, Witness
+from language.text.diagnostic import Problems, SpecError
+
+MAX_CYCLE_LENGTH = 4
+"""Transitions of a way round that is looked for; longer ones are made of more than one mistake."""
+MAX_CYCLES = 200
+"""Ways round of one automaton that are looked at."""
+
+Cycle = tuple[Transition, ...]
+
+
+def report_refiring(automaton: Automaton, problems: Problems) -> None:
+    """Report transitions to a mode and back that fire for ever at one instant, with a witness."""
+    for cycle, witness in _endless_cycles(automaton, range(1, 3)):
+        label = f"this fires again at the same instant, for ever: {_format_cycle(cycle)}"
+        hint = f"{witness.hint_prefix}write the direction of motion too, like "
+        hint += "`x >= limit and v > 0 m/s`" + _range_hint(automaton)
+        problems.error("refire", _boundary_transition(automaton, cycle).when.span, label, hint)
+
+
+def check_cycles(automaton: Automaton, problems: Problems) -> None:
+    """Warn of longer ways round that are taken for ever at one instant: a run stops there."""
+    for cycle, witness in _endless_cycles(automaton, range(3, MAX_CYCLE_LENGTH + 1)):
+        label = f"from here the modes change for ever at one instant: {_format_cycle(cycle)}"
+        hint = f"{witness.hint_prefix}let one of them wait, or its guard exclude the one before"
+        hint += _range_hint(automaton)
+        problems.warning("cycle", _boundary_transition(automaton, cycle).when.span, label, hint)
+
+
+def _endless_cycles(automaton: Automaton, lengths: range) -> Iterator[tuple[Cycle, Witness]]:
+    """Yield ways round of some lengths that are taken for ever, the first turn that shows it."""
+    if automaton.is_sampled:
+        return  # language/checks/check_chart_cycles.py
+    inquiry = QueryEngine(automaton)
+    for way in instant_cycles(automaton):
+        for turn in range(len(way) if len(way) in lengths else 0):
+            turned = (*way[turn:], *way[:turn])
+            found = _find_endless_witness(automaton, turned, inquiry)
+            if found:
+                yield turned, found
+                break
+
+
+@cache_on_owner
+def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
+    """Return the ways round of which each transition can follow the one before at one instant."""
+    inquiry = QueryEngine(automaton)
+    ways = {way.key: way for way in instant_transitions(automaton)}
+    after: dict[str, list[str]] = {key: [] for key in ways}
+    for first, seconds in _candidate_successors(automaton, list(ways.values())):
+        after[first.key] = [
+            way.key for way in _feasible_successors(automaton, first, seconds, inquiry)
+        ]
+    follows: dict[tuple[str, str], bool] = {}
+    found: list[Cycle] = []
+    for members in islice(simple_cycles(after), MAX_CYCLES):
+        way = tuple(ways[key] for key in members)
+        pairs = [(first, second) for first, second in zip(way, (*way[1:], way[0]), strict=True)]
+        for first, second in pairs:
+            key = first.key, second.key
+            if key not in follows:
+                follows[key] = _can_follow(automaton, first, second, inquiry)
+            if not follows[key]:
+                break
+        else:
+            found.append(way)
+    return tuple(found)
+
+
+def instant_transitions(automaton: Automaton) -> list[Transition]:
+    """Return the transitions that need no time."""
+    found = [way for mode in automaton.all_modes for way in mode.transitions]
+    return [way for way in found if not (way.wait and evaluate_exactly(way.wait, automaton))]
+
+
+def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
+    """Yield the cycles of at most `LONGEST` members, each once, from its first member on."""
+    place = {name: number for number, name in enumerate(after)}
+    for group in strongly_connected_components(after):
+        inside = set(group)
+        for start in group:
+            stack: list[tuple[str, ...]] = [(start,)]
+            while stack:
+                path = stack.pop()
+                for name in after[path[-1]]:
+                    if name == start:
+                        yield path
+                    elif name in inside and place[name] > place[start] and name not in path:
+                        stack += [(*path, name)] if len(path) < MAX_CYCLE_LENGTH else []
+
+
+def _candidate_successors(
+    automaton: Automaton, transitions: list[Transition]
+) -> Iterator[tuple[Transition, list[Transition]]]:
+    """Yield each transition with those that leave where it leads, on a way round of modes."""
+    modes: dict[str, list[str]] = {f"{m.region} {m.name}": [] for m in automaton.all_modes}
+    leaving: dict[str, list[Transition]] = {}
+    for way in transitions:
+        modes[f"{way.region} {way.source}"].append(f"{way.region} {way.target}")
+        leaving.setdefault(f"{way.region} {way.source}", []).append(way)
+    groups = {
+        name: number
+        for number, group in enumerate(strongly_connected_components(modes))
+        for name in group
+    }
+    for way in transitions:
+        target = f"{way.region} {way.target}"
+        if groups[target] == groups[f"{way.region} {way.source}"]:
+            seconds = [(f"{second.region} {second.target}", second) for second in leaving[target]]
+            yield way, [second for name, second in seconds if groups[name] == groups[target]]
+
+
+def _feasible_successors(
+    automaton: Automaton, first: Transition, successors: list[Transition], query_engine: QueryEngine
+) -> Iterator[Transition]:
+    """Yield the transitions that linear bounds let follow another one at the same instant."""
+    snapshot = GuardSnapshot(automaton, automaton.source_mode(first))
+    try:
+        guard = snapshot.lower_expression(first.when.tree)
+        there = snapshot.apply_transition(first)
+    except (KeyError, SpecError):
+        return
+    for second in successors:
+        with suppress(KeyError, SpecError):
+            condition = there.lower_expression(second.when.tree)
+            if not is_disproved_by_bounds(
+                query_engine.build_query(snapshot.path, (guard, condition))
+            ):
+                yield second
+
+
+def _can_follow(
+    automaton: Automaton, first: Transition, second: Transition, query_engine: QueryEngine
+) -> bool:
+    """Tell whether a transition can be followed by another one at the same instant."""
+    try:
+        path, guards = path_constraints(automaton, (first, second))
+    except (KeyError, SpecError):
+        return False
+    return not query_engine.is_unsatisfiable(query_engine.build_query(path, guards))
+
+
+def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, list[Expr]]:
+    """Return the story of transitions taken one after another at an instant, and what it needs.
+
+    Of each the guard holds, and no guard of a smaller priority that needs no time.
+    """
+    path = SymbolicPath()
+    snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
+    needed: list[Expr] = []
+    for position, transition in enumerate(cycle):
+        for other in snapshot.mode.transitions:
+            if (other.priority or 0) < (transition.priority or 0) and not other.wait:
+                needed.append(Unary("not", snapshot.lower_expression(other.when.tree)))
+        needed.append(snapshot.lower_expression(transition.when.tree))
+        if position + 1 < len(cycle):
+            snapshot = snapshot.apply_transition(transition)
+    return path, needed
+
+
+def _find_endless_witness(
+    automaton: Automaton, cycle: Cycle, query_engine: QueryEngine
+) -> Witness | None:
+    """Return values from which a way round is taken past the bound of micro-steps."""
+    try:
+        found = query_engine.answer(
+            query_engine.build_query(*path_constraints(automaton, cycle * 2))
+        )
+        if not isinstance(found, Witness):
+            return None
+        if _may_be_disturbed(automaton, cycle, found):
+            return None
+        bound = len(automaton.region(cycle[0].region).modes)
+        rounds = bound // len(cycle) + 2
+        lasting = query_engine.build_query(*path_constraints(automaton, cycle * rounds))
+    except (KeyError, SpecError):
+        return None
+    return found if lasting.holds_at(found.valuation) else None
+
+
+def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> bool:
+    """Tell whether another region may change what the guards read: it moves at the same time."""
+    if any(name.startswith("mode.") for name in witness.valuation):
+        return True
+    others = (m for m in automaton.all_modes if m.region != cycle[0].region)
+    written = {name for mode in others for name in _assigned_names(mode)}
+    return any(name.partition(".")[2] in written for name in witness.valuation)
+
+
+def _assigned_names(mode: Mode) -> Iterator[str]:
+    for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):
+        yield from formulas
+
+
+def _format_cycle(cycle: Cycle) -> str:
+    return " -> ".join(f"`{transition.source}`" for transition in (*cycle, cycle[0]))
+
+
+def _range_hint(automaton: Automaton) -> str:
+    """Return the help for states whose values have no bounds."""
+    names = [f"`{name}`" for name, state in automaton.states.items() if state.range is None]
+    return f", or give {', '.join(names)} a `range` if this is out of reach" if names else ""
+
+
+def _boundary_transition(automaton: Automaton, cycle: Cycle) -> Transition:
+    """Return the transition to point at: one whose guard holds on a boundary."""
+    bare = (t for t in reversed(cycle) if _has_boundary(t.when.tree, automaton.states))
+    return next(bare, cycle[-1])
+
+
+def _has_boundary(guard: SyntaxTree, states: Mapping[str, object]) -> bool:
+    """Tell whether a guard holds where a state sits exactly on a limit: `x >= limit`."""
+    for part in walk(guard):
+        if isinstance(part, Relation) and part.operator in ("<=", ">="):
+            sides = (part.left, part.right)
+            if any(isinstance(side, Name) and side.path in states for side in sides):
+                return True
+    return False

@@ -1,0 +1,87 @@
+"""Check of numbers: every number of a spec has a value near it in the automaton's number type."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from language.expressions.syntax_tree import NumberLiteral
+from language.ir.number_type import round_to_type
+from language.model.automaton import Automaton
+from language.model.declaration import Input, Parameter, State
+from language.text.diagnostic import Problems, Span
+
+
+def check_numbers(automaton: Automaton, problems: Problems) -> None:
+    """Report numbers that the type turns into an infinity or into 0. Raises SpecError."""
+    number = automaton.numbers
+    if number == "float64":
+        return
+    for value, span in dict.fromkeys(_numbers_in(automaton)):
+        near = round_to_type(value, number)
+        if math.isinf(near):
+            label = (
+                f"{_format_short(value)} is beyond the largest {number}, {_largest_float32():.4g}"
+            )
+            problems.error("value", span, label, "`numbers: float64` has room for it")
+        elif near == 0.0 and value != 0:
+            label = f"{_format_short(value)} is 0 in {number}"
+            problems.error("value", span, label, "`numbers: float64` tells it from 0")
+    check_ranges(automaton, problems)
+    for parameter in automaton.parameters.values():
+        for axis in parameter.table.axes if parameter.table else ():
+            points = [round_to_type(point, number) for point in axis.points]
+            if any(low >= high for low, high in itertools.pairwise(points)):
+                label = f"two points of the axis `{axis.name}` are one in {number}"
+                problems.error(
+                    "table", parameter.span, label, "`numbers: float64` tells them apart"
+                )
+    problems.raise_if_errors()
+
+
+def check_ranges(automaton: Automaton, problems: Problems) -> None:
+    """Report ranges that the type turns into an infinity."""
+    for thing in _ranged_declarations(automaton):
+        if any(math.isinf(round_to_type(bound, automaton.numbers)) for bound in thing.range or ()):
+            label = f"the range of `{thing.name}` goes beyond the largest {automaton.numbers}"
+            problems.error("value", thing.span, label, "`numbers: float64` has room for it")
+
+
+def _ranged_declarations(automaton: Automaton) -> Iterator[Input | State | Parameter]:
+    """Yield what an automaton, and the model that it knows, declare with a range."""
+    yield from automaton.inputs.values()
+    yield from automaton.state_variables.values()
+    yield from automaton.parameters.values()
+    if automaton.model:
+        yield from _ranged_declarations(automaton.model)
+
+
+def _numbers_in(part: object) -> Iterator[tuple[Fraction, Span]]:
+    """Yield every number below a part of a model, with its place."""
+    match part:
+        case NumberLiteral(value, _, span):
+            yield value, span
+        case Parameter(value=Fraction() as value, span=span):
+            yield value, span
+        case Input(default=Fraction() as default, span=span):
+            yield default, span
+        case Mapping():
+            for item in part.values():
+                yield from _numbers_in(item)
+        case tuple():
+            for item in part:
+                yield from _numbers_in(item)
+        case _ if dataclasses.is_dataclass(part) and not isinstance(part, type | Span):
+            for field in dataclasses.fields(part):
+                yield from _numbers_in(getattr(part, field.name))
+
+
+def _largest_float32() -> float:
+    return (2.0 - 2.0**-23) * 2.0**127
+
+
+def _format_short(value: Fraction) -> str:
+    return f"{float(value):.4g}"

@@ -1,0 +1,93 @@
+"""Check of values past their range: what an assignment may give beyond what its target may have.
+
+Looked at are values that are made of inputs alone: these may be anything within their ranges. How
+far a state gets is not known here, so what reads one gives no alarm; nor does a target with an
+`on_range`, a fault or a fallback of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from language.ir.number_type import round_to_type
+from language.ir.ops import Binary, Compare, Expr, real
+from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
+from language.model.automaton import Automaton, Mode
+from language.model.declaration import Formula, RangePolicy, State
+from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.query_engine import QueryEngine, Witness
+from language.text.diagnostic import Problems, SpecError
+
+STATE_PREFIXES = ("state.", "discrete.", "memory.")
+"""What is carried: how far it gets is not known."""
+
+
+def check_range_violations(
+    automaton: Automaton, query_engine: QueryEngine, problems: Problems
+) -> None:
+    """Warn of assignments that may give a value past the range of their target, with a witness."""
+    for mode in automaton.all_modes:
+        for formulas, guard in _assignments(mode):
+            for name, formula in formulas.items():
+                target = automaton.state_variables.get(name)
+                if target is None or not _is_checked(target):
+                    continue
+                try:
+                    found = _find_violation(automaton, mode, formula, guard, target, query_engine)
+                except (KeyError, SpecError):
+                    continue
+                if found:
+                    label = f"`{name}` may be past its range of {_format_range(target)} here"
+                    hint = f"at {found.text} in SI; limit the value with `clip`, or widen the range"
+                    problems.warning("past", formula.span, label, hint)
+
+
+def _assignments(mode: Mode) -> Iterator[tuple[Mapping[str, Formula], Formula | None]]:
+    """Yield what a mode assigns, with the guard that holds then."""
+    for formulas in (mode.entry, mode.exit, mode.update):
+        yield formulas, None
+    for transition in mode.transitions:
+        if not (transition.events or transition.is_completion):
+            yield transition.reset, transition.when
+
+
+def _is_checked(target: State) -> bool:
+    """Tell whether a range is that of a real value, and nothing more is said about leaving it."""
+    return (
+        target.range is not None and target.type == "real" and target.range_policy == RangePolicy()
+    )
+
+
+def _find_violation(
+    automaton: Automaton,
+    mode: Mode,
+    formula: Formula,
+    guard: Formula | None,
+    target: State,
+    query_engine: QueryEngine,
+) -> Witness | None:
+    snapshot = GuardSnapshot(automaton, mode)
+    conditions: list[Expr] = [snapshot.lower_expression(guard.tree)] if guard else []
+    snapshot.lower_expression(formula.tree)
+    value = lower_assigned_value(formula.tree, snapshot.bindings, target.type in WHOLE_TYPES)
+    assert target.range
+    low, high = (round_to_type(Fraction(bound), automaton.numbers) for bound in target.range)
+    if any(
+        name.startswith(STATE_PREFIXES)
+        for name in query_engine.build_query(snapshot.path, [value]).names_read
+    ):
+        return None
+    below, above = Compare("<", value, real(low)), Compare(">", value, real(high))
+    found = query_engine.answer(
+        query_engine.build_query(snapshot.path, [*conditions, Binary("or", below, above)])
+    )
+    return found if isinstance(found, Witness) else None
+
+
+def _format_range(target: State) -> str:
+    """Return a range in the unit of its declaration."""
+    assert target.range
+    unit = target.unit
+    low, high = (float((bound - unit.offset) / unit.factor) for bound in target.range)
+    return f"{low:.4g} to {high:.4g} {'' if unit.text == '1' else unit.text}".rstrip()

@@ -1,0 +1,71 @@
+"""Check of parallel regions: whole in each region, disjoint between them (rule 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.model.automaton import Automaton, Mode, Region
+from language.model.region_queries import region_equations
+from language.text.diagnostic import Problems, Span
+
+
+def check_regions(automaton: Automaton, problems: Problems) -> None:
+    """Report what only the chart may have, what a mode lacks, and what two regions write."""
+    labels: dict[str, Span] = {}
+    for mode in automaton.all_modes:
+        if mode.label in labels:
+            hint = f"it is given first at {labels[mode.label]}"
+            problems.error("duplicate", mode.span, f"two modes are called `{mode.label}`", hint)
+        labels.setdefault(mode.label, mode.span)
+    for region in automaton.regions:
+        for mode in region.modes.values():
+            _check_mode(region, mode, problems)
+    _check_writers(automaton, problems)
+
+
+def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
+    if region.inactive is not None and mode.equations:
+        return  # check_chart.py says that it has none
+    for what, thing in (("observer", mode.observer), ("runs", mode.run)):
+        if thing is not None:
+            label = f"`{what}` belongs to a mode of the chart, not to one of region `{region.name}`"
+            problems.error("form", thing.span, label)
+    for name in region_equations(region):
+        if name not in mode.equations:
+            label = f"`{name}` has no equation in mode `{mode.name}` of region `{region.name}`"
+            hint = "an equation stands at the root or in every mode of one region"
+            problems.error("missing", mode.span, label, hint)
+    flows = dict.fromkeys(name for other in region.modes.values() for name in other.flow)
+    for name in flows:
+        if name not in mode.flow:
+            label = f"`{name}` has no balance in mode `{mode.name}` of region `{region.name}`"
+            problems.error("missing", mode.span, label, f"`der({name}) = 0` keeps it")
+
+
+def _check_writers(automaton: Automaton, problems: Problems) -> None:
+    """One region defines, balances or assigns to a name, whatever the stage."""
+    for what in ("equation", "balance", "assignment"):
+        if automaton.statechart and what == "assignment":
+            continue
+        writers: dict[str, str] = {}
+        for region in automaton.all_regions:
+            for name, span in _written_names(region, what):
+                first = writers.setdefault(name, region.name)
+                if first != region.name:
+                    a = "a" if what == "balance" else "an"
+                    here = f"in region `{first}` and in region `{region.name}`"
+                    label = f"`{name}` has {a} {what} {here}"
+                    hint = "parallel regions write disjoint variables"
+                    problems.error("writer", span, label, hint)
+
+
+def _written_names(region: Region, what: str) -> Iterator[tuple[str, Span]]:
+    for mode in region.modes.values():
+        if what == "equation":
+            yield from ((name, formula.span) for name, formula in mode.equations.items())
+        elif what == "balance":
+            yield from ((name, balance.left.span) for name, balance in mode.flow.items())
+        else:
+            resets = [transition.reset for transition in mode.transitions]
+            for formulas in (mode.entry, mode.exit, mode.update, *resets):
+                yield from ((name, formula.span) for name, formula in formulas.items())

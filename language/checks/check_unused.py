@@ -1,0 +1,84 @@
+"""Check of what nobody reads and what nothing writes: warnings, it may be meant for later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.model.automaton import Automaton, Mode
+from language.model.names_read import names_read_by
+from language.text.diagnostic import Problems, suggest_name
+
+UNUSED_HINT = "make it an output, or remove it"
+
+
+def check_unused(automaton: Automaton, problems: Problems) -> None:
+    """Warn of parameters, inputs, states and equations without a reader, and of states without a
+    writer. What an automaton has from its model is looked at there.
+    """
+    model = automaton.model
+    read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
+    read |= {name for m in automaton.all_modes for way in m.transitions for name in way.events}
+    read |= {*_observer_names(automaton), *(_run_names(automaton) if model else ())}
+    for name, parameter in automaton.parameters.items():
+        if not (model and name in model.parameters) and name not in read:
+            hint = suggest_name(name, automaton.parameters.keys() - {name})
+            problems.warning("unused", parameter.span, f"parameter `{name}` is read nowhere", hint)
+    for name, thing in automaton.inputs.items():
+        if name not in read:
+            problems.warning("unused", thing.span, f"input `{name}` is read nowhere")
+    for name, state in automaton.state_variables.items():
+        if name not in read:
+            problems.warning("unused", state.span, f"state `{name}` is read nowhere", UNUSED_HINT)
+    _check_equations(automaton, read, problems)
+    _check_unwritten(automaton, problems)
+
+
+def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -> None:
+    reported = set()
+    for mode in automaton.all_modes:
+        for name, formula in mode.equations.items():
+            if name not in read and name not in reported:
+                reported.add(name)
+                label = f"equation `{name}` is read nowhere"
+                problems.warning("unused", formula.span, label, UNUSED_HINT)
+
+
+def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
+    written = {name for mode in automaton.all_modes for name in _written_names(automaton, mode)}
+    written |= {name for table in automaton.tables for name in table.assigned_names}
+    for name, state in automaton.state_variables.items():
+        if name not in written:
+            label = f"`{name}` is written nowhere: it keeps its start value"
+            problems.warning("unwritten", state.span, label, "declare it as a parameter")
+
+
+def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
+    """Yield what a mode or a transition out of it writes."""
+    for group in (mode.update, mode.entry, mode.exit, mode.flow):
+        yield from group
+    for transition in mode.transitions:
+        yield from transition.reset
+    if mode.observer:
+        yield from mode.observer.states
+    if mode.run and automaton.model:
+        yield from automaton.model.states
+
+
+def _observer_names(automaton: Automaton) -> Iterator[str]:
+    """Yield the inputs and states that observers name beside their formulas."""
+    for mode in automaton.modes.values():
+        if mode.observer:
+            yield from mode.observer.states
+            yield from mode.observer.inputs
+            yield from mode.observer.measures
+            if mode.observer.of and automaton.model:
+                yield from automaton.model.inputs
+            yield from (mode.observer.correct,) if mode.observer.correct else ()
+
+
+def _run_names(automaton: Automaton) -> Iterator[str]:
+    """Yield the inputs and states that runs share with the model by name."""
+    assert automaton.model
+    if any(mode.run for mode in automaton.modes.values()):
+        yield from automaton.model.inputs
+        yield from automaton.model.states

@@ -1,0 +1,34 @@
+"""Examine: what is not wrong but hardly meant - warnings of a checked automaton.
+
+It runs where a spec is checked, not where it is only used: what has errors never gets here.
+"""
+
+from __future__ import annotations
+
+from language.checks.check_chart_cycles import check_chart_cycles
+from language.checks.check_dead_transitions import (
+    check_close_waits,
+    check_dead_transitions,
+    check_stuck_modes,
+)
+from language.checks.check_instant_cycles import check_cycles
+from language.checks.check_range_violation import check_range_violations
+from language.checks.check_reachability import check_blocked_modes, check_final_modes
+from language.checks.check_zeno import check_zeno
+from language.model.automaton import Automaton
+from language.smt.query_engine import QueryEngine
+from language.text.diagnostic import Problems
+
+
+def check_warnings(automaton: Automaton, problems: Problems) -> None:
+    """Warn of what never fires or is never left, and of modes that change for ever."""
+    query_engine = QueryEngine(automaton)
+    dead_transitions = check_dead_transitions(automaton, query_engine, problems)
+    check_blocked_modes(automaton, dead_transitions, problems)
+    check_stuck_modes(automaton, dead_transitions, problems)
+    check_final_modes(automaton, problems)
+    check_close_waits(automaton, query_engine, problems)
+    check_cycles(automaton, problems)
+    check_chart_cycles(automaton, query_engine, problems)
+    check_zeno(automaton, query_engine, problems)
+    check_range_violations(automaton, query_engine, problems)

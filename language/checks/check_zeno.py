@@ -1,0 +1,162 @@
+"""Check of chatter: modes that can change infinitely often in a finite time (rule 12).
+
+A point is looked for at which each flow of a way round makes the next guard true at once, and the
+resets change nothing: a Zeno equilibrium (Lamperski and Ames, IEEE TAC 58 (2013), section III). A
+bouncing ball has one where it rests, a thermostat with one limit at that limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from language.checks.check_instant_cycles import Cycle, instant_transitions
+from language.expressions.syntax_tree import FunctionCall, walk
+from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value, multiply, real, subtract
+from language.model.automaton import Automaton, Transition
+from language.smt.guard_snapshot import GuardSnapshot, SymbolicPath
+from language.smt.lie_derivative import LieDerivative, UnknownRateError
+from language.smt.query import SolverQuery
+from language.smt.query_engine import QueryEngine, Witness
+from language.text.diagnostic import Problems, SpecError
+
+TIMED_FUNCTIONS = ("after", "every", "rising", "falling", "changed", "delay")
+"""Functions by which a guard needs time, or an earlier instant."""
+EQUALITY_TOLERANCE = 1.0e-9
+"""Relative; a witness lies on a boundary up to rounding, which z3 finds exactly."""
+SECANT_STEP = 1.0e-3
+"""Relative; how far beside the point resets are tried: the step of a secant."""
+NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+
+
+def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
+    """Warn of ways to a mode and back that can be taken infinitely often in a finite time."""
+    for cycle in _two_mode_cycles(automaton):
+        try:
+            witness = _find_zeno_equilibrium(automaton, cycle, query_engine)
+        except (KeyError, SpecError, UnknownRateError):
+            continue
+        if witness:
+            path = " -> ".join(f"`{each.source}`" for each in (*cycle, cycle[0]))
+            label = f"here the modes can change infinitely often in a finite time: {path}"
+            hint = f"at {witness.text} each flow leads back at once; "
+            hint += "leave a distance between the limits (a hysteresis), or let one of them wait"
+            problems.warning("zeno", cycle[0].when.span, label, hint)
+
+
+def _two_mode_cycles(automaton: Automaton) -> Iterator[Cycle]:
+    """Yield the transitions that lead back to their source, and pairs there and back."""
+    if automaton.is_sampled or automaton.regions:
+        return
+    quick = [way for way in instant_transitions(automaton) if not _is_timed(way)]
+    for place, first in enumerate(quick):
+        if first.source == first.target:
+            yield (first,)
+            continue
+        for second in quick[place + 1 :]:
+            if (first.source, first.target) == (second.target, second.source):
+                yield first, second
+
+
+def _is_timed(transition: Transition) -> bool:
+    parts = (part for part in walk(transition.when.tree) if isinstance(part, FunctionCall))
+    return any(part.function in TIMED_FUNCTIONS for part in parts)
+
+
+def _find_zeno_equilibrium(
+    automaton: Automaton, cycle: Cycle, query_engine: QueryEngine
+) -> Witness | None:
+    """Return a point that the flows and resets of a way round lead to for ever, if there is one."""
+    path = SymbolicPath()
+    start = snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
+    exact: list[Expr] = []
+    near: list[Expr] = []
+    assigned: dict[str, Expr] = {}
+    for transition in cycle:
+        guard = snapshot.lower_expression(transition.when.tree)
+        becoming = _EnablingCondition(snapshot)
+        exact.append(becoming.condition_for(guard, True))
+        near.append(_relax_equalities(exact[-1]))
+        after = snapshot.apply_transition(transition)
+        for state in automaton.states:
+            if after.bindings[state] != start.bindings[state]:
+                known = start.bindings[state]
+                assigned.update(
+                    {known.name: after.bindings[state]} if isinstance(known, Ref) else {}
+                )
+                same = Compare("==", after.bindings[state], start.bindings[state])
+                exact.append(same)
+                near.append(_relax_equalities(same))
+        snapshot = after
+    found = query_engine.find_confirmed_witness(
+        query_engine.build_query(path, exact), query_engine.build_query(path, near)
+    )
+    return (
+        found
+        if found and _is_contracting(assigned, query_engine.build_query(path, near), found)
+        else None
+    )
+
+
+def _is_contracting(assigned: Mapping[str, Expr], query: SolverQuery, witness: Witness) -> bool:
+    """Tell whether resets bring a state nearer to the point: a bounce without loss does not."""
+    for name, value in assigned.items():
+        place = float(witness.valuation.get(name, 0.0))
+        moved = place + SECANT_STEP * (1.0 + abs(place))
+        beside = query.value_at({**witness.valuation, name: moved}, value)
+        here = query.value_at(witness.valuation, value)
+        if abs(beside - here) >= (1.0 - EQUALITY_TOLERANCE) * abs(moved - place):
+            return False
+    return True
+
+
+class _EnablingCondition:
+    """What makes a condition true now, or at once along the flow of a moment's mode."""
+
+    def __init__(self, snapshot: GuardSnapshot) -> None:
+        self.snapshot = snapshot
+        self.lie_derivative = LieDerivative(snapshot)
+
+    def condition_for(self, condition: Expr, is_true: bool) -> Expr:
+        match condition:
+            case Unary("not", operand):
+                return self.condition_for(operand, not is_true)
+            case Binary("and" | "or" as operator, left, right):
+                sides = self.condition_for(left, is_true), self.condition_for(right, is_true)
+                return Binary("and" if (operator == "and") == is_true else "or", *sides)
+            case Compare(operator, left, right) if operator not in ("==", "!="):
+                relation = operator if is_true else NEGATED_RELATION[operator]
+                return self._relation(relation, left, right)
+            case Ref(name):
+                found = next(
+                    (v for target, v in self.snapshot.path.assignments if target == name), None
+                )
+                if found is not None:
+                    return self.condition_for(found, is_true)
+        return condition if is_true else Unary("not", condition)
+
+    def _relation(self, operator: str, left: Expr, right: Expr) -> Expr:
+        """Sides are apart; or they are equal and move apart, or begin to."""
+        larger, smaller = (left, right) if operator in (">", ">=") else (right, left)
+        now = Compare(">", larger, smaller)
+        first = self.lie_derivative.differentiate(subtract(larger, smaller))
+        zero = real(0.0)
+        if isinstance(first, Value):
+            return now
+        moving: Expr = Compare(">", first, zero)
+        second = self.lie_derivative.differentiate(first)
+        if not isinstance(second, Value):
+            begun = Binary("and", Compare("==", first, zero), Compare(">", second, zero))
+            moving = Binary("or", moving, begun)
+        return Binary("or", now, Binary("and", Compare("==", larger, smaller), moving))
+
+
+def _relax_equalities(condition: Expr) -> Expr:
+    """Return a condition in which real sides that have to be equal are so up to rounding."""
+    match condition:
+        case Binary("and" | "or" as operator, left, right):
+            return Binary(operator, _relax_equalities(left), _relax_equalities(right))
+        case Compare("==", left, right) if not isinstance(left, Ref) or not left.is_integer:
+            size = Binary("+", real(1.0), Call("abs", (right,)))
+            apart = Call("abs", (subtract(left, right),))
+            return Compare("<=", apart, multiply(real(EQUALITY_TOLERANCE), size))
+    return condition

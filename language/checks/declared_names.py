@@ -1,0 +1,104 @@
+"""Declared: the kinds of value that declarations say, and each name once."""
+
+from __future__ import annotations
+
+from language.checks.check_single_writer import equation_names_of
+from language.expressions.name_rules import report_case_collisions
+from language.model.automaton import Automaton
+from language.model.declaration import Input, Parameter, State
+from language.model.system import SystemInput
+from language.text.diagnostic import Problems, Span
+from language.typecheck.types import EnumType, ExprType, IntType
+
+BUILTIN_NAMES = ("mode", "faults")
+
+
+def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprType:
+    """Return the kind that a declaration says; a whole number lies in its range."""
+    if declaration.type == "bool":
+        return "truth"
+    if declaration.type == "enum":
+        return EnumType(declaration.values)
+    if declaration.type == "int":
+        if (
+            isinstance(declaration, Parameter)
+            and declaration.kind == "fixed"
+            and declaration.value is not None
+        ):
+            return IntType(int(declaration.value), int(declaration.value))
+        limits = getattr(declaration, "range", None)
+        return IntType(int(limits[0]), int(limits[1])) if limits else IntType()
+    return declaration.unit.dimension
+
+
+def declared_names(
+    automaton: Automaton, problems: Problems
+) -> tuple[dict[str, ExprType], dict[str, ExprType]]:
+    """Return the kinds of all names that are declared, and of the names in enumerations."""
+    declared = _DeclarationTable(automaton, problems)
+    declared.declare()
+    return declared.kinds, declared.literal_kinds
+
+
+class _DeclarationTable:
+    """What was declared so far, and where each name was given first."""
+
+    def __init__(self, automaton: Automaton, problems: Problems) -> None:
+        self.automaton = automaton
+        self.problems = problems
+        self.kinds: dict[str, ExprType] = {}
+        self.literal_kinds: dict[str, ExprType] = {}
+        self.first_spans: dict[str, Span] = {}
+
+    def declare(self) -> None:
+        automaton = self.automaton
+        groups = (automaton.parameters, automaton.inputs, automaton.state_variables)
+        for group in groups:
+            for name, thing in group.items():
+                self._declare_name(name, declared_kind(thing), thing.span)
+        for group in groups:
+            for thing in group.values():
+                if thing.values:
+                    self._declare_literals(thing)
+        for name in equation_names_of(automaton.all_modes):
+            for mode in automaton.all_modes:
+                if name in mode.equations:
+                    self._report_clash(name, mode.equations[name].span)
+                    break
+        for region in automaton.regions:
+            self._report_clash(region.name, region.span)
+        self._report_case_twins()
+
+    def _report_case_twins(self) -> None:
+        automaton = self.automaton
+        named = list(self.first_spans.items())
+        for mode in automaton.all_modes:
+            named += [(name, formula.span) for name, formula in mode.equations.items()]
+        report_case_collisions(named, self.problems)
+        report_case_collisions([(m.name, m.span) for m in automaton.all_modes], self.problems)
+
+    def _declare_name(self, name: str, kind: ExprType, span: Span) -> None:
+        self._report_clash(name, span)
+        self.kinds[name] = kind
+        self.first_spans.setdefault(name, span)
+
+    def _declare_literals(self, declaration: Parameter | Input | State) -> None:
+        """The names of an enumeration are known; two that share a name have the same list."""
+        kind = EnumType(declaration.values)
+        for value in declaration.values:
+            known = self.kinds.get(value)
+            if known is None:
+                self.kinds[value] = kind
+                self.first_spans[value] = declaration.span
+                self.literal_kinds[value] = kind
+            elif known != kind or value not in self.literal_kinds:
+                self._report_clash(value, declaration.span)
+
+    def _report_clash(self, name: str, span: Span) -> None:
+        if name in self.first_spans:
+            hint = f"it is given first at {self.first_spans[name]}"
+            self.problems.error(
+                "duplicate", span, f"`{name}` is already the name of something", hint
+            )
+        elif name in BUILTIN_NAMES:
+            self.problems.error("name", span, f"`{name}` is a word of the language")

@@ -1,0 +1,1 @@
+"""Expressions: units, syntax trees, parser, symbolic simplification and derivatives."""

@@ -1,0 +1,133 @@
+"""Build: the tree of an expression from its shape and its tokens, each part with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from language.expressions.number_literal import parse_number_literal, parse_quantity_literal
+from language.expressions.syntax_tree import (
+    Arithmetic,
+    BoolLiteral,
+    Conditional,
+    FunctionCall,
+    Logic,
+    Name,
+    Negation,
+    Not,
+    NumberLiteral,
+    Power,
+    Relation,
+    SyntaxTree,
+)
+from language.expressions.token_shape import ParsedShape, ParseShape
+from language.text.diagnostic import Problems, Span, SpecError
+
+MAX_POWER = 8
+
+
+def build_trees(parsed: ParsedShape, span: Span) -> tuple[SyntaxTree, ...]:
+    """Return the tree of an expression, or both sides of a balance; `span` is that of the text.
+
+    Raises SpecError for a number, a unit or a power that is none.
+    """
+    builder = _AstBuilder(parsed, span)
+    return tuple(builder.build_part(part) for part in parsed.shape[1])
+
+
+class _AstBuilder:
+    """From shapes to trees; a part is a tree, or the number of a token."""
+
+    def __init__(self, parsed: ParsedShape, span: Span) -> None:
+        self.texts = parsed.texts
+        self.starts = parsed.offsets
+        self.span = span
+
+    def build_part(self, shape: ParseShape | int) -> Any:
+        if isinstance(shape, int):
+            return shape
+        return BUILDERS[shape[0]](self, [self.build_part(part) for part in shape[1]])
+
+    def token_span(self, token: int) -> Span:
+        """Return the place of a token."""
+        return self.text_span(self.starts[token], len(self.texts[token]))
+
+    def text_span(self, start: int, width: int) -> Span:
+        """Return the place of a part of the text, which has at least one character."""
+        span = self.span
+        return span if span.is_atomic else Span(span.source, span.line, span.column + start, width)
+
+    def joined_span(self, first: Any, last: Any) -> Span:
+        """Return the place from one part to another."""
+        start = self.token_span(first) if isinstance(first, int) else first.span
+        end = self.token_span(last) if isinstance(last, int) else last.span
+        return Span(start.source, start.line, start.column, end.column + end.width - start.column)
+
+
+def _build_name(builder: _AstBuilder, parts: list[int]) -> SyntaxTree:
+    first, last = parts[0], parts[-1]
+    path = builder.texts[first] if first == last else ".".join(builder.texts[k] for k in parts)
+    start, end = builder.starts[first], builder.starts[last] + len(builder.texts[last])
+    return Name(path, builder.text_span(start, end - start))
+
+
+def _build_call(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    name, *arguments, close = parts
+    return FunctionCall(name.path, tuple(arguments), builder.joined_span(name, close))
+
+
+def _build_negation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    minus, operand = parts
+    if isinstance(operand, NumberLiteral) and operand.unit.offset:
+        below = 2 * operand.unit.offset - operand.value
+        return NumberLiteral(below, operand.unit, operand.span)
+    return Negation(operand, builder.joined_span(minus, operand))
+
+
+def _build_power(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    base, token = parts
+    exponent = int(builder.texts[token])
+    if abs(exponent) > MAX_POWER:
+        problems = Problems()
+        label = f"a power is at most {MAX_POWER}"
+        problems.error("power", builder.token_span(token), label, "multiply two powers: `x^8 * x`")
+        raise SpecError(problems.reported)
+    return Power(base, exponent, builder.joined_span(base, token))
+
+
+def _build_arithmetic(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    left, operator, right = parts
+    return Arithmetic(builder.texts[operator], left, right, builder.joined_span(left, right))
+
+
+def _build_relation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    left, operator, right = parts
+    return Relation(builder.texts[operator], left, right, builder.joined_span(left, right))
+
+
+def _build_conditional(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    condition, then, other = parts
+    return Conditional(condition, then, other, builder.joined_span(condition, other))
+
+
+BUILDERS: Mapping[str, Callable[[_AstBuilder, list[Any]], SyntaxTree]] = {
+    "number": lambda build, parts: parse_number_literal(
+        build.texts[parts[0]], build.token_span(parts[0])
+    ),
+    "quantity": lambda build, parts: parse_quantity_literal(
+        build.texts[parts[0]], build.token_span(parts[0])
+    ),
+    "true": lambda build, parts: BoolLiteral(True, build.token_span(parts[0])),
+    "false": lambda build, parts: BoolLiteral(False, build.token_span(parts[0])),
+    "path": _build_name,
+    "call": _build_call,
+    "negative": _build_negation,
+    "not_": lambda build, parts: Not(parts[1], build.joined_span(*parts)),
+    "power_of": _build_power,
+    "binary": _build_arithmetic,
+    "compare": _build_relation,
+    "or_": lambda build, parts: Logic("or", parts[0], parts[1], build.joined_span(*parts)),
+    "and_": lambda build, parts: Logic("and", parts[0], parts[1], build.joined_span(*parts)),
+    "select": _build_conditional,
+}
+"""What each rule of the grammar makes of its parts."""

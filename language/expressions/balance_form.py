@@ -1,0 +1,37 @@
+"""Balance: the coefficient of the one der(x) on the left side of `coefficient * der(x) = ...`."""
+
+from __future__ import annotations
+
+from language.expressions.syntax_tree import Arithmetic, FunctionCall, Name, SyntaxTree, walk
+from language.text.diagnostic import Problems, SpecError
+
+
+def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | None:
+    """Return the factor of der(state) on the left side of a balance, None where it is 1."""
+    if isinstance(left, FunctionCall) and left.function == "der":
+        return None if _is_derivative(left, state) else _balance_error(left, state)
+    if isinstance(left, Arithmetic) and left.operator == "*":
+        if isinstance(left.right, FunctionCall) and _is_derivative(left.right, state):
+            return left.left if not _has_derivative(left.left) else _balance_error(left, state)
+        if isinstance(left.left, FunctionCall) and _is_derivative(left.left, state):
+            return left.right if not _has_derivative(left.right) else _balance_error(left, state)
+    return _balance_error(left, state)
+
+
+def _is_derivative(tree: FunctionCall, state: str) -> bool:
+    match tree:
+        case FunctionCall("der", (Name(path, _),), _):
+            return path == state
+        case _:
+            return False
+
+
+def _has_derivative(tree: SyntaxTree) -> bool:
+    return any(isinstance(part, FunctionCall) and part.function == "der" for part in walk(tree))
+
+
+def _balance_error(left: SyntaxTree, state: str) -> SpecError:
+    problems = Problems()
+    label = f"the left side is `coefficient * der({state})` with der once"
+    problems.error("balance", left.span, label)
+    return SpecError(problems.reported)

@@ -1,0 +1,88 @@
+"""Names: what is a name, and which names cannot stand beside each other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import resources
+
+from language.expressions.migration_hints import increment_hint
+from language.text.diagnostic import Problems, Span
+
+C_MACRO_PATTERN = re.compile(
+    r"INFINITY|NAN|HUGE_VAL[FL]?|MATH_ERR\w*|math_errhandling|FP_\w+|(DBL|FLT|LDBL)_\w+|DECIMAL_DIG"
+    r"|U?INT\w*_(MAX|MIN|C)|(PTRDIFF|SIZE|WCHAR|WINT|SIG_ATOMIC)_(MAX|MIN)|NULL|errno|M_(E|PI\w*)"
+)
+"""Macros of the headers that generated code includes."""
+
+FILE_WORDS = frozenset({"main", "ha_math", "float", "math", "stdint", "stdbool", "string"})
+"""Names of files beside which an automaton's own files would stand."""
+
+DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
+"""File names that Windows keeps for devices, whatever their ending."""
+
+
+@cache
+def reserved_words() -> Mapping[str, frozenset[str]]:
+    """Return the words by language: GRAMMAR, YAML, C, C++, A2L, GENERATED."""
+    text = resources.files("language").joinpath("reserved.txt").read_text("utf-8")
+    sections: dict[str, frozenset[str]] = {}
+    for section in text.split("\n[")[1:]:
+        head, _, words = section.partition("\n")
+        sections[head.partition("]")[0]] = frozenset(words.split())
+    return sections
+
+
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+
+COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
+
+
+def check_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name that is not one: docs/language.md, "Names, numbers, units"."""
+    words = reserved_words()
+    another = f"another name, like `{name}_1`"
+    if not NAME_PATTERN.fullmatch(name):
+        hint = COMMA_HINT if ")" in name else increment_hint(name)
+        hint = hint or "a letter, then at most 30 letters, digits or `_`"
+        problems.error("name", span, f"`{name}` is not a name", hint)
+    elif name in words["GRAMMAR"]:
+        problems.error("name", span, f"`{name}` is a word of the language", another)
+    elif name.lower() in words["YAML"]:
+        label = f"`{name}` means something else to other YAML tools: they read true, false or null"
+        problems.error("name", span, label, another)
+    elif name in words["GENERATED"]:
+        label = f"`{name}` has a meaning of its own in generated code"
+        problems.error("name", span, label, another)
+    else:
+        for language in ("C", "C++", "A2L"):
+            if name in words[language] or (language == "C" and C_MACRO_PATTERN.fullmatch(name)):
+                label = f"`{name}` is a word of {language}, and generated files keep the names"
+                problems.error("name", span, label, another)
+                return
+
+
+def check_region_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name of a region or instance: in C it is a part of names, or a member."""
+    if name != "main":
+        check_name(name, span, problems)
+
+
+def check_file_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name of an automaton that cannot be the name of its files."""
+    check_name(name, span, problems)
+    if name.lower() in FILE_WORDS or DEVICE_NAME_PATTERN.fullmatch(name):
+        label = f"an automaton is not called `{name}`: that is another file"
+        problems.error("name", span, label, f"another name, like `{name}_1`")
+
+
+def report_case_collisions(names: Iterable[tuple[str, Span]], problems: Problems) -> None:
+    """Report names that differ in case only: many tools for A2L and CSV do not tell them apart."""
+    first: dict[str, tuple[str, Span]] = {}
+    for name, span in names:
+        other, place = first.setdefault(name.lower(), (name, span))
+        if other != name:
+            label = f"`{name}` and `{other}` differ in case only"
+            hint = f"`{other}` is at {place}; tools for A2L and tables take them for one"
+            problems.error("duplicate", span, label, hint)

@@ -1,0 +1,100 @@
+"""Quantity: the text of a number, with or without a unit, to its exact value."""
+
+from __future__ import annotations
+
+import re
+import sys
+from fractions import Fraction
+from functools import lru_cache
+
+from language.expressions.syntax_tree import NumberLiteral
+from language.expressions.units import NO_UNIT, UNIT_PATTERN, Unit, UnitError, parse_unit, unit_hint
+from language.text.diagnostic import Problems, Span, SpecError
+
+UNIT_HINT = "a unit is written like `W`, `N*m`, `1/s`, a product with `*`: `2 * x`"
+DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
+PLAIN_DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?")
+QUANTITY_PATTERN = re.compile(rf"{DECIMAL_PATTERN.pattern} {UNIT_PATTERN.pattern}")
+MAX_QUANTITY = Fraction(sys.float_info.max)
+MAX_EXPONENT = 330
+"""Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
+
+
+def parse_number_literal(text: str, span: Span) -> NumberLiteral:
+    """Return a number without a unit. Raises SpecError."""
+    return NumberLiteral(
+        _require_in_range(parse_decimal_literal(text, span), text, span), NO_UNIT, span
+    )
+
+
+def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
+    """Return a number with a unit behind a blank. Raises SpecError."""
+    digits, _, unit_text = text.partition(" ")
+    value = parse_decimal_literal(digits, span.subspan(0, len(digits)))
+    unit = _parse_unit(unit_text, span.subspan(len(digits) + 1, len(unit_text)))
+    return NumberLiteral(
+        _require_in_range(value * unit.factor + unit.offset, text, span), unit, span
+    )
+
+
+def parse_decimal_literal(text: str, span: Span) -> Fraction:
+    """Return the exact value of a decimal literal. Raises SpecError for other forms."""
+    if PLAIN_DECIMAL_PATTERN.fullmatch(text):
+        return _to_fraction(text)
+    problems = Problems()
+    if re.fullmatch(r"\d+[eE][-+]?\d+", text):
+        digits, exponent = re.split("[eE]", text)
+        hint = f"write `{digits}.0e{exponent}`: other YAML tools read `{text}` as a text"
+        problems.error("number", span, f"`{text}` has an exponent but no point", hint)
+    elif re.fullmatch(r"0\d+.*", text):
+        shorter = re.sub(r"^0+(?=\d)", "", text)
+        hint = f"write `{shorter}`: other YAML tools read `{text}` as octal"
+        problems.error("number", span, f"`{text}` starts with a zero", hint)
+    elif not DECIMAL_PATTERN.fullmatch(text):
+        hint = _missing_blank_hint(text) or "write it as `1.0e-3` or `12.5`"
+        problems.error("number", span, f"`{text}` is not a number", hint)
+    elif abs(_exponent_of(text)) > MAX_EXPONENT:
+        problems.error("number", span, f"`{text}` is out of the range of a double")
+    problems.raise_if_errors()
+    return _to_fraction(text)
+
+
+@lru_cache(maxsize=4096)
+def _to_fraction(text: str) -> Fraction:
+    return Fraction(text)
+
+
+def _missing_blank_hint(text: str) -> str:
+    """Return how `100ms` is written, or an empty text where this is no number before a unit."""
+    found = re.fullmatch(r"([0-9.]+?)\.?([A-Za-z].*)", text)
+    if not found or not DECIMAL_PATTERN.fullmatch(found[1]):
+        return ""
+    try:
+        parse_unit(found[2])
+    except UnitError:
+        return ""
+    return f"one blank stands before the unit: `{found[1]} {found[2]}`"
+
+
+def _require_in_range(value: Fraction, text: str, span: Span) -> Fraction:
+    if abs(value) > MAX_QUANTITY:
+        problems = Problems()
+        label = f"`{text}` is out of the range of a double"
+        problems.error("number", span, label)
+        raise SpecError(problems.reported)
+    return value
+
+
+def _exponent_of(text: str) -> int:
+    parts = re.split("[eE]", text)
+    return int(parts[1]) if len(parts) == 2 else 0
+
+
+def _parse_unit(text: str, span: Span) -> Unit:
+    try:
+        return parse_unit(text)
+    except UnitError as error:
+        problems = Problems()
+        hint = unit_hint(text) or UNIT_HINT
+        problems.error("unit", span, str(error), hint)
+        raise SpecError(problems.reported) from None

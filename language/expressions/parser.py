@@ -1,0 +1,117 @@
+"""Parse: the text of an expression or balance to its tree, or a problem at the right place."""
+
+from __future__ import annotations
+
+import re
+
+import lark
+
+from language.expressions.ast_builder import build_trees
+from language.expressions.migration_hints import increment_hint
+from language.expressions.name_rules import COMMA_HINT
+from language.expressions.number_literal import (
+    DECIMAL_PATTERN,
+    QUANTITY_PATTERN,
+    parse_number_literal,
+    parse_quantity_literal,
+)
+from language.expressions.syntax_tree import Name, SyntaxTree, depth
+from language.expressions.token_shape import parse_shape
+from language.text.diagnostic import Problems, Span, SpecError
+from language.text.document import ScalarNode
+
+FOREIGN_OPERATORS = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not", "~": "not"}
+"""Operators of other languages, and how they are written here."""
+
+SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+KEYWORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
+MAX_EXPRESSION_LENGTH = 2000
+"""Longest expression read; longer ones want an equation of their own."""
+MAX_DEPTH = 100
+"""Deepest tree: a sum of 100 terms; more want an equation of their own."""
+
+
+def parse_expression(scalar: ScalarNode) -> SyntaxTree:
+    """Parse an expression. Raises SpecError with the place inside the text."""
+    (tree,) = _parse(scalar, "expression")
+    return tree
+
+
+def parse_balance(scalar: ScalarNode) -> tuple[SyntaxTree, SyntaxTree]:
+    """Parse `left = right`. Raises SpecError with the place inside the text."""
+    left, right = _parse(scalar, "balance")
+    return left, right
+
+
+def _parse(scalar: ScalarNode, start_rule: str) -> tuple[SyntaxTree, ...]:
+    text, span = scalar.text, scalar.text_span
+    problems = Problems()
+    if len(text) > MAX_EXPRESSION_LENGTH:
+        problems.error("expression", span, f"an expression of {len(text)} characters is too long")
+    if "\n" in text:
+        problems.error("expression", span, "an expression stands on one line")
+    problems.raise_if_errors()
+    simple = _parse_simple(text, span) if start_rule == "expression" else None
+    if simple is not None:
+        return (simple,)
+    try:
+        shape = parse_shape(text, start_rule)
+        trees = build_trees(shape, span)
+        if shape.depth <= MAX_DEPTH or all(depth(tree) <= MAX_DEPTH for tree in trees):
+            return trees
+        problems.error("expression", span, "the expression is nested too deeply")
+    except lark.exceptions.UnexpectedInput as error:
+        problems.error("expression", *_explain_syntax_error(text, span, start_rule, error))
+    except RecursionError:
+        problems.error("expression", span, "the expression is nested too deeply")
+    raise SpecError(problems.reported)
+
+
+def _parse_simple(text: str, span: Span) -> SyntaxTree | None:
+    """Return a name or a literal without the parser: most values of a spec are one."""
+    if SIMPLE_NAME.fullmatch(text) and text not in KEYWORDS:
+        return Name(text, span.subspan(0, len(text)))
+    if DECIMAL_PATTERN.fullmatch(text):
+        return parse_number_literal(text, span.subspan(0, len(text)))
+    if QUANTITY_PATTERN.fullmatch(text) and text.partition(" ")[2] not in KEYWORDS:
+        return parse_quantity_literal(text, span.subspan(0, len(text)))
+    return None
+
+
+def _explain_syntax_error(
+    text: str, span: Span, start_rule: str, error: lark.exceptions.UnexpectedInput
+) -> tuple[Span, str, str]:
+    column = getattr(error, "column", 0)
+    token = str(getattr(error, "token", "")) or ""
+    ended = (
+        getattr(getattr(error, "token", None), "type", "") == "$END"
+        or column < 1
+        or (not token and column > len(text))
+        or token == "$END"
+    )
+    place = span.subspan(len(text)) if ended else span.subspan(column - 1, len(token))
+    if start_rule == "balance" and "=" not in text:
+        return span, "a balance is `coefficient * der(x) = ...`", ""
+    if text.count("(") > text.count(")"):
+        return place, "a `(` is not closed", COMMA_HINT
+    if ended or not text.strip():
+        return place, "the expression ends too early", ""
+    rest = text[column - 1 :]
+    if rest.startswith("[") and text.endswith("]"):
+        label = "a condition stands without brackets"
+        return span.subspan(0, len(text)), label, f"it is written `{text[1:-1].strip()}`"
+    if re.match(r"(\+\+|--|[-+*/]=)", text[max(column - 2, 0) :]) or rest.startswith("+="):
+        return place, f"`{rest.split(' ')[0][:20]}` was not expected here", increment_hint(text)
+    if token in ("<", "<=", ">", ">=", "==", "!="):
+        return place, "one relation only", "write `a < b and b < c`"
+    for foreign, ours in FOREIGN_OPERATORS.items():
+        at = text.find(foreign, max(column - 2, 0), column - 1 + len(foreign))
+        if at >= 0:
+            label = f"`{foreign}` is not part of an expression"
+            return span.subspan(at, len(foreign)), label, f"it is written `{ours}`"
+    if rest.startswith("="):
+        return place, "`=` is not part of an expression", "equality is written `==`"
+    hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
+    if re.match(r",\d", rest):
+        hint = "a decimal point is a point: `12.5`"
+    return place, f"`{rest.split(' ')[0][:20]}` was not expected here", hint

@@ -1,0 +1,235 @@
+"""Units: a unit's text to its factor, dimension and power of the angle, exactly."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+from language.expressions.unit_symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
+
+CELSIUS_OFFSET = Fraction(27315, 100)
+"""0 degC in kelvin."""
+
+MECHANICAL_NAMES: dict[tuple[int, ...], str] = {
+    (2, 1, -2): "N*m",
+    (2, 1, -1): "N*m*s",
+    (1, 1, -2): "N",
+    (2, 1, -3): "W",
+    (-1, 1, -2): "Pa",
+    (2, 1, 0): "kg*m^2",
+}
+"""How dimensions of mechanics are shown: powers of m, kg, s."""
+COMMON_NAMES: dict[tuple[int, ...], str] = {
+    (2, 1, -3, -1, 0): "V",
+    (2, 1, -3, -2, 0): "ohm",
+    (-2, -1, 3, 2, 0): "A/V",
+    (2, 1, -2, -2, 0): "V*s/A",
+    (-2, -1, 4, 2, 0): "A*s/V",
+    (0, 0, 1, 1, 0): "A*s",
+    (2, 1, -2, -1, 0): "N*m/A",
+    (1, 1, -3, -1, 0): "V/m",
+    (2, 1, -4, -1, 0): "V/s",
+    (0, 1, -2, 0, 0): "N/m",
+    (2, 1, -2, 0, -1): "N*m/K",
+    (2, 1, -3, 0, -1): "W/K",
+    (-2, -1, 3, 0, 1): "K/W",
+    (-1, 1, -3, 0, 0): "Pa/s",
+}
+"""Further common names, for readers alone: powers of m, kg, s, A, K. Programs do without them."""
+
+UNIT_PATTERN = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
+FACTOR_PATTERN = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Exponents of m, kg, s, A, K; `angle` is the power of the angle, None where it is free."""
+
+    powers: tuple[int, ...] = (0, 0, 0, 0, 0)
+    angle: int | None = 0
+
+    @property
+    def is_number(self) -> bool:
+        """Tell whether this is a pure number: no dimension and no angle."""
+        return not any(self.powers) and self.angle == 0
+
+    @property
+    def is_dimensionless(self) -> bool:
+        """Tell whether there is no dimension, whatever the angle."""
+        return not any(self.powers)
+
+    @property
+    def display_name(self) -> str:
+        """The dimension for readers: by its common name where it has one."""
+        return DISPLAY_NAMES.get(str(self), str(self))
+
+    def __str__(self) -> str:
+        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown."""
+        if not self.powers:
+            return "?"
+        known = MECHANICAL_NAMES.get(self.powers[:3])
+        if known and not any(self.powers[3:]):
+            angle = self.angle or 0
+            return known + {0: "", 1: "*rad", -1: "/rad"}.get(angle, f"*rad^{angle}")
+        parts = list(zip(BASE_SYMBOLS, self.powers, strict=True))
+        parts.insert(0, ("rad", self.angle or 0))
+        over = [_format_power(name, power) for name, power in parts if power > 0]
+        under = [_format_power(name, -power) for name, power in parts if power < 0]
+        return "*".join(over or ["1"]) + "".join(f"/{name}" for name in under)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in SI = factor * value + offset."""
+
+    text: str
+    factor: Fraction
+    dimension: Dimension
+    offset: Fraction = Fraction(0)
+
+
+class UnitError(ValueError):
+    """The text is not a unit; the message says why."""
+
+
+PURE_NUMBER = Dimension()
+UNKNOWN_DIMENSION = Dimension((), None)
+"""What is in a unit that was reported: it fits everything, so that nothing is reported twice."""
+SECOND = Dimension((0, 0, 1, 0, 0))
+NO_UNIT = Unit("1", Fraction(1), PURE_NUMBER)
+UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN_DIMENSION)
+
+
+def _format_power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"
+
+
+DISPLAY_NAMES = {str(Dimension(powers)): text for powers, text in COMMON_NAMES.items()}
+
+
+def display_unit(text: str) -> str:
+    """Return how a unit of a Program is shown: by its common name where it has one."""
+    return DISPLAY_NAMES.get(text, text)
+
+
+@cache
+def parse_unit(text: str) -> Unit:
+    """Return the unit written as `N*m*s/rad`, `1/s`, `kg*m^2`. Raises UnitError."""
+    if text == "1":
+        return NO_UNIT
+    if not UNIT_PATTERN.fullmatch(text):
+        raise UnitError(f"`{text}` is not written as a unit")
+    body = text.removeprefix("1/")
+    sign = -1 if body != text else 1
+    factor, powers, angle = Fraction(1), [0] * len(BASE_SYMBOLS), 0
+    for operator, symbol, exponent in FACTOR_PATTERN.findall(body):
+        if symbol not in SYMBOLS:
+            raise UnitError(f"`{symbol}` is not a unit")
+        power = int(exponent or 1) * (-1 if operator == "/" else sign)
+        sign = 1
+        value, base, turn = SYMBOLS[symbol]
+        factor *= value**power
+        powers = [old + power * new for old, new in zip(powers, base, strict=True)]
+        angle += power * turn
+    offset = CELSIUS_OFFSET if text == "degC" else Fraction(0)
+    return Unit(text, factor, Dimension(tuple(powers), angle), offset)
+
+
+def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
+    """Return the dimension of a * b (sign 1) or a / b (sign -1), with rule 20's angle power.
+
+    A factor that is a pure number keeps the power of the other; of two quantities with
+    dimensions, or one and an angle, the result is free; angles alone multiply exactly.
+    """
+    if UNKNOWN_DIMENSION in (a, b):
+        return UNKNOWN_DIMENSION
+    powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
+    if b.is_number:
+        return a
+    if a.is_number:
+        return Dimension(powers, None if b.angle is None else sign * b.angle)
+    if a.is_dimensionless and b.is_dimensionless and a.angle is not None and b.angle is not None:
+        return Dimension(powers, a.angle + sign * b.angle)
+    return Dimension(powers, None)
+
+
+def rate_dimension(a: Dimension) -> Dimension:
+    """Return the dimension of the rate of a quantity, whose power of the angle stays."""
+    if a == UNKNOWN_DIMENSION:
+        return UNKNOWN_DIMENSION
+    return Dimension(tuple(x - y for x, y in zip(a.powers, SECOND.powers, strict=True)), a.angle)
+
+
+def dimension_power(a: Dimension, exponent: int) -> Dimension:
+    """Return the dimension of a^exponent."""
+    if a.is_number or exponent == 1:
+        return a
+    if exponent == 0:
+        return PURE_NUMBER
+    powers = tuple(exponent * x for x in a.powers)
+    exact = a.angle is not None and a.is_dimensionless
+    return Dimension(powers, exponent * (a.angle or 0) if exact else None)
+
+
+def dimension_sqrt(a: Dimension) -> Dimension | None:
+    """Return the dimension of sqrt(a), or None where a power is odd."""
+    if a == UNKNOWN_DIMENSION:
+        return UNKNOWN_DIMENSION
+    odd_angle = a.angle is not None and a.angle % 2 != 0
+    if any(x % 2 for x in a.powers) or odd_angle:
+        return None
+    return Dimension(tuple(x // 2 for x in a.powers), None if a.angle is None else a.angle // 2)
+
+
+def are_compatible(a: Dimension, b: Dimension) -> bool:
+    """Tell whether two quantities may be added, compared, assigned: rule 20."""
+    if UNKNOWN_DIMENSION in (a, b):
+        return True
+    return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
+
+
+def common_dimension(a: Dimension, b: Dimension) -> Dimension:
+    """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
+    if UNKNOWN_DIMENSION in (a, b):
+        return UNKNOWN_DIMENSION
+    return b if a.angle is None else a
+
+
+def unit_hint(text: str) -> str:
+    """Return "did you mean `N*m`?" for a text that is no unit, or an empty text."""
+    if text in MISSPELLED_UNITS:
+        return f"did you mean `{MISSPELLED_UNITS[text]}`?"
+    changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
+    try:
+        return f"did you mean `{parse_unit(changed).text}`?"
+    except UnitError:
+        return "a unit is written like `N*m`, `kg*m^2`, `1/s`" if " " in text else ""
+
+
+def matching_units_hint(dimension: Dimension) -> str:
+    """Return the symbols that fit, like `s`, `ms`, `min`; an empty text where there are none."""
+    fitting = [
+        f"`{name}`"
+        for name, (_, powers, angle) in SYMBOLS.items()
+        if Dimension(powers, angle) == dimension and not dimension.is_number
+    ]
+    return f"units that fit: {', '.join(fitting)}" if fitting else ""
+
+
+def _nearest_symbol(symbol: str) -> str:
+    if symbol in SYMBOLS:
+        return symbol
+    found = difflib.get_close_matches(symbol, SYMBOLS, n=1)
+    return MISSPELLED_UNITS.get(symbol, found[0] if found else symbol)
+
+
+def angle_hint(left: Dimension, right: Dimension) -> str:
+    """Return what to do where two dimensions differ in the angle only; else nothing."""
+    if left.powers != right.powers:
+        return ""
+    if left.is_dimensionless and 0 in (left.angle, right.angle):
+        return "give the unit of the angle: `0.02 rad`, `3 deg`"
+    return "they differ in the power of the angle (rad)"

@@ -1,0 +1,1 @@
+"""Integration methods as operations of a Program, and the location of crossings."""

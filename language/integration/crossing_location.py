@@ -1,0 +1,246 @@
+"""Motion: flow of a field over `work.h` up to the first crossing, located inside the step.
+
+A method gives three things: a block `step_<mode>` from the states to `work.end_<state>`, a block
+`series_<mode>` that fills `work.series_<state>` with a polynomial through the step, and the number
+of its terms. What is here is common: look at the guards at the end, and where one changed, halve
+the bracket on the polynomial; the upper end is kept, so the guard is true where it is committed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from language.expressions.units import rate_dimension
+from language.integration.dense_output import DenseOutput, event_search_block
+from language.integration.vector_field import VectorField, any_guard_condition, set_point_time
+from language.ir.number_type import SIGNIFICAND_BITS, NumberType
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Expr,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Store,
+    Unary,
+    Value,
+    add,
+    integer,
+    multiply,
+    real,
+    subtract,
+)
+from language.ir.program import Constant, Variable
+from language.lowering.guard_slots import guard_slots
+from language.model.automaton import Mode
+from language.model.constant_states import constant_states, ever_varying_states
+
+MERGE_ULPS = 4096
+"""Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
+RUN_BISECTIONS = 24
+"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 an ULP."""
+FLOW_BISECTIONS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
+"""Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
+float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
+
+ArmedGuards = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class IntegrationMethod:
+    """A method of integration for one field; `norms` are |A h| of each mode, where it has them.
+
+    `resting` are the states that move in no mode: they have no polynomial.
+    """
+
+    blocks: dict[str, Block]
+    terms: int
+    constants: tuple[Constant, ...]
+    variables: tuple[Variable, ...]
+    step_norms: Mapping[str, float] = field(default_factory=dict)
+    constant_states: frozenset[str] = frozenset()
+
+
+def hold_constant_states(field: VectorField, mode: str) -> list[Op]:
+    """Return the ends of a step of the states that rest in a mode."""
+    still = constant_states(field.automaton.modes[mode])
+    return [Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in field.states if n in still]
+
+
+def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]:
+    """Return the polynomials of a mode's step of the states that rest in this mode, not in all."""
+    still = constant_states(field.automaton.modes[mode])
+    names = [name for name in ever_varying_states(field.automaton) if name in still]
+    return [Store(f"work.series_{n}", integer(k), real(0.0)) for n in names for k in range(terms)]
+
+
+def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
+    """Return the time [s] within which events are one instant, at a time since the start.
+
+    In float64 ULPs of the time: 0.9 ps at 1 s. A float32 knows the time within the step only, and
+    its states are as coarse: ULPs of the step, 0.5 us in 1 ms.
+    """
+    whole = max(time, step) if number == "float64" else step
+    return float(whole) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
+
+
+def continuous_step_blocks(
+    field: VectorField,
+    method: IntegrationMethod,
+    flows: Mapping[str, Block],
+    merge: Expr,
+    bisections: int,
+    armed: Callable[[Mode], ArmedGuards | None],
+    is_wait: Expr | None = None,
+) -> dict[str, Block]:
+    """Return `point`, and `look_<mode>`, `locate_<mode>` and `move_<mode>` of every mode.
+
+    `flows` are the blocks of the field. What crosses within `merge` [s] is one instant; `armed`
+    gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
+    crosses just after it is at that instant.
+    """
+    paths = DenseOutput(method.terms, method.constant_states)
+    blocks = {"point": paths.evaluate(field.states)}
+    for mode in field.automaton.modes.values():
+        blocks[f"look_{mode.name}"] = event_search_block(field, mode, paths, flows)
+        crossed = any_guard_condition(field, mode, armed(mode))
+        blocks[f"locate_{mode.name}"] = _bisect_crossing(field, mode, crossed, bisections, merge)
+        blocks[f"move_{mode.name}"] = _lower_continuous_step(field, mode, crossed, merge, is_wait)
+    return blocks
+
+
+def continuous_step_variables(field: VectorField, method: IntegrationMethod) -> list[Variable]:
+    """Return the work variables of a motion."""
+    found = [
+        Variable("work.h", "real", "s", about="step to flow over"),
+        Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
+        Variable("work.crossed", "truth", about="a guard has turned true in the step"),
+        Variable("work.s", "real", "s", about="time since the start of the step"),
+        Variable("work.low", "real", "s"),
+        Variable("work.high", "real", "s"),
+        Variable("work.halving", "whole"),
+        Variable(
+            "work.is_before_end", "truth", about="a guard turns true before the end of the step"
+        ),
+        Variable("work.term", "whole"),
+        *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.guard_slots),
+    ]
+    for name, state in field.automaton.states.items():
+        dimension = state.unit.dimension
+        unit, rate = str(dimension), str(rate_dimension(dimension))
+        found.append(Variable(f"work.end_{name}", "real", unit, about="at the end of the step"))
+        if name in method.constant_states:
+            continue
+        found.append(Variable(f"work.sum_{name}", "real", rate))
+        about = "factor of s; those of s^2, s^3, ... have one more 1/s each"
+        found.append(Variable(f"work.series_{name}", "real", rate, about=about, size=method.terms))
+    return [*found, *method.variables]
+
+
+def _bisect_crossing(
+    field: VectorField, mode: Mode, crossed: Expr, bisections: int, merge: Expr
+) -> Block:
+    """Halve (low, high]: a guard has changed at high, none has at low."""
+    low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_before_end"
+    middle = add(low, multiply(real(0.5), subtract(high, low)))
+    body: Block = (
+        *_evaluate_guards_at(mode, middle),
+        Branch(
+            crossed,
+            (Assign("work.high", Ref("work.s")), Assign(inside, Value(True))),
+            (Assign("work.low", Ref("work.s")),),
+        ),
+    )
+    return (
+        Assign("work.low", real(0.0)),
+        Assign("work.high", Ref("work.h")),
+        Assign(inside, Value(False)),
+        Loop(bisections, "work.halving", body),
+        *_accept_upper_end(field, mode, Ref(inside)),
+        *_merge_close_events(field, mode, merge),
+        Assign("work.elapsed", Call("min", (high, Ref("work.h")))),
+    )
+
+
+def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Block:
+    """Take the point at the upper end where that lies inside, and read the guards there if more
+    than one may change.
+    """
+    high = Ref("work.high")
+    kept = (Assign("work.s", high), *_accept_point(field))
+    if len(guard_slots(mode)) < 2:
+        return (Branch(is_before_end, kept),)
+    return (
+        Branch(
+            is_before_end, (*kept, RunBlock(f"guards_{mode.name}")), _evaluate_guards_at(mode, high)
+        ),
+    )
+
+
+def _evaluate_guards_at(mode: Mode, time: Expr, comment: str = "") -> Block:
+    """Read the guards at `time`."""
+    return (Assign("work.s", time, comment), RunBlock(f"look_{mode.name}"))
+
+
+def _accept_point(field: VectorField) -> Block:
+    """Take the point at `work.s` for the end."""
+    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    return (RunBlock("point"), *keep)
+
+
+def _merge_close_events(field: VectorField, mode: Mode, merge: Expr) -> Block:
+    """Where another guard changes within `merge` after the first, take both as one instant; what
+    they are at the first is known.
+    """
+    watched = guard_slots(mode)
+    if len(watched) < 2:
+        return ()
+    first = [Assign(f"work.guard_{k}_at_high", Ref(f"work.guard_{k}")) for k in watched]
+    another: Expr = Value(False)
+    for position, k in enumerate(watched):
+        turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.guard_{k}_at_high")))
+        another = turned if position == 0 else Binary("or", another, turned)
+    high = Ref("work.high")
+    accepted: Block = (Assign("work.high", Ref("work.s")), *_accept_point(field))
+    return (
+        *first,
+        *_evaluate_guards_at(
+            mode, add(high, merge), "what turns true until then does so at the same instant"
+        ),
+        Branch(another, accepted),
+    )
+
+
+def _lower_continuous_step(
+    field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None
+) -> Block:
+    watched = guard_slots(mode)
+    ops: list[Op] = [RunBlock(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
+    if watched:
+        ops += [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
+        ops += set_point_time(field, Ref("work.h"))
+        ops.append(RunBlock(f"guards_{mode.name}"))
+    ops.append(Assign("work.crossed", crossed if watched else Value(False)))
+    if watched:
+        found: Block = (RunBlock(f"series_{mode.name}"), RunBlock(f"locate_{mode.name}"))
+        just_after = (
+            () if is_wait is None else _merge_event_after_wait(field, mode, crossed, merge, is_wait)
+        )
+        ops.append(Branch(Ref("work.crossed"), found, just_after))
+    ops += [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
+    return tuple(ops)
+
+
+def _merge_event_after_wait(
+    field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr
+) -> Block:
+    """A guard that changes within `merge` after the end of a wait changes at that instant."""
+    look = (RunBlock(f"series_{mode.name}"), *_evaluate_guards_at(mode, add(Ref("work.h"), merge)))
+    change = Branch(crossed, (Assign("work.crossed", Value(True)), *_accept_point(field)))
+    return (Branch(is_wait, (*look, change)),)

@@ -1,0 +1,284 @@
+"""Exponential: the part linear in the states exactly, the rest by its value at the middle.
+
+Exponential midpoint rule: Hochbruck and Ostermann 2010 (Acta Numerica 19, 209-286), eq. (2.40b).
+Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number of terms (rule 17e).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from language.expressions.units import rate_dimension
+from language.integration.crossing_location import IntegrationMethod
+from language.integration.rate_terms import non_affine_terms
+from language.integration.taylor_bound import (
+    max_or_nan,
+    row_sum_norm,
+    scale_by_ranges,
+    taylor_term_count,
+)
+from language.integration.vector_field import VectorField, set_point_time, set_point_to_state
+from language.ir.number_type import NumberType
+from language.ir.ops import (
+    Assign,
+    Block,
+    Branch,
+    Compare,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Store,
+    add,
+    divide,
+    integer,
+    multiply,
+    real,
+    subtract,
+    sum_of,
+)
+from language.ir.program import Constant, Variable
+from language.lowering.linearisation import LinearisationPoint
+from language.numerics.affine_form import affine_forms, jacobian
+from language.numerics.evaluate import Scalar
+from language.numerics.matrix import Matrix, expm as matrix_exponential, expm_integral
+from language.text.diagnostic import Problems, Span
+
+MAX_STEP_NORM = 4.0
+"""|A h| up to which the Taylor sum is accurate and short (rule 17e)."""
+
+
+@dataclass(frozen=True)
+class ExponentialContext:
+    """What a method knows before it runs: constants, the step [s], the rates of each mode.
+
+    `corners` are the constants at the ends of the ranges of the tunables in `depends_on`.
+    """
+
+    point: LinearisationPoint
+    corners: tuple[Mapping[str, Scalar], ...]
+    step: Fraction
+    rates: Mapping[str, Block]
+    depends_on: tuple[str, ...]
+    number_type: NumberType
+
+    def state_matrix(self, field: VectorField, mode: str) -> Matrix:
+        """Return A (n, n) of a mode: see `jacobian`."""
+        return jacobian(self.rates[mode], field.states, self.point.constant_values)
+
+    def scaled_step_matrices(self, field: VectorField, mode: str) -> list[Matrix]:
+        """Return A h of a mode in units of the ranges, also at the ends of those of the tunables.
+
+        An entry that is largest between them is not seen.
+        """
+        rates, states, h = self.rates[mode], field.states, float(self.step)
+        known = (self.point.constant_values, *self.corners)
+        return [
+            scale_by_ranges(field, jacobian(rates, states, constants), h) for constants in known
+        ]
+
+    def states_with_remainder(self, field: VectorField, mode: str) -> frozenset[str]:
+        """Return the states whose rate is more than its row of A, whatever the calibration."""
+        known = self.point.constant_values.items()
+        fixed = {name: value for name, value in known if name.startswith("constant.")}
+        parts = affine_forms(self.rates[mode], field.states, fixed)
+        return frozenset(n for n in field.states if parts[f"work.rate_{n}"].constant != 0.0)
+
+
+def exponential_method(
+    field: VectorField, context: ExponentialContext, span: Span, problems: Problems
+) -> IntegrationMethod:
+    """Return the method for a field."""
+    return build_exponential_method(field, context, _step_blocks, span, problems)
+
+
+def build_exponential_method(
+    field: VectorField,
+    context: ExponentialContext,
+    step_blocks: Callable[[VectorField, str, ExponentialContext], Mapping[str, Block]],
+    span: Span,
+    problems: Problems,
+) -> IntegrationMethod:
+    """Return a method that has the linear part solved; `step_blocks` makes the blocks of a mode's."""
+    made: dict[str, Block] = {}
+    constants: list[Constant] = []
+    norms: dict[str, float] = {}
+    steps: dict[str, list[Matrix]] = {}
+    for name in field.automaton.modes:
+        steps[name] = context.scaled_step_matrices(field, name)
+        norms[name] = max_or_nan(row_sum_norm(step) for step in steps[name])
+        if not norms[name] <= MAX_STEP_NORM:
+            label = f"mode `{name}` is too fast for one step: |A h| = {norms[name]:.3g} is above 4"
+            norm = norms[name]
+            needed = math.ceil(norm / MAX_STEP_NORM) if math.isfinite(norm) else "more"
+            problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
+            continue
+        constants += _solved_constants(field, name, context)
+        made.update(step_blocks(field, name, context))
+        made[f"pull_{name}"] = _remainder_block(field, name, context)
+        made[f"whole_{name}"] = _propagate(field, name, ("end", "E", "F"), context)
+    bounded = [
+        step for name, norm in norms.items() if norm <= MAX_STEP_NORM for step in steps[name]
+    ]
+    terms = max((taylor_term_count(step, context.number_type) for step in bounded), default=1)
+    for name in field.automaton.modes:
+        made[f"series_{name}"] = _taylor_series(field, name, context, terms)
+    variables = [
+        Variable(f"work.pull_{name}", "real", str(rate_dimension(state.unit.dimension)))
+        for name, state in field.automaton.states.items()
+    ]
+    number = Variable("work.order", "real", about="order of a term")
+    return IntegrationMethod(made, terms, tuple(constants), (*variables, number), norms)
+
+
+def _solved_matrices(
+    field: VectorField, mode: str, context: ExponentialContext
+) -> dict[str, Matrix]:
+    """Return A, and E = e^(A h) with F = its integral over the step and over half of it."""
+    a, h = context.state_matrix(field, mode), float(context.step)
+    return {
+        "A": a,
+        "E": matrix_exponential(a, h),
+        "F": expm_integral(a, h),
+        "Eh": matrix_exponential(a, 0.5 * h),
+        "Fh": expm_integral(a, 0.5 * h),
+    }
+
+
+def _entry_name(mode: str, letter: str, row: str, column: str) -> str:
+    return f"solved.{mode}_{letter}.{row}.{column}"
+
+
+def _solved_constants(field: VectorField, mode: str, context: ExponentialContext) -> list[Constant]:
+    found = []
+    for letter, matrix in _solved_matrices(field, mode, context).items():
+        for i, row in enumerate(field.states):
+            for j, column in enumerate(field.states):
+                if matrix[i][j] != 0.0:
+                    name = _entry_name(mode, letter, row, column)
+                    value, depends_on = matrix[i][j], context.depends_on
+                    found.append(Constant(name, "solved", value, depends_on=depends_on))
+    return found
+
+
+def _row_products(
+    field: VectorField, mode: str, letter: str, matrix: Matrix, i: int, values: Mapping[str, Expr]
+) -> list[Expr]:
+    """Return the products of one row of a matrix with values by state, zeros left out."""
+    row = field.states[i]
+    return [
+        multiply(Ref(_entry_name(mode, letter, row, column)), values[column])
+        for j, column in enumerate(field.states)
+        if matrix[i][j] != 0.0 and column in values
+    ]
+
+
+def _remainder_refs(field: VectorField, mode: str, context: ExponentialContext) -> dict[str, Expr]:
+    pulled = context.states_with_remainder(field, mode)
+    return {name: Ref(f"work.pull_{name}") for name in field.states if name in pulled}
+
+
+def _remainder_block(field: VectorField, mode: str, context: ExponentialContext) -> Block:
+    """pull = rate - A x at the point: what is not linear."""
+    a, pulled = context.state_matrix(field, mode), context.states_with_remainder(field, mode)
+    at: dict[str, Expr] = {name: Ref(f"work.at_{name}") for name in field.states}
+    ops: list[Op] = [RunBlock(f"rates_{mode}")]
+    for i, name in enumerate(field.states):
+        if name not in pulled:
+            continue
+        linear = _row_products(field, mode, "A", a, i, at)
+        rate = Ref(f"work.rate_{name}")
+        value: Expr = subtract(rate, sum_of(linear)) if linear else rate
+        ops.append(Assign(f"work.pull_{name}", value))
+    return tuple(ops)
+
+
+def lower_step_start(field: VectorField, mode: str) -> Block:
+    """Return the operations that find what is not linear, at the start of the step."""
+    return (*set_point_to_state(field), *set_point_time(field, real(0.0)), RunBlock(f"pull_{mode}"))
+
+
+def lower_step_end(field: VectorField, mode: str, context: ExponentialContext) -> Block:
+    """Return the operations that go to the end of the step; `work.pull_<state>` is known."""
+    end = Assign("work.s", Ref("work.h"))
+    arrive = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    rest: Block = (RunBlock(f"series_{mode}"), end, RunBlock("point"), *arrive)
+    return (Branch(_is_full_step(context), (RunBlock(f"whole_{mode}"),), rest),)
+
+
+def _is_full_step(context: ExponentialContext) -> Expr:
+    return Compare("==", Ref("work.h"), real(context.step))
+
+
+def _propagate(
+    field: VectorField, mode: str, letters: tuple[str, str, str], context: ExponentialContext
+) -> Block:
+    """x = E x + F pull into `work.<target>_<state>`; letters are target, E and F."""
+    target, e, f = letters
+    table = _solved_matrices(field, mode, context)
+    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
+    pull = _remainder_refs(field, mode, context)
+    ops = []
+    for i, name in enumerate(field.states):
+        parts = _row_products(field, mode, e, table[e], i, state)
+        parts += _row_products(field, mode, f, table[f], i, pull)
+        ops.append(Assign(f"work.{target}_{name}", sum_of(parts)))
+    return tuple(ops)
+
+
+def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> Mapping[str, Block]:
+    half = multiply(real(0.5), Ref("work.h"))
+    middle = Assign("work.s", half)
+    part: Block = (RunBlock(f"series_{mode}"), middle, RunBlock("point"))
+    step = (
+        *lower_step_start(field, mode),
+        Branch(_is_full_step(context), (RunBlock(f"half_{mode}"),), part),
+        *set_point_time(field, half),
+        RunBlock(f"pull_{mode}"),
+        *lower_step_end(field, mode, context),
+    )
+    moved = _propagate(field, mode, ("at", "Eh", "Fh"), context)
+    return {f"half_{mode}": moved, f"step_{mode}": step}
+
+
+def _taylor_series(
+    field: VectorField, mode: str, context: ExponentialContext, term_count: int
+) -> Block:
+    """d0 = A x0 + pull, d_i = A d_(i-1) / (i + 1)."""
+    a, pull = context.state_matrix(field, mode), _remainder_refs(field, mode, context)
+    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
+    order, index = Ref("work.order"), Ref("work.term")
+    ops: list[Op] = [Assign("work.order", real(1.0))]
+    for i, name in enumerate(field.states):
+        pulled = [pull[name]] if name in pull else []
+        value = sum_of([*_row_products(field, mode, "A", a, i, state), *pulled])
+        ops.append(Store(f"work.series_{name}", integer(0), value))
+    before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
+    body: list[Op] = [Assign("work.order", add(order, real(1.0)))]
+    for i, name in enumerate(field.states):
+        value = divide(sum_of(_row_products(field, mode, "A", a, i, before)), order)
+        body.append(Store(f"work.series_{name}", add(index, integer(1)), value))
+    return (*ops, Loop(max(0, term_count - 1), "work.term", tuple(body)))
+
+
+def exact_method(
+    field: VectorField, context: ExponentialContext, span: Span, problems: Problems
+) -> IntegrationMethod:
+    """Return the method for a field, with a problem for each mode that is not affine."""
+    for mode in field.automaton.modes.values():
+        others = non_affine_terms(field.automaton, mode, context.point)
+        if others:
+            label = f"the flow of mode `{mode.name}` is not linear in the states with constant "
+            label += f"coefficients: {', '.join(f'`{term}`' for term in others)}"
+            help = "`linearise: {at: ...}` takes the tangent, `method: exponential` the middle"
+            problems.error("method", span, label, help)
+    return build_exponential_method(field, context, _step_blocks, span, problems)
+
+
+def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> Mapping[str, Block]:
+    return {f"step_{mode}": (*lower_step_start(field, mode), *lower_step_end(field, mode, context))}

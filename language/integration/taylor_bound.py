@@ -1,0 +1,53 @@
+"""Taylor: how many terms of the sum for a linear flow count, and the size of its step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from language.integration.vector_field import VectorField
+from language.ir.number_type import SIGNIFICAND_BITS, NumberType
+from language.numerics.matrix import Matrix, abs_sum
+
+
+def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
+    """Return A h (n, n), each state in units of its range's width."""
+    widths = []
+    for state in field.automaton.states.values():
+        assert state.range is not None
+        widths.append(float(state.range[1] - state.range[0]))
+    return tuple(
+        tuple(entry * other / width * h for entry, other in zip(row, widths, strict=True))
+        for row, width in zip(a, widths, strict=True)
+    )
+
+
+def row_sum_norm(a: Matrix) -> float:
+    """Return the largest sum of sizes of a row."""
+    return max_or_nan(abs_sum(row) for row in a)
+
+
+def max_or_nan(values: Iterable[float]) -> float:
+    """Return the largest of sizes; NaN if one is."""
+    found = 0.0
+    for value in values:
+        found = value if not value <= found else found
+    return found
+
+
+def taylor_term_count(step: Matrix, number: NumberType = "float64") -> int:
+    """Return the number of terms of a Taylor sum after which none counts, for z = A h (n, n).
+
+    The sum is that of z^k (d0 h) / (k + 1)!, and d0 h is at most |z|. From K on
+    | |z|^K 1 | |z| / (K + 1)! <= 2^-53, 2^-24 in float32: powers of sizes see what the norm does
+    not, that what turns into another quantity is gone, such as speed into angle.
+    """
+    norm, tiny = row_sum_norm(step), 2.0 ** -SIGNIFICAND_BITS[number]
+    reach = [1.0 for _ in step]
+    terms, bound, order = 1, norm, 1
+    while bound > tiny:
+        if max_or_nan(reach) * norm > tiny:
+            terms = order
+        order += 1
+        bound = bound * norm / order
+        reach = [abs_sum(x * y for x, y in zip(row, reach, strict=True)) / order for row in step]
+    return terms

@@ -1,0 +1,297 @@
+"""Field: rates and guards of a continuous automaton at the point `work.at_<state>`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import ChainMap
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.expressions.units import rate_dimension
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Compare,
+    Expr,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    Value,
+    integer,
+)
+from language.ir.program import Variable, mode_variable
+from language.lowering.action_stages import (
+    action_variables,
+    commit_stage,
+    lower_stage,
+    read_stage,
+    storage_of,
+)
+from language.lowering.continuous_edges import level_change_conditions, set_levels
+from language.lowering.expressions import (
+    NameBindings,
+    choose_by_mode,
+    equation_bindings,
+    lower_equations,
+    lower_expression,
+    lower_rate,
+    names_read,
+)
+from language.lowering.guard_slots import all_guard_slots, guard_slot, guard_slots, mode_bindings
+from language.lowering.program_builder import equation_variables
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Balance, Mode, Transition
+from language.model.declaration import Formula
+from language.model.region_queries import (
+    possible_balances,
+    region_of_balance,
+    transitions_by_priority,
+    watched_transitions,
+)
+
+ALWAYS = Value(True)
+"""Of a transition that is taken where no other one is."""
+
+
+@dataclass(frozen=True)
+class VectorField:
+    """A continuous automaton where it moves: on its own, or as a run inside a tick.
+
+    `inputs` are what its inputs read; `mode` is the variable that holds its mode; `timed` says
+    whether something changes with `work.s`, the time since the start of the step; `remembered` is
+    what the guards of a mode (by its key) remember; `is_staged` is whether stages have blocks.
+    """
+
+    automaton: Automaton
+    constants: NameBindings
+    inputs: NameBindings
+    mode_variable_name: str
+    key_prefix: str
+    is_time_dependent: bool = False
+    guard_memory: Mapping[str, NameBindings] = dataclasses.field(default_factory=dict)
+    has_stage_blocks: bool = False
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of the states, in the order of the file."""
+        return tuple(self.automaton.states)
+
+    @property
+    def guard_slots(self) -> tuple[str, ...]:
+        """The endings of the guard variables."""
+        return tuple(all_guard_slots(self.automaton))
+
+    def mode_variable_of(self, region: str) -> str:
+        """Return the variable that holds the mode of a region."""
+        return mode_variable(self.mode_variable_name, region)
+
+
+def field_blocks(field: VectorField) -> dict[str, Block]:
+    """Return `rates_<mode>` and `guards_<mode>` of every mode."""
+    blocks: dict[str, Block] = {}
+    for region in field.automaton.regions:
+        for mode in region.modes.values():
+            blocks[f"guards_{mode.label}"] = tuple(
+                _lower_own_guards(field, mode, region.max_transitions)
+            )
+    for name, mode in field.automaton.modes.items():
+        blocks[f"rates_{name}"] = _lower_rates(field, mode)
+        blocks[f"guards_{name}"] = _lower_guards(field, mode)
+    return blocks
+
+
+def field_variables(field: VectorField) -> list[Variable]:
+    """Return the work variables that the blocks of a field use."""
+    found = []
+    for state, thing in field.automaton.states.items():
+        dimension = thing.unit.dimension
+        about = "at the point that is looked at"
+        found.append(Variable(f"work.at_{state}", "real", str(dimension), about=about))
+        found.append(
+            Variable(f"work.rate_{state}", "real", str(rate_dimension(dimension)), about=about)
+        )
+    found += equation_variables(field.automaton, "work.at_")
+    about = "a guard of the mode that flows, in the order of its transitions"
+    found += [Variable(f"work.guard_{slot}", "truth", about=about) for slot in field.guard_slots]
+    found += action_variables(field.automaton)
+    return found
+
+
+def bindings_at_point(field: VectorField) -> dict[str, Expr]:
+    """Return what the names of the automaton are at the point, to be added to."""
+    return dict(_bindings_at_point(field))
+
+
+@cache_on_owner
+def _bindings_at_point(field: VectorField) -> dict[str, Expr]:
+    known: dict[str, Expr] = dict(field.constants)
+    known.update(field.inputs)
+    known.update({name: Ref(f"work.at_{name}") for name in field.states})
+    known.update(mode_bindings(field.automaton, field.mode_variable_name))
+    return known
+
+
+@cache_on_owner
+def all_bindings_at_point(field: VectorField) -> dict[str, Expr]:
+    """Return what the names of the automaton are at the point, all equations among them."""
+    known = bindings_at_point(field)
+    known.update(equation_bindings(field.automaton, "work.at_"))
+    return known
+
+
+def set_point_to_state(field: VectorField) -> list[Op]:
+    """Return the operations that put the point where the states are."""
+    return [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in field.states]
+
+
+def set_point_time(field: VectorField, time: Expr) -> list[Op]:
+    """Return the operations that put the inputs where they are at a time of the step [s]."""
+    return [Assign("work.s", time)] if field.is_time_dependent else []
+
+
+def run_block_by_mode(field: VectorField, block_prefix: str) -> Switch:
+    """Return the choice of the block `<verb>_<mode>` of the mode that the field is in."""
+    modes = field.automaton.modes.values()
+    return Switch(
+        field.mode_variable_name,
+        tuple((m.number, (RunBlock(f"{block_prefix}_{m.name}"),)) for m in modes),
+    )
+
+
+def any_guard_condition(
+    field: VectorField, mode: Mode, armed: Mapping[str, str] | None = None
+) -> Expr:
+    """Return whether a guard of the mode is true (it or an edge's level is not as when armed)."""
+    result: Expr = Value(False)
+    for k, watched in enumerate(guard_slots(mode)):
+        guard: Expr = Ref(f"work.guard_{watched}")
+        if armed is not None:
+            guard = Compare("!=", guard, Ref(armed[watched]))
+        result = guard if k == 0 else Binary("or", result, guard)
+    for level in level_change_conditions(field.automaton):
+        result = Binary("or", result, level)
+    return result
+
+
+def select_by_priority(
+    mode: Mode, enabled: Mapping[int, Expr], effects: Mapping[int, Block]
+) -> Block:
+    """Return the choice of one transition: the enabled one with the smallest priority."""
+    ops: Block = ()
+    for k, _ in reversed(transitions_by_priority(mode)):
+        ops = effects[k] if enabled[k] == ALWAYS else (Branch(enabled[k], effects[k], ops),)
+    return ops
+
+
+def lower_reset_stages(field: VectorField, transition: Transition) -> tuple[list[Op], list[Op]]:
+    """Return a transition's resets: what reads the values before, then what commits."""
+    automaton, known = field.automaton, all_bindings_at_point(field)
+    return read_stage(automaton, transition.reset, known), commit_stage(automaton, transition.reset)
+
+
+def lower_single_region_step(
+    field: VectorField, mode: Mode, enabled: Mapping[int, Expr], extra_effects: Mapping[int, Block]
+) -> Block:
+    """Return one micro-step of an automaton that has no region beside the chart."""
+    fire = {
+        k: (
+            *lower_transition_actions(field, transition),
+            set_target_mode(field, transition),
+            *extra_effects.get(k, ()),
+        )
+        for k, transition in enumerate(mode.transitions)
+    }
+    return select_by_priority(mode, enabled, fire)
+
+
+def lower_transition_actions(field: VectorField, transition: Transition) -> list[Op]:
+    """Return exit, reset and entry (rule 6) of a transition that nothing else fires beside."""
+    source, target = (
+        field.automaton.source_mode(transition),
+        field.automaton.target_mode(transition),
+    )
+    if source.exit or target.entry:
+        ops = lower_stage(field.automaton, source.exit, all_bindings_at_point(field))
+        ops += [op for op in set_point_to_state(field) if transition.reset]
+        ops += lower_stage(field.automaton, transition.reset, all_bindings_at_point(field))
+        return [*ops, *lower_entry_at_point(field, target, target.entry)]
+    first, second = lower_reset_stages(field, transition)
+    if len(first) == 1:
+        (name,) = transition.reset
+        (only,) = first
+        assert isinstance(only, Assign)
+        return [Assign(storage_of(field.automaton, name), only.value, only.key)]
+    return first + second
+
+
+def lower_entry_at_point(
+    field: VectorField, target: Mode, assignments: Mapping[str, Formula]
+) -> list[Op]:
+    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    if not assignments:
+        return []
+    known = bindings_at_point(field)
+    wanted = names_read(formula.tree for formula in assignments.values())
+    ops = lower_equations(target, known, "work.at_", field.key_prefix, wanted)
+    return [*set_point_to_state(field), *ops, *lower_stage(field.automaton, assignments, known)]
+
+
+def set_target_mode(field: VectorField, transition: Transition) -> Assign:
+    """Return the operation that makes a transition's target the mode of its region."""
+    number = field.automaton.target_mode(transition).number
+    return Assign(field.mode_variable_of(transition.region), integer(number))
+
+
+def _lower_rates(field: VectorField, mode: Mode) -> Block:
+    known = bindings_at_point(field)
+    wanted = names_read(
+        tree for balance in possible_balances(mode) for tree in (balance.right, balance.left)
+    )
+    ops = lower_equations(mode, known, "work.at_", field.key_prefix, wanted)
+
+    def rate_is(balance: Balance) -> Assign:
+        target = f"work.rate_{balance.state}"
+        return Assign(target, lower_rate(balance, known), field.key_prefix + balance.key)
+
+    for name in field.states:
+        region = region_of_balance(mode, name)
+        if region is None:
+            ops.append(rate_is(mode.flow[name]))
+        else:
+            modes = region.modes.values()
+            cases = {other.name: (rate_is(other.flow[name]),) for other in modes}
+            ops.append(choose_by_mode(region, known, cases))
+    return tuple(ops)
+
+
+def _lower_guards(field: VectorField, mode: Mode) -> Block:
+    """The guards of a mode of the chart, then those of the modes beside it, on its equations."""
+    known = bindings_at_point(field)
+    trees = [transition.when.tree for transition in watched_transitions(mode)]
+    for active in (mode, *(m for region in mode.parallel_regions for m in region.modes.values())):
+        trees += [formula.tree for formula in active.exit.values()]
+    for transition in watched_transitions(mode):
+        trees += [formula.tree for formula in transition.reset.values()]
+    ops = lower_equations(mode, known, "work.at_", field.key_prefix, names_read(trees))
+    ops += _lower_own_guards(field, mode, len(mode.transitions))
+    for region in mode.parallel_regions:
+        modes = region.modes.values()
+        cases: dict[str, Block] = {m.name: (RunBlock(f"guards_{m.label}"),) for m in modes}
+        ops.append(choose_by_mode(region, known, cases))
+    return tuple(ops)
+
+
+def _lower_own_guards(field: VectorField, mode: Mode, slot_count: int) -> list[Op]:
+    """Return what sets the guards of a mode, and those up to `slot_count` to false."""
+    known = ChainMap(dict(field.guard_memory.get(mode.key, {})), all_bindings_at_point(field))
+    ops = set_levels(field.automaton, mode, known)
+    for k, transition in enumerate(mode.transitions):
+        guard = lower_expression(transition.when.tree, known)
+        target = f"work.guard_{guard_slot(mode.region, k)}"
+        ops.append(Assign(target, guard, field.key_prefix + transition.when.key))
+    for k in range(len(mode.transitions), slot_count):
+        ops.append(Assign(f"work.guard_{guard_slot(mode.region, k)}", Value(False)))
+    return ops

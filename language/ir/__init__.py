@@ -1,0 +1,1 @@
+"""The intermediate representation: Program, operations, traversal, printer."""

@@ -1,0 +1,88 @@
+"""Formula name: a readable name for the value of an expression, and its text for a comment."""
+
+from __future__ import annotations
+
+import re
+
+from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
+from language.ir.program import unqualified_name
+
+MAX_NAME_LENGTH = 32
+"""Characters of a name that is still read; longer ones are numbered instead."""
+FALLBACK_NAME = "hoisted"
+OPERATOR_WORDS = {"+": "plus", "-": "minus", "/": "per"}
+PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2}
+EVALUATION_POINT_PREFIX = "at_"
+"""How the names of equations and states begin where they are values at a point of a step."""
+
+
+def formula_name(expr: Expr) -> str:
+    """Return a name like `m_g_r_w`, `k_hs_per_c_hs`, `per_J_v`, `r_w_cubed`, `half_h`."""
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", _build_name(expr)).strip("_")
+    return name if len(name) <= MAX_NAME_LENGTH and not name[:1].isdigit() else FALLBACK_NAME
+
+
+def format_formula(expr: Expr) -> str:
+    """Return an expression as it is written: `m * g * r_w`."""
+    match expr:
+        case Value(value):
+            return f"{value:g}" if isinstance(value, float) else str(value).lower()
+        case Ref(name):
+            return _plain_name(name)
+        case Item(name, index):
+            return f"{_plain_name(name)}[{format_formula(index)}]"
+        case Unary(operator, operand):
+            sign = "-" if operator == "-" else "not "
+            return f"{sign}{_format_operand(operand, 3)}"
+        case Binary("and" | "or" as operator, left, right) | Compare(operator, left, right):
+            return f"{_format_operand(left, 3)} {operator} {_format_operand(right, 3)}"
+        case Binary(operator, left, right):
+            rank = PRECEDENCE[operator]
+            return f"{_format_operand(left, rank)} {operator} {_format_operand(right, rank + 1)}"
+        case Select(condition, then, other):
+            texts = (format_formula(part) for part in (condition, then, other))
+            return "if {} then {} else {}".format(*texts)
+        case Call(function, arguments):
+            return f"{function}({', '.join(format_formula(argument) for argument in arguments)})"
+
+
+def _format_operand(expr: Expr, precedence: int) -> str:
+    text = format_formula(expr)
+    if isinstance(expr, Binary | Compare | Select):
+        own = PRECEDENCE.get(expr.operator, 0) if isinstance(expr, Binary) else 0
+        return text if own >= precedence else f"({text})"
+    return f"({text})" if text.startswith("-") else text
+
+
+def _build_name(expr: Expr) -> str:
+    match expr:
+        case Value(value):
+            return {0.5: "half", 2.0: "twice"}.get(float(value), f"{value:g}")
+        case Ref(name):
+            return _plain_name(name)
+        case Unary(_, operand):
+            return f"minus_{_build_name(operand)}"
+        case Binary("*", left, right):
+            return _power_name(expr) or f"{_build_name(left)}_{_build_name(right)}"
+        case Binary("/", Value(1.0), right):
+            return f"per_{_build_name(right)}"
+        case Binary(operator, left, right) if operator in OPERATOR_WORDS:
+            return f"{_build_name(left)}_{OPERATOR_WORDS[operator]}_{_build_name(right)}"
+        case Call(function, arguments):
+            return "_".join([function, *(_build_name(argument) for argument in arguments)])
+        case _:
+            return "x" * (MAX_NAME_LENGTH + 1)
+
+
+def _power_name(expr: Binary) -> str | None:
+    match expr:
+        case Binary("*", Ref(name), Ref(other)) if name == other:
+            return f"{_plain_name(name)}_squared"
+        case Binary("*", Binary("*", Ref(name), Ref(other)), Ref(third)) if name == other == third:
+            return f"{_plain_name(name)}_cubed"
+        case _:
+            return None
+
+
+def _plain_name(name: str) -> str:
+    return unqualified_name(name).removeprefix(EVALUATION_POINT_PREFIX).replace(".", "_")

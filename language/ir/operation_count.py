@@ -1,0 +1,79 @@
+"""Longest: a bound of the work of a step - operations on the way through its blocks that has most.
+
+Each loop is taken to its end, of each branch the side with more; what cannot happen together is
+counted together, so no step ever takes more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Count,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    RunBlock,
+    Select,
+    Store,
+    Switch,
+    Unary,
+)
+
+Blocks = Mapping[str, Block]
+
+
+def max_operations(blocks: Blocks, name: str) -> int:
+    """Return the most arithmetic, comparisons, calls, tests and stores of a block and its runs."""
+    counts: dict[str, int] = {}
+
+    def count_block(name: str) -> int:
+        if name not in counts:
+            counts[name] = count_ops(blocks[name])
+        return counts[name]
+
+    def count_ops(block: Block) -> int:
+        return sum(map(count_op, block))
+
+    def count_op(op: Op) -> int:
+        match op:
+            case Branch(condition, then, other):
+                return 1 + count_expr(condition) + max(count_ops(then), count_ops(other))
+            case Switch(_, cases):
+                return 1 + max((count_ops(case) for _, case in cases), default=0)
+            case Loop(count, _, body):
+                return count * (2 + count_ops(body))
+            case RunBlock(inner):
+                return count_block(inner)
+            case Assign(_, value, _):
+                return 1 + count_expr(value)
+            case Store(_, index, value):
+                return 1 + count_expr(index) + count_expr(value)
+            case Count(_, condition, _, _):
+                return 2 + count_expr(condition)
+        return 1
+
+    return count_block(name)
+
+
+def count_expr(value: Expr) -> int:
+    """Return the operations of an expression, both sides of a choice."""
+    match value:
+        case Unary(_, operand):
+            return 1 + count_expr(operand)
+        case Binary(_, left, right) | Compare(_, left, right):
+            return 1 + count_expr(left) + count_expr(right)
+        case Select(condition, then, other):
+            return 1 + count_expr(condition) + max(count_expr(then), count_expr(other))
+        case Call(_, arguments):
+            return 1 + sum(map(count_expr, arguments))
+        case Item(_, index, _):
+            return 1 + count_expr(index)
+    return 0

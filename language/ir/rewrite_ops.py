@@ -1,0 +1,110 @@
+"""Substitution: the expressions of a block replaced by others, whatever operation holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Count,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Select,
+    Store,
+    Switch,
+    Unary,
+)
+
+ExprTransform = Callable[[Expr], Expr]
+
+
+def operands(expr: Expr) -> tuple[Expr, ...]:
+    """Return the direct operands of an expression."""
+    if isinstance(expr, (Binary, Compare)):
+        return expr.left, expr.right
+    if isinstance(expr, Call):
+        return expr.arguments
+    if isinstance(expr, Unary):
+        return (expr.operand,)
+    if isinstance(expr, Select):
+        return expr.condition, expr.then, expr.other
+    return (expr.index,) if isinstance(expr, Item) else ()
+
+
+def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
+    """Return an expression with its direct operands changed: itself where none is another one."""
+    if isinstance(expr, (Binary, Compare)):
+        left, right = transform(expr.left), transform(expr.right)
+        is_same = left is expr.left and right is expr.right
+        return expr if is_same else type(expr)(expr.operator, left, right)  # type: ignore[arg-type]
+    if isinstance(expr, Call):
+        arguments = tuple(transform(argument) for argument in expr.arguments)
+        is_same = all(new is old for new, old in zip(arguments, expr.arguments, strict=True))
+        return expr if is_same else Call(expr.function, arguments)
+    if isinstance(expr, Unary):
+        operand = transform(expr.operand)
+        return expr if operand is expr.operand else Unary(expr.operator, operand)
+    if isinstance(expr, Select):
+        condition, then, other = (
+            transform(expr.condition),
+            transform(expr.then),
+            transform(expr.other),
+        )
+        old = expr.condition, expr.then, expr.other
+        is_same = condition is old[0] and then is old[1] and other is old[2]
+        return expr if is_same else Select(condition, then, other)
+    if isinstance(expr, Item):
+        index = transform(expr.index)
+        return expr if index is expr.index else Item(expr.name, index, expr.is_integer)
+    return expr
+
+
+def map_expressions(block: Block, transform: ExprTransform) -> Block:
+    """Return a block with every expression that an operation reads changed."""
+    return tuple(_map_op(op, transform) for op in block)
+
+
+def direct_expressions(op: Op) -> tuple[Expr, ...]:
+    """Return the expressions that an operation reads itself, not those of blocks inside it."""
+    match op:
+        case Assign(_, value, _):
+            return (value,)
+        case Store(_, index, value):
+            return index, value
+        case Branch(condition, _, _) | Count(_, condition, _, _):
+            return (condition,)
+        case _:
+            return ()
+
+
+def walk_post_order(expr: Expr) -> Iterator[Expr]:
+    """Yield an expression and all inside it, the innermost first."""
+    for part in operands(expr):
+        yield from walk_post_order(part)
+    yield expr
+
+
+def _map_op(op: Op, transform: ExprTransform) -> Op:
+    match op:
+        case Assign(target, value, key):
+            return Assign(target, transform(value), key)
+        case Store(array, index, value):
+            return Store(array, transform(index), transform(value))
+        case Branch(condition, then, other):
+            inner = (map_expressions(block, transform) for block in (then, other))
+            return Branch(transform(condition), *inner)
+        case Switch(selector, cases):
+            return Switch(selector, tuple((k, map_expressions(b, transform)) for k, b in cases))
+        case Loop(count, index, body):
+            return Loop(count, index, map_expressions(body, transform))
+        case Count(timer, condition, limit, key):
+            return Count(timer, transform(condition), limit, key)
+        case _:
+            return op

@@ -1,0 +1,169 @@
+"""Traversal: every operation of a block, and the names that blocks read and write.
+
+Every pass asks for these again and again: a kind of operation is asked for after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Count,
+    Expr,
+    FaultBit,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Select,
+    Store,
+    Switch,
+    Unary,
+    Value,
+)
+
+
+def walk_ops(block: Block) -> Iterator[Op]:
+    """Yield every operation of a block, those inside others too."""
+    stack = list(reversed(block))
+    while stack:
+        op = stack.pop()
+        yield op
+        if isinstance(op, Branch):
+            stack += op.other[::-1]
+            stack += op.then[::-1]
+        elif isinstance(op, Switch):
+            for _, case_block in reversed(op.cases):
+                stack += case_block[::-1]
+        elif isinstance(op, Loop):
+            stack += op.body[::-1]
+
+
+def block_names(block: Block) -> list[str]:
+    """Return the variables and constants that a block reads or writes, and `call <function>`."""
+    return block_reads(block) + block_writes(block)
+
+
+def block_reads(block: Block) -> list[str]:
+    """Return the variables that a block reads."""
+    names: list[str] = []
+    for op in walk_ops(block):
+        if isinstance(op, Assign):
+            names += expr_names(op.value)
+        elif isinstance(op, (Branch, Count)):
+            names += expr_names(op.condition)
+        elif isinstance(op, Store):
+            names += expr_names(op.index)
+            names += expr_names(op.value)
+        elif isinstance(op, Switch):
+            names.append(op.selector)
+    return names
+
+
+def block_writes(block: Block) -> list[str]:
+    """Return the variables that a block writes."""
+    names: list[str] = []
+    for op in walk_ops(block):
+        if isinstance(op, Assign):
+            names.append(op.target)
+        elif isinstance(op, Store):
+            names.append(op.array)
+        elif isinstance(op, Count):
+            names.append(op.timer)
+        elif isinstance(op, Loop):
+            names.append(op.index)
+        elif isinstance(op, FaultBit):
+            names.append("memory.faults")
+    return names
+
+
+def expr_names(expr: Expr) -> list[str]:
+    """Return the variables and constants that an expression reads, and `call <function>`."""
+    names: list[str] = []
+    for part in subexpressions(expr):
+        if isinstance(part, (Ref, Item)):
+            names.append(part.name)
+        elif isinstance(part, Call):
+            names.append(f"call {part.function}")
+    return names
+
+
+def subexpressions(expr: Expr) -> Sequence[Expr]:
+    """Return every part of an expression, parents first."""
+    stack: list[Expr] = [expr]
+    result: list[Expr] = []
+    while stack:
+        part = stack.pop()
+        result.append(part)
+        if isinstance(part, (Binary, Compare)):
+            stack += (part.right, part.left)
+        elif isinstance(part, Call):
+            stack += part.arguments[::-1]
+        elif isinstance(part, Unary):
+            stack.append(part.operand)
+        elif isinstance(part, Select):
+            stack += (part.other, part.then, part.condition)
+        elif isinstance(part, Item):
+            stack.append(part.index)
+    return result
+
+
+def names_used(blocks: Iterable[Block]) -> set[str]:
+    """Return every name that some blocks read or write."""
+    return {name for block in blocks for name in block_names(block)}
+
+
+def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
+    """Return a block's name and those of all that it runs."""
+    result, stack = set[str](), [name]
+    while stack:
+        block_name = stack.pop()
+        if block_name not in result:
+            result.add(block_name)
+            stack += [op.block for op in walk_ops(blocks[block_name]) if isinstance(op, RunBlock)]
+    return result
+
+
+def substitute_variable(block: Block, name: str, constant: int) -> Block:
+    """Return assignments and stores in which a whole-number variable has a value."""
+    ops: list[Op] = []
+    for op in block:
+        match op:
+            case Assign(target, value, key):
+                ops.append(Assign(target, _substitute_in_expr(value, name, constant), key))
+            case Store(array, index, value):
+                parts = (_substitute_in_expr(part, name, constant) for part in (index, value))
+                ops.append(Store(array, *parts))
+            case _:
+                raise TypeError(f"neither an assignment nor a store: {op!r}")
+    return tuple(ops)
+
+
+def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
+    def part(inner: Expr) -> Expr:
+        return _substitute_in_expr(inner, name, constant)
+
+    match expr:
+        case Ref(variable):
+            return Value(constant) if variable == name else expr
+        case Item(array, index, is_whole):
+            return Item(array, part(index), is_whole)
+        case Unary(operator, operand):
+            return Unary(operator, part(operand))
+        case Binary(operator, left, right):
+            return Binary(operator, part(left), part(right))
+        case Compare(operator, left, right):
+            return Compare(operator, part(left), part(right))
+        case Select(condition, then, other):
+            return Select(part(condition), part(then), part(other))
+        case Call(function, arguments):
+            return Call(function, tuple(part(argument) for argument in arguments))
+        case Value():
+            return expr

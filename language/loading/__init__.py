@@ -1,0 +1,1 @@
+"""Reading of whole documents: automata, systems, scenarios, recording maps."""

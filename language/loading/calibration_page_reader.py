@@ -1,0 +1,105 @@
+"""Page reader: calibrations that change while a system runs, by time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+from language.loading.stimulus_reader import StimulusReader
+from language.lowering.wait_ticks import tunable_waits
+from language.model.declaration import Parameter
+from language.model.system import ScheduledCalibration, System
+from language.text.diagnostic import Problems, Source, Span, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+
+
+def read_pages(
+    node: YamlNode | None, system: System, problems: Problems
+) -> tuple[ScheduledCalibration, ...]:
+    """Return the pages of `pages: {1.5 s: {est.k_hs: 6000 N*m/rad}}`, problems reported."""
+    return _PageReader(problems, system).read_pages(node)
+
+
+def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibration, ...]:
+    """Return the pages of command-line texts `1.5 s: k_hs = 6000 N*m/rad`. Raises SpecError."""
+    problems = Problems()
+    times: dict[str, MappingNode] = {}
+    for text in texts:
+        span = Span(Source("--change", (text,)), 1, 1, max(1, len(text)))
+        time, colon, rest = text.partition(":")
+        name, equals, value = rest.partition("=")
+        if not (colon and equals and time.strip() and name.strip() and value.strip()):
+            label = "a change of the calibration is `time: parameter = value`"
+            problems.error("form", span, label, "like `1.5 s: k_hs = 6000 N*m/rad`")
+            continue
+        entry = Entry(name.strip(), span, ScalarNode(value.strip(), span))
+        before = times.get(time.strip(), MappingNode({}, span))
+        times[time.strip()] = MappingNode({**before.entries, entry.key: entry}, span)
+    table = {time: Entry(time, page.span, page) for time, page in times.items()}
+    problems.raise_if_errors()
+    found = read_pages(MappingNode(table, Span(Source("--change"), 1, 1)), system, problems)
+    problems.raise_if_errors()
+    return found
+
+
+class _PageReader(StimulusReader):
+    """Each page is a table of tunable parameters at a time."""
+
+    def __init__(self, problems: Problems, system: System) -> None:
+        super().__init__(problems)
+        self.system = system
+        self.waits = {name: tunable_waits(i.automaton) for name, i in system.instances.items()}
+        self.tunable: dict[str, dict[str, Parameter]] = {
+            name: {
+                p.name: p
+                for p in instance.automaton.parameters.values()
+                if _is_changeable(p) and p.name not in self.waits[name]
+            }
+            for name, instance in system.instances.items()
+        }
+
+    def read_pages(self, node: YamlNode | None) -> tuple[ScheduledCalibration, ...]:
+        found: list[ScheduledCalibration] = []
+        for entry in self.read_mapping(node, "pages"):
+            error_count = len(self.problems.reported)
+            time = self.read_time(
+                ScalarNode(entry.key, entry.span), "the time of a page", entry.span
+            )
+            is_time = len(self.problems.reported) == error_count
+            if is_time and found and time <= found[-1].time:
+                self.problems.error("order", entry.span, "pages are in the order of time")
+            values: dict[tuple[str, str], Fraction] = {}
+            for item in self.read_mapping(entry.node, f"pages.{entry.key}"):
+                values.update(self._read_values(item))
+            found.append(ScheduledCalibration(time, values))
+        return tuple(found)
+
+    def _read_values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
+        """A parameter of one instance, or of all that have it as a tunable one."""
+        owner, dot, name = entry.key.rpartition(".")
+        held = [o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)]
+        if held:
+            label = f"`{held[0]}.{name}` is a wait: it stays as it is while a system runs"
+            self.problems.error("name", entry.span, label)
+            return {}
+        owners = [o for o in self.tunable if name in self.tunable[o] and (not dot or o == owner)]
+        if not owners:
+            known = [f"{o}.{n}" for o, tunable in self.tunable.items() for n in tunable]
+            label = f"`{entry.key}` is not a tunable parameter of `{self.system.name}`"
+            hint = suggest_name(entry.key, [*known, *(n for t in self.tunable.values() for n in t)])
+            self.problems.error("name", entry.span, label, hint)
+        return {(o, name): self._read_tunable(entry, self.tunable[o][name]) for o in owners}
+
+    def _read_tunable(self, entry: Entry, parameter: Parameter) -> Fraction:
+        value, _ = self.read_quantity(entry.node, entry.key, entry.span, parameter.unit)
+        limits = parameter.range
+        if limits and not limits[0] <= value <= limits[1]:
+            place = entry.node.span
+            label = f"the value of `{parameter.name}` is outside its range"
+            self.problems.error("range", place, label)
+        return value
+
+
+def _is_changeable(parameter: Parameter) -> bool:
+    """Tables, whole numbers, waits and words stay as they are while a system runs."""
+    return parameter.kind == "tunable" and parameter.type == "real" and parameter.table is None

@@ -1,0 +1,316 @@
+"""Connection reader: sensors, connections and outputs of a system, as expressions of signals."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.checks.declared_names import declared_kind
+from language.expressions.syntax_tree import (
+    BoolLiteral,
+    ErrorNode,
+    FunctionCall,
+    Name,
+    NumberLiteral,
+    SyntaxTree,
+    children,
+    names,
+    walk,
+)
+from language.expressions.units import PURE_NUMBER, SECOND, Dimension, Unit, are_compatible
+from language.model.declaration import Formula
+from language.model.system import Connection, DelayedSignal, Instance, Sensor, SystemInput
+from language.reading.difference_literal import read_difference
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.infer import TypeChecker
+from language.typecheck.types import ExprType, IntType
+
+SENSOR_KEYS = ("of", "filter", "delay", "noise", "quantise", "sample")
+
+
+class ConnectionReader(Reader):
+    """What is known on the wires of a system, and what reads it."""
+
+    def __init__(
+        self,
+        problems: Problems,
+        inputs: Mapping[str, SystemInput],
+        instances: Mapping[str, Instance],
+    ) -> None:
+        """Read against the inputs and instances of the system."""
+        super().__init__(problems)
+        self.inputs = inputs
+        self.instances = instances
+        self.sensors: dict[str, Sensor] = {}
+        self.lines: dict[str, DelayedSignal] = {}
+        self.dimensions: dict[str, Dimension] = {}
+        self.kinds: dict[str, ExprType] = {n: declared_kind(thing) for n, thing in inputs.items()}
+        self.instance_outputs: dict[str, ExprType] = {}
+        for instance in instances.values():
+            self.instance_outputs.update(output_kinds(instance))
+        self.kinds.update(self.instance_outputs)
+        self.measurable = {n: k for n, k in self.kinds.items() if isinstance(k, Dimension)}
+
+    # Sensors.
+
+    def read_sensors(self, node: YamlNode | None) -> None:
+        """Read `sensors`; they are known to connections and outputs from then on."""
+        for entry in self.named_entries(node, "sensors"):
+            if entry.key in self.inputs or entry.key in self.instances:
+                label = f"`{entry.key}` is an input or an instance of the system, too"
+                self.problems.error("duplicate", entry.span, label)
+                continue
+            with self.problems.collect_errors():
+                sensor = self._read_sensor(entry)
+                self.sensors[entry.key] = sensor
+                self.kinds[entry.key] = sensor.dimension
+
+    def _read_sensor(self, entry: Entry) -> Sensor:
+        table = self.read_mapping(entry.node, f"sensors.{entry.key}", SENSOR_KEYS)
+        source = self.read_scalar(table.get("of"), "of", entry.span)
+        dimension = self.measurable.get(source.text, PURE_NUMBER) if source else PURE_NUMBER
+        if source and source.text not in self.measurable:
+            label = f"`{source.text}` is not an input or an output of an instance with a real value"
+            self.problems.error(
+                "name", source.span, label, suggest_name(source.text, self.measurable)
+            )
+        unit = Unit(str(dimension), Fraction(1), dimension)
+        lag = self._read_stage(table, "filter", "lag", None)
+        noise = self._read_stage(table, "noise", "sd", unit)
+        period, offset = self._read_sample(table.get("sample"), entry.span)
+        delay = self._read_time(table.get("delay"), "delay")
+        sensor = Sensor(
+            name=entry.key,
+            source=source.text if source else "",
+            dimension=dimension,
+            lag=lag,
+            delay=delay,
+            noise=noise,
+            quantum=self._read_positive(table.get("quantise"), "quantise", unit),
+            period=period,
+            offset=offset,
+            span=entry.span,
+        )
+        if lag and source and source.text in self.inputs:
+            label = "a sensor of an input of the system has no `filter`"
+            hint = "filter it in an automaton: `update: {y: previous(y) + ...}`"
+            self.problems.error("connection", table.entries["filter"].span, label, hint)
+        for stage in ("delay", "noise"):
+            if period is None and stage in table.entries:
+                label = f"a sensor with `{stage}` has a `sample`"
+                hint = "like `sample: 1 ms`, the period at which it measures"
+                self.problems.error("missing", table.entries[stage].span, label, hint)
+        return sensor
+
+    def _read_stage(self, table: MappingNode, stage: str, key: str, unit: Unit | None) -> Fraction:
+        node = table.get(stage)
+        if node is None:
+            return Fraction(0)
+        inner = self.read_mapping(node, stage, (key,)).get(key)
+        if inner is None:
+            self.problems.error("missing", node.span, f"`{stage}` has a `{key}`")
+            return Fraction(0)
+        if unit is None:
+            return self._read_time(inner, f"{stage}.{key}")
+        return self._read_positive(inner, f"{stage}.{key}", unit)
+
+    def _read_sample(self, node: YamlNode | None, span: Span) -> tuple[Fraction | None, Fraction]:
+        if node is None:
+            return None, Fraction(0)
+        if isinstance(node, ScalarNode):
+            return self._read_time(node, "sample"), Fraction(0)
+        table = self.read_mapping(node, "sample", ("period", "offset"))
+        if "period" not in table.entries:
+            self.problems.error("missing", span, "`sample` has a `period`")
+            return None, Fraction(0)
+        offset = table.get("offset")
+        zero = isinstance(offset, ScalarNode) and offset.text.partition(" ")[0] == "0"
+        later = Fraction(0) if zero else self._read_time(offset, "offset")
+        return self._read_time(table.get("period"), "period"), later
+
+    def _read_time(self, node: YamlNode | None, what: str) -> Fraction:
+        if node is None:
+            return Fraction(0)
+        value, unit = self.read_quantity(node, what, node.span, None)
+        if value <= 0 or not are_compatible(unit.dimension, SECOND):
+            label = f"`{what}` is a time above zero, like `5 ms`"
+            self.problems.error("range", node.span, label)
+            return Fraction(1, 1000)
+        return value
+
+    def _read_positive(self, node: YamlNode | None, what: str, unit: Unit) -> Fraction:
+        if node is None:
+            return Fraction(0)
+        value = read_difference(self, node, what, node.span, unit)
+        if value <= 0:
+            self.problems.error("range", node.span, f"`{what}` is above zero")
+        return value
+
+    # Connections.
+
+    def read_connections(self, node: YamlNode | None) -> dict[tuple[str, str], Connection]:
+        """Return what each input of an instance reads."""
+        found = {}
+        for entry in self.read_mapping(node, "connections"):
+            owner, _, name = entry.key.partition(".")
+            target = self.instances.get(owner)
+            if target is None or name not in target.automaton.inputs:
+                known = [
+                    f"{i.name}.{n}" for i in self.instances.values() for n in i.automaton.inputs
+                ]
+                label = f"`{entry.key}` is not an input of an instance"
+                self.problems.error("name", entry.span, label, suggest_name(entry.key, known))
+                continue
+            source = self.read_scalar(entry.node, entry.key, entry.span)
+            if source is None:
+                continue
+            with self.problems.collect_errors():
+                found[owner, name] = self._read_connection(target, name, source)
+        return found
+
+    def _read_connection(self, target: Instance, name: str, source: ScalarNode) -> Connection:
+        wanted = target.automaton.inputs[name]
+        to = (target.name, name)
+        formula = self.read_expression(source, name, source.span)
+        tree = formula.tree if formula else ErrorNode(source.span)
+        if isinstance(tree, BoolLiteral) and wanted.is_bool:
+            return Connection(to, Fraction(tree.value), source.span)
+        if source.text in wanted.values or (not names(tree) and not wanted.is_bool):
+            unit, values = wanted.unit, wanted.values
+            value = self.read_typed_value(
+                source, source.text, source.span, unit, wanted.type, values
+            )
+            return Connection(to, value, source.span)
+        tree = self._replace_delays(tree)
+        if isinstance(tree, Name):
+            self._check_direct_connection(tree, declared_kind(wanted))
+            return Connection(to, tree.path, source.span)
+        check = TypeChecker(self._scope(), self.problems)
+        check.check_assignment(tree, declared_kind(wanted), f"the input {name}")
+        return Connection(to, Formula(tree, f"connections.{target.name}.{name}"), source.span)
+
+    def _check_direct_connection(self, tree: Name, expected: ExprType) -> None:
+        kind = self.kinds.get(tree.path)
+        if kind is None:
+            label = f"`{tree.path}` is not an input of the system or an output of an instance"
+            self.problems.error(
+                "name", tree.span, label, suggest_name(tree.path, self._connectable_names())
+            )
+        elif not _is_connectable(kind, expected):
+            label = (
+                f"`{tree.path}` is {_describe_kind(kind)}, the input is {_describe_kind(expected)}"
+            )
+            self.problems.error("dimension", tree.span, label)
+
+    def _connectable_names(self) -> list[str]:
+        return [name for name in self.kinds if name not in self.lines]
+
+    def _scope(self) -> NameEnvironment:
+        return NameEnvironment(self.kinds, location="in this system")
+
+    def _replace_delays(self, tree: SyntaxTree) -> SyntaxTree:
+        """Replace every `delay(signal, d)` by the name of a line."""
+        if isinstance(tree, FunctionCall) and tree.function == "delay":
+            return self._add_delay_line(tree)
+        changed: dict[str, object] = {}
+        for field in dataclasses.fields(tree):
+            part = getattr(tree, field.name)
+            if isinstance(part, tuple):
+                changed[field.name] = tuple(self._replace_delays(item) for item in part)
+            elif any(part is child for child in children(tree)):
+                changed[field.name] = self._replace_delays(part)
+        return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[arg-type]
+
+    def _add_delay_line(self, tree: FunctionCall) -> SyntaxTree:
+        match tree.arguments:
+            case (Name(path, span), NumberLiteral(delay, unit, _)) if are_compatible(
+                unit.dimension, SECOND
+            ):
+                if path not in self.kinds or path in self.lines:
+                    label = f"`{path}` is not an input of the system or an output of an instance"
+                    self.problems.error(
+                        "name", span, label, suggest_name(path, self._connectable_names())
+                    )
+                    return ErrorNode(span)
+                if delay == 0:
+                    return Name(path, tree.span)
+                name = f"delay.{path}.{delay.numerator}.{delay.denominator}"
+                self.lines[name] = DelayedSignal(name, path, delay)
+                self.kinds[name] = self.kinds[path]
+                return Name(name, tree.span)
+        label = "a delay is `delay(signal, time)`, like `delay(T_req, 1 ms)`"
+        self.problems.error("arguments", tree.span, label)
+        return ErrorNode(tree.span)
+
+    # Outputs.
+
+    def read_outputs(self, node: YamlNode | None) -> dict[str, str | Formula]:
+        """Return the outputs of the system: a signal by name, or an expression."""
+        found: dict[str, str | Formula] = {}
+        for entry in self.named_entries(node, "outputs"):
+            source = self.read_scalar(entry.node, entry.key, entry.span)
+            if source is None:
+                continue
+            if entry.key in self.inputs or entry.key in self.sensors:
+                label = f"`{entry.key}` is an input or a sensor of the system, too"
+                self.problems.error("duplicate", entry.span, label)
+            if source.text.endswith(".mode") and source.text.split(".")[0] in self.instances:
+                found[entry.key] = self._read_output(source)
+                continue
+            formula = self.read_expression(source, entry.key, entry.span)
+            if formula is None:
+                continue
+            if isinstance(formula.tree, Name):
+                found[entry.key] = self._read_output(source)
+                continue
+            self._check_no_delay(formula.tree)
+            kind = TypeChecker(self._scope(), self.problems).infer_type(formula.tree)
+            if isinstance(kind, Dimension):
+                self.dimensions[entry.key] = kind
+            found[entry.key] = Formula(formula.tree, f"outputs.{entry.key}")
+        return found
+
+    def _read_output(self, source: ScalarNode) -> str:
+        known = [
+            f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
+        ]
+        if source.text not in (*known, *self.sensors, *self.inputs):
+            label = f"`{source.text}` is not an output of an instance"
+            self.problems.error("name", source.span, label, suggest_name(source.text, known))
+        return source.text
+
+    def _check_no_delay(self, tree: SyntaxTree) -> None:
+        for part in walk(tree):
+            if isinstance(part, FunctionCall) and part.function == "delay":
+                label = "an output of a system is not delayed"
+                self.problems.error("form", part.span, label, "a sensor may have a `delay`")
+
+
+def output_kinds(instance: Instance) -> dict[str, ExprType]:
+    """Return what the outputs of an instance are; its mode, a number, is not among them."""
+    automaton = instance.automaton
+    return {
+        f"{instance.name}.{name}": automaton.name_types[automaton.output_source(name)]
+        for name in automaton.outputs
+        if automaton.output_source(name) in automaton.name_types
+    }
+
+
+def _is_connectable(source: ExprType, target: ExprType) -> bool:
+    """A connection joins equal kinds; a whole number may be read as a real number."""
+    if isinstance(target, Dimension):
+        real = PURE_NUMBER if isinstance(source, IntType) else source
+        return isinstance(real, Dimension) and are_compatible(real, target)
+    if isinstance(target, IntType):
+        return isinstance(source, IntType)
+    return source == target
+
+
+def _describe_kind(kind: ExprType) -> str:
+    if kind == "truth":
+        return "true or false"
+    return f"in `{kind}`" if isinstance(kind, Dimension) else f"`{kind}`"

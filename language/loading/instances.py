@@ -1,0 +1,287 @@
+"""Instance: another automaton as a parallel region of this one, read as `main.closed`.
+
+Its modes become the region `main`; its parameters, states, discrete variables and equations get
+names of ours, `main_closed`. What stands for one of its inputs is an expression of ours, as the
+equation `main_command`. Its period is ours, and it has neither a model nor regions itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from language.expressions.name_rules import NAME_PATTERN, check_name, check_region_name
+from language.expressions.text_rewrite import rename_names, substitute_reads
+from language.overlays.effect_reader import added_names
+from language.overlays.expand_document import expand_document
+from language.overlays.parameter_override import override_parameter
+from language.overlays.tree_types import mode_mappings
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Source, suggest_name
+from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.formula_sites import ALL_SCALARS, EFFECT_SITES, KeyPath, map_formulas
+from language.text.node_edit import find_node, put_node, replace_source
+from language.text.project_files import Project, read_document
+from language.text.requirement import find_requirements
+
+FORBIDDEN_KEYS = (
+    *("model", "regions", "instances", "tables", "faults", "fault_mode"),
+    *("events", "order", "micro_steps"),
+)
+"""What only an automaton on its own has."""
+SECTIONS = ("parameters", "states", "discrete", "equations", "flow", "terms", "templates")
+VARIABLE_SECTIONS = ("parameters", "states", "discrete", "equations", "flow", "terms")
+"""Sections whose keys are names of variables; so are those of stages and balances in modes."""
+VARIABLE_MODE_SECTIONS = ("equations", "flow", "terms", "update", "entry", "exit", "reset")
+REGION_SECTIONS = ("initial", "modes", "transition_table")
+HOST_EXPRESSIONS = {**EFFECT_SITES, "instances": {"*": {"inputs": ALL_SCALARS}}}
+
+
+@dataclass(frozen=True)
+class _InstanceDeclaration:
+    """One instance: what is asked of it, and the tree of what it is of."""
+
+    entry: Entry
+    options: MappingNode
+    tree: MappingNode
+    names: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        return self.entry.key
+
+    @property
+    def host_names_of_outputs(self) -> dict[str, str]:
+        """What its outputs are to us: `main.closed` is `main_closed`."""
+        outputs = self.tree.get("outputs")
+        found: dict[str, str] = {}
+        for item in outputs.nodes if isinstance(outputs, SequenceNode) else ():
+            if isinstance(item, ScalarNode):
+                found[item.text] = item.text
+        for output in outputs if isinstance(outputs, MappingNode) else ():
+            if isinstance(output.node, ScalarNode):
+                found[output.key] = output.node.text
+        known = {out: source for out, source in found.items() if source in self.names}
+        return {f"{self.name}.{out}": self.names[source] for out, source in known.items()}
+
+
+def expand_instances(tree: MappingNode, project: Project, problems: Problems) -> MappingNode:
+    """Return an automaton's tree with its instances as regions. Raises SpecError."""
+    node = tree.get("instances")
+    if node is None:
+        return tree
+    reader = _InstanceReader(problems, tree, project)
+    read = [reader.read_instance(entry) for entry in reader.read_mapping(node, "instances")]
+    instances = [instance for instance in read if instance]
+    reads = {
+        path: name
+        for instance in instances
+        for path, name in instance.host_names_of_outputs.items()
+    }
+    tree = _rename_output_reads(tree, reads)
+    for instance in instances:
+        asked = find_node(tree, ("instances", instance.name))
+        assert isinstance(asked, MappingNode)
+        tree = reader.merge_instance(tree, instance, asked)
+    problems.raise_if_errors()
+    return MappingNode(
+        {k: entry for k, entry in tree.entries.items() if k != "instances"}, tree.span
+    )
+
+
+def _rename_output_reads(tree: MappingNode, reads: Mapping[str, str]) -> MappingNode:
+    """Return a tree in which outputs of instances are read by their names among ours."""
+
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        text, found = substitute_reads(scalar.text, reads)
+        return ScalarNode(text, scalar.span) if found else scalar
+
+    tree = map_formulas(tree, HOST_EXPRESSIONS, change)
+    outputs = tree.get("outputs")
+    if isinstance(outputs, SequenceNode):
+        named = (_rename_scalar(item, reads) for item in outputs.nodes)
+        return put_node(tree, ("outputs",), SequenceNode(tuple(named), outputs.span))
+    for output in outputs if isinstance(outputs, MappingNode) else ():
+        tree = put_node(tree, ("outputs", output.key), _rename_scalar(output.node, reads))
+    return tree
+
+
+def _rename_scalar(node: YamlNode, new: Mapping[str, str]) -> YamlNode:
+    return (
+        ScalarNode(new.get(node.text, node.text), node.span)
+        if isinstance(node, ScalarNode)
+        else node
+    )
+
+
+class _InstanceReader(Reader):
+    """Reads the instances of one automaton's tree."""
+
+    def __init__(self, problems: Problems, tree: MappingNode, project: Project) -> None:
+        super().__init__(problems)
+        self.tree = tree
+        self.project = project
+
+    def read_instance(self, entry: Entry) -> _InstanceDeclaration | None:
+        """Return an instance with the tree of what it is of, None where that cannot be one."""
+        check_region_name(entry.key, entry.span, self.problems)
+        asked = self.read_mapping(entry.node, f"instances.{entry.key}", ("of", "inputs", "values"))
+        of = self.read_scalar(asked.get("of"), "of", entry.span)
+        known = len(self.problems.reported)
+        root = self._read_root(of) if of else None
+        if root is None or len(self.problems.reported) > known:
+            return None
+        inputs = self.read_mapping(root.get("inputs"), "inputs")
+        own = [*added_names(root), *inputs.entries]
+        own += [name for mode in mode_mappings(root) for name in _equation_names(mode)]
+        names = {name: f"{entry.key}_{name}" for name in own}
+        return _InstanceDeclaration(entry, asked, root, names)
+
+    def _read_root(self, reference: ScalarNode) -> MappingNode | None:
+        with self.problems.collect_errors():
+            document = read_document(self.project.path_of(reference.text, reference.span))
+            document = expand_document(document, self.project, self.problems)
+            self._check_document(document, reference)
+            return document.root
+        return None
+
+    def _check_document(self, document: Document, reference: ScalarNode) -> None:
+        if document.kind != "automaton":
+            label = f"`{document.name}` is a {document.kind}, not an automaton"
+            self.problems.error("form", reference.span, label)
+            return
+        for key in FORBIDDEN_KEYS:
+            if key in document.root.entries:
+                label = f"`{document.name}` has `{key}`: an instance has none"
+                self.problems.error("form", reference.span, label)
+        periods = [self._read_period(tree) for tree in (document.root, self.tree)]
+        if periods[0] != periods[1]:
+            label = f"`{document.name}` has another period than what it is an instance in"
+            hint = "give both one period, or make them instances of a system"
+            self.problems.error("form", reference.span, label, hint)
+
+    def _read_period(self, tree: MappingNode) -> object:
+        node = tree.get("period")
+        return self.read_quantity(node, "period", node.span, None)[0] if node else None
+
+    def merge_instance(
+        self, tree: MappingNode, instance: _InstanceDeclaration, options: MappingNode
+    ) -> MappingNode:
+        """Return our tree with one instance in it; `options` has its inputs as we read them."""
+        entry, names = instance.entry, instance.names
+        for final in names.values():
+            self._check_host_name(tree, final, entry)
+        theirs = instance.tree.span.source
+        layer = Source(theirs.name, theirs.lines, f"instance {entry.key}", entry.span)
+        body = replace_source(instance.tree, layer)
+        assert isinstance(body, MappingNode)
+        body = self._apply_values(body, options)
+        inputs = self._input_expressions(body, options, entry)
+        body = _rename_to_host(body, instance)
+        for section in SECTIONS:
+            for thing in self.read_mapping(body.get(section), section):
+                tree = put_node(tree, (section, thing.key), thing.node)
+        for name, node in inputs.items():
+            tree = put_node(tree, ("equations", names[name]), node)
+        region = {key: body.entries[key] for key in REGION_SECTIONS if key in body.entries}
+        region |= _requirements_entry(entry, body)
+        if "modes" not in region:
+            always = MappingNode(
+                {"always": Entry("always", entry.span, MappingNode({}, entry.span))}, entry.span
+            )
+            region["modes"] = Entry("modes", entry.span, always)
+        if find_node(tree, ("regions", entry.key)) is not None:
+            label = f"there is a region `{entry.key}` already"
+            self.problems.error("duplicate", entry.span, label)
+        return put_node(tree, ("regions", entry.key), MappingNode(region, entry.span))
+
+    def _check_host_name(self, tree: MappingNode, host_name: str, entry: Entry) -> None:
+        taken = [*added_names(tree), *self.read_mapping(tree.get("inputs"), "inputs").entries]
+        if not NAME_PATTERN.fullmatch(host_name):
+            label = f"`{entry.key}` would have a name `{host_name}` of {len(host_name)} characters"
+            self.problems.error("name", entry.span, label, "a shorter name of the instance")
+        elif host_name in taken:
+            label = f"`{entry.key}` would have a name `{host_name}`, which is taken"
+            self.problems.error("duplicate", entry.span, label, "another name of the instance")
+        else:
+            check_name(host_name, entry.span, self.problems)
+
+    def _apply_values(self, body: MappingNode, options: MappingNode) -> MappingNode:
+        parameters = self.read_mapping(body.get("parameters"), "parameters").entries
+        for value in self.read_mapping(options.get("values"), "values"):
+            known = parameters.get(value.key)
+            if known is None or not isinstance(known.node, MappingNode):
+                label = f"there is no parameter `{value.key}`"
+                self.problems.error("name", value.span, label, suggest_name(value.key, parameters))
+            elif "derived" in known.node.entries:
+                label = f"`{value.key}` is derived: set what it follows from"
+                self.problems.error("values", value.span, label)
+            else:
+                made = override_parameter(known.node, value.node, self.problems)
+                body = put_node(body, ("parameters", value.key), made)
+        return body
+
+    def _input_expressions(
+        self, body: MappingNode, options: MappingNode, entry: Entry
+    ) -> dict[str, ScalarNode]:
+        """Return what stands for each input: an expression of ours, or its default."""
+        declared = self.read_mapping(body.get("inputs"), "inputs").entries
+        given = self.read_mapping(options.get("inputs"), "inputs").entries
+        for name, own in given.items():
+            if name not in declared:
+                label = f"there is no input `{name}`"
+                self.problems.error("name", own.span, label, suggest_name(name, declared))
+        found: dict[str, ScalarNode] = {}
+        for name, thing in declared.items():
+            default = thing.node.get("default") if isinstance(thing.node, MappingNode) else None
+            node = given[name].node if name in given else default
+            if isinstance(node, ScalarNode):
+                found[name] = node
+            else:
+                label = f"the input `{name}` of `{entry.key}` has no value"
+                hint = f"`inputs: {{{name}: ...}}`"
+                self.problems.error("missing", entry.span, label, hint)
+        return found
+
+
+def _requirements_entry(entry: Entry, body: MappingNode) -> dict[str, Entry]:
+    """Return `req` of an instance: its own, and all of what it is of that becomes nothing else."""
+    kept = {
+        key: each for key, each in body.entries.items() if key not in (*SECTIONS, *REGION_SECTIONS)
+    }
+    named = [*find_requirements(entry.node), *find_requirements(MappingNode(kept, body.span))]
+    names = tuple(ScalarNode(each.requirement, each.span) for each in named)
+    return {"req": Entry("req", entry.span, SequenceNode(names, entry.span))} if names else {}
+
+
+def _equation_names(mode: MappingNode) -> Iterator[str]:
+    table = mode.get("equations")
+    yield from table.entries if isinstance(table, MappingNode) else ()
+
+
+def _rename_to_host(body: MappingNode, instance: _InstanceDeclaration) -> MappingNode:
+    """Return a tree whose names are ours, where they are read and where they are written."""
+
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        text = rename_names(scalar.text, instance.names)
+        return ScalarNode(text, scalar.span) if text != scalar.text else scalar
+
+    return _rename_keys(map_formulas(body, EFFECT_SITES, change), instance, ())
+
+
+def _rename_keys(table: MappingNode, instance: _InstanceDeclaration, path: KeyPath) -> MappingNode:
+    made = {}
+    for entry in table:
+        key, node = entry.key, entry.node
+        if isinstance(node, MappingNode):
+            node = _rename_keys(node, instance, (*path, key))
+        elif key == "like" and isinstance(node, ScalarNode):
+            node = ScalarNode(f"{instance.name}_{node.text}", node.span)
+        if (len(path) == 1 and path[0] in VARIABLE_SECTIONS) or (
+            len(path) > 2 and path[-1] in VARIABLE_MODE_SECTIONS
+        ):
+            key = instance.names.get(key, key)
+        elif path == ("templates",):
+            key = f"{instance.name}_{key}"
+        made[key] = Entry(key, entry.span, node)
+    return MappingNode(made, table.span)

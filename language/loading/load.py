@@ -1,0 +1,62 @@
+"""Load: from a name or path to a checked Automaton, and from that to its Program."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from language.checks.check_automaton import check_automaton
+from language.checks.check_number_range import check_numbers
+from language.ir.program import Program
+from language.loading.automaton_reader import read_automaton
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project
+from language.passes.constant_folding import run_passes
+from language.programs.continuous_program import lower_continuous_automaton
+from language.programs.sampled_program import lower_sampled_automaton
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document, ScalarNode, YamlNode
+
+
+def automaton_of(
+    document: Document,
+    project: Project,
+    values: Mapping[str, YamlNode] | None = None,
+    problems: Problems | None = None,
+) -> Automaton:
+    """Return the checked automaton of a document; warnings are left in `problems`.
+
+    Raises SpecError with all problems.
+    """
+    problems = problems or Problems()
+    return check_automaton(read_automaton(document, project, values, problems), problems)
+
+
+def load_automaton(
+    reference: str, project: Project, values: Mapping[str, YamlNode] | None = None
+) -> Automaton:
+    """Return the checked automaton of a name or path. Raises SpecError with all problems."""
+    return automaton_of(project.read(project.path_of(reference)), project, values)
+
+
+def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
+    """Return the Program of a checked automaton; `varying` inputs change inside its steps.
+
+    Raises SpecError.
+    """
+    return run_passes(lower_automaton(automaton, varying))
+
+
+def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Program:
+    """Return the Program of a checked automaton before it is optimised. Raises SpecError."""
+    problems = Problems()
+    check_numbers(automaton, problems)
+    if automaton.is_sampled:
+        return lower_sampled_automaton(automaton, problems)
+    return lower_continuous_automaton(automaton, problems, varying)
+
+
+def command_line_value(text: str, option: str = "--set", name: str = "") -> ScalarNode:
+    """Return a value given on the command line, as a scalar with a place in `name=value`."""
+    shown = f"{name}={text}" if name else text
+    place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
+    return ScalarNode(text, place)

@@ -1,0 +1,96 @@
+"""Pairing: which columns of a map an automaton reads or compares, and what does not fit."""
+
+from __future__ import annotations
+
+from language.expressions.units import PURE_NUMBER, Dimension, are_compatible
+from language.loading.recording_map_reader import column_dimension
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping, RecordingMap
+from language.text.diagnostic import Problems, suggest_name
+
+
+def pair_columns(
+    automaton: Automaton, mapping: RecordingMap, problems: Problems
+) -> tuple[list[str], list[str]]:
+    """Return the columns of a map that an automaton reads or compares, and those left out.
+
+    Reported are an input without a column, one that is fed twice, a wrong dimension, an unknown
+    output. Columns and constants for inputs that it lacks are for others that the map serves.
+    """
+    used, left_out = [], []
+    fed = set(mapping.constants)
+    _check_constants(automaton, mapping, problems)
+    for column in mapping.columns.values():
+        if column.compare is not None:
+            _check_output(automaton, column, problems)
+            used.append(column.name)
+            continue
+        thing = automaton.inputs.get(column.to or "")
+        if thing is None:
+            left_out.append(column.name)
+            continue
+        _check_dimension(column, thing.unit.dimension, f"input `{thing.name}`", problems)
+        if thing.name in fed:
+            problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
+        fed.add(thing.name)
+        used.append(column.name)
+    for name, thing in automaton.inputs.items():
+        if name not in fed and thing.default is None:
+            label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
+            problems.error("missing", mapping.span, label, suggest_name(name, left_out))
+    return used, left_out
+
+
+def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
+    """Report what keeps recordings from being compared with an automaton.
+
+    Here every column is for it: one for an input that it lacks is most often a name misspelt.
+    """
+    _, left_out = pair_columns(automaton, mapping, problems)
+    for name in left_out:
+        column = mapping.columns[name]
+        label = f"`{column.to}` is not an input of `{automaton.name}`"
+        help = (
+            suggest_name(column.to or "", automaton.inputs)
+            or "leave out what the model does not read"
+        )
+        problems.error("name", column.span, label, help)
+    first: dict[str, str] = {}
+    for column in mapping.columns.values():
+        if column.compare is None:
+            continue
+        if column.compare in first:
+            label = f"output `{column.compare}` is compared with `{first[column.compare]}` already"
+            problems.error("duplicate", column.span, label, "each output is measured by one column")
+        first.setdefault(column.compare, column.name)
+    if not first:
+        label = f"map `{mapping.name}` compares no output of `{automaton.name}`"
+        hint = f"a column with `compare: {next(iter(automaton.outputs), 'output')}`"
+        problems.error("missing", mapping.span, label, hint)
+
+
+def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problems) -> None:
+    output = column.compare or ""
+    if output in automaton.outputs:
+        want = automaton.dimensions.get(automaton.output_source(output), PURE_NUMBER)
+        _check_dimension(column, want, f"output `{output}`", problems)
+        return
+    label = f"`{output}` is not an output of `{automaton.name}`"
+    problems.error("name", column.span, label, suggest_name(output, automaton.outputs))
+
+
+def _check_dimension(
+    column: ColumnMapping, expected: Dimension, what: str, problems: Problems
+) -> None:
+    if not are_compatible(column_dimension(column), expected):
+        label = f"column `{column.name}` is in `{column_dimension(column).display_name}`"
+        problems.error("dimension", column.span, label, f"{what} is in `{expected.display_name}`")
+
+
+def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
+    for name, (_, dimension) in mapping.constants.items():
+        thing = automaton.inputs.get(name)
+        if thing and not are_compatible(dimension, thing.unit.dimension):
+            label = f"constant `{name}` is in `{dimension.display_name}`"
+            hint = f"input `{name}` is in `{thing.unit.dimension.display_name}`"
+            problems.error("dimension", mapping.span, label, hint)

@@ -1,0 +1,179 @@
+"""Map reader: how the columns of a recording become signals."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Literal, cast
+
+from language.expressions.constant_literal import evaluate_literal
+from language.expressions.units import (
+    NO_UNIT,
+    PURE_NUMBER,
+    SECOND,
+    Dimension,
+    are_compatible,
+    dimension_product,
+    parse_unit,
+)
+from language.model.system import ALL_FILES, ColumnMapping, RecordingMap, Window
+from language.overlays.expand_document import Project, expand_document
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span
+from language.text.document import (
+    Document,
+    Entry,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    YamlNode,
+    require_kind,
+)
+
+MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc")
+COLUMN_KEYS = (
+    "column mean to compare unit scale sign delay hold blank time".split()  # noqa: SIM905
+)
+
+
+def read_map(document: Document, project: Project) -> RecordingMap:
+    """Read a map. Raises SpecError with all problems."""
+    document = expand_document(document, project)
+    problems = Problems()
+    require_kind(document, "map", problems)
+    problems.raise_if_errors()
+    found = read_map_table(document.root, document.name, document.name_span, problems)
+    problems.raise_if_errors()
+    return found
+
+
+def read_map_table(root: MappingNode, name: str, span: Span, problems: Problems) -> RecordingMap:
+    """Return the map that a mapping of a file holds; what is wrong is reported."""
+    return _MapReader(problems).read(root, name, span)
+
+
+class _MapReader(Reader):
+    """The sections of a map."""
+
+    def read(self, root: MappingNode, name: str, span: Span) -> RecordingMap:
+        tree = self.read_mapping(root, f"map {name}", MAP_KEYS)
+        time = self.read_mapping(tree.get("time"), "time", ("column", "unit"))
+        has_time = "time" in tree.entries
+        unit = self.read_unit(time.get("unit")) if has_time else parse_unit("s")
+        if not are_compatible(unit.dimension, SECOND):
+            self.problems.error(
+                "unit", time.span if time.entries else span, "the unit of `time` is a time"
+            )
+        constants: dict[str, tuple[Fraction, Dimension]] = {}
+        for entry in self.named_entries(tree.get("constants"), "constants"):
+            value, own = self.read_quantity(entry.node, entry.key, entry.span, None)
+            constants[entry.key] = value, own.dimension
+        columns = [
+            self._read_column(entry) for entry in self.read_mapping(tree.get("columns"), "columns")
+        ]
+        if not columns:
+            self.problems.error("missing", span, "a map has at least one column in `columns`")
+        return RecordingMap(
+            name=name,
+            time=self.read_string(time.get("column"), "time.column", span) if has_time else "",
+            time_unit=unit,
+            columns={column.name: column for column in columns},
+            constants=constants,
+            span=span,
+            windows=self._read_windows(tree.get("windows")),
+            databases=self._read_databases(tree.get("dbc")),
+        )
+
+    def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
+        """One DBC file or a list of them."""
+        return (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
+
+    def _read_windows(self, node: YamlNode | None) -> dict[str, tuple[Window, ...]]:
+        """A list of windows for every file, or a mapping from file names to such lists."""
+        if node is None:
+            return {}
+        if not isinstance(node, MappingNode):
+            return {ALL_FILES: self._read_window_list(node)}
+        return {entry.key: self._read_window_list(entry.node) for entry in node}
+
+    def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
+        found: list[Window] = []
+        if not isinstance(node, SequenceNode) or not node.nodes:
+            label = "`windows` is a list like `[[1 s, 8 s]]`, or such a list for each file"
+            self.problems.error("form", node.span, label)
+            return ()
+        for item in node.nodes:
+            if not isinstance(item, SequenceNode) or len(item.nodes) != 2:
+                self.problems.error(
+                    "form", item.span, "a window is `[from, to]`, like `[1 s, 8 s]`"
+                )
+                continue
+            start, end = (self._read_time(part) for part in item.nodes)
+            if end <= start:
+                self.problems.error("range", item.span, "a window ends after it starts")
+            elif found and start <= found[-1][1]:
+                label = "this window starts before the one above it ends"
+                self.problems.error("range", item.span, label, "windows stand in order")
+            found.append((start, end))
+        return tuple(found)
+
+    def _read_time(self, node: YamlNode) -> Fraction:
+        value, unit = self.read_quantity(node, "a window", node.span, None)
+        if value and not are_compatible(unit.dimension, SECOND):
+            self.problems.error("dimension", node.span, "a window is in time, like `[1 s, 8 s]`")
+        return value
+
+    def _read_column(self, entry: Entry) -> ColumnMapping:
+        what = f"columns.{entry.key}"
+        table = self.read_mapping(entry.node, what, COLUMN_KEYS)
+        mean = table.get("mean")
+        names = [item.text for item in self.read_list(mean, f"{what}.mean")]
+        if isinstance(mean, SequenceNode) and not mean.nodes:
+            label = "`mean` is a list of at least one column"
+            self.problems.error("missing", mean.span, label)
+        column = table.get("column")
+        if not names:
+            names = [self.read_string(column, "column", entry.span) if column else entry.key]
+        elif column:
+            self.problems.error("form", entry.span, "`column` and `mean` exclude each other")
+        to, compare = table.get("to"), table.get("compare")
+        if (to is None) == (compare is None):
+            label = "a column has `to` (an input) or `compare` (an output)"
+            self.problems.error("missing", entry.span, label)
+        hold = self.read_choice(table.get("hold"), "hold", ("previous", "linear"), "previous")
+        blank = self.read_choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
+        delay = table.get("delay")
+        shift, unit = (
+            self.read_quantity(delay, "delay", delay.span, None)
+            if delay
+            else (Fraction(0), NO_UNIT)
+        )
+        if delay and ((shift and not are_compatible(unit.dimension, SECOND)) or shift < 0):
+            self.problems.error("unit", delay.span, "`delay` is a time of at least 0 s")
+        time = table.get("time")
+        return ColumnMapping(
+            name=entry.key,
+            columns=tuple(names),
+            to=self.read_string(to, "to", entry.span) if to else None,
+            compare=self.read_string(compare, "compare", entry.span) if compare else None,
+            unit=self.read_unit(table.get("unit")),
+            scale=self._read_scale(table),
+            sign=int(self.read_choice(table.get("sign"), "sign", ("1", "-1"), "1")),
+            delay=shift,
+            blank=cast(Literal["refuse", "skip"], blank),
+            time=self.read_string(time, "time", entry.span) if time else None,
+            span=entry.span,
+            hold=cast(Literal["previous", "linear"], hold),
+        )
+
+    def _read_scale(self, table: MappingNode) -> tuple[Fraction, Dimension]:
+        node = table.get("scale")
+        formula = self.read_expression(node, "scale", node.span) if node else None
+        if formula:
+            with self.problems.collect_errors():
+                return evaluate_literal(formula.tree)
+        return Fraction(1), PURE_NUMBER
+
+
+def column_dimension(column: ColumnMapping) -> Dimension:
+    """Return the dimension of what a column gives: its unit times its scale."""
+    return dimension_product(column.unit.dimension, column.scale[1])

@@ -1,0 +1,24 @@
+"""Signal kind: what each signal of a system is."""
+
+from __future__ import annotations
+
+from language.checks.declared_names import declared_kind
+from language.loading.connection_reader import output_kinds
+from language.model.system import System
+from language.typecheck.types import ExprType
+
+
+def signal_kinds(system: System) -> dict[str, ExprType]:
+    """Return what each signal of a system is: inputs, outputs of instances, sensors, outputs."""
+    found: dict[str, ExprType] = {
+        name: declared_kind(thing) for name, thing in system.inputs.items()
+    }
+    for instance in system.instances.values():
+        found.update(output_kinds(instance))
+    found.update({name: sensor.dimension for name, sensor in system.sensors.items()})
+    for name, output in system.outputs.items():
+        if isinstance(output, str) and output in found:
+            found[name] = found[output]
+        elif name in system.dimensions:
+            found[name] = system.dimensions[name]
+    return found

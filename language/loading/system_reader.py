@@ -1,0 +1,248 @@
+"""System reader: instances of automata, connected, in the order in which they run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+from language.expressions.units import SECOND, are_compatible
+from language.ir.number_type import NumberType
+from language.loading.connection_reader import ConnectionReader
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.model.graphs import find_cycle, format_cycle, topological_sort
+from language.model.system import Connection, Instance, System, SystemInput
+from language.overlays.expand_document import Project, expand_document
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, SpecError, suggest_name
+from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
+from language.text.node_edit import format_inline
+
+SYSTEM_KEYS = tuple(
+    "language system inputs instances sensors connections outputs".split()  # noqa: SIM905
+)
+SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type", "values")
+INSTANCE_KEYS = ("of", "values", "offset")
+
+Connections = Mapping[tuple[str, str], Connection]
+ExecutionOrder = tuple[str, ...]
+Overrides = Mapping[str, ScalarNode]
+"""Parameter values from the command line, by `parameter` or `instance.parameter`."""
+
+
+def read_system(document: Document, project: Project, overrides: Overrides | None = None) -> System:
+    """Read a system with all its automata, checked. Raises SpecError with all problems.
+
+    An automaton is read as a system of its own: see `around`.
+    """
+    plain, document = document, expand_document(document, project)
+    problems = Problems()
+    if document.kind == "automaton":
+        return single_instance_system(automaton_of(plain, project, overrides))
+    require_kind(document, "system", problems)
+    problems.raise_if_errors()
+    system = _SystemReader(problems, project, dict(overrides or {})).read(document)
+    problems.raise_if_errors()
+    return system
+
+
+def with_number_type(system: System, numbers: NumberType) -> System:
+    """Return the system with another number type in every instance."""
+    instances = {
+        name: dataclasses.replace(
+            instance, automaton=dataclasses.replace(instance.automaton, numbers=numbers)
+        )
+        for name, instance in system.instances.items()
+    }
+    return dataclasses.replace(system, instances=instances)
+
+
+def single_instance_system(automaton: Automaton) -> System:
+    """Return the system of one instance, named as its automaton, with the same inputs."""
+    name, at = automaton.name, automaton.span
+    return System(
+        name=name,
+        inputs={
+            thing.name: SystemInput(
+                thing.name, thing.unit, thing.default, thing.span, thing.type, thing.values
+            )
+            for thing in automaton.inputs.values()
+        },
+        instances={name: Instance(name, automaton, Fraction(0), name, at)},
+        connections={(name, key): Connection((name, key), key, at) for key in automaton.inputs},
+        outputs={},
+        order=(name,),
+        span=at,
+        sole_instance=name,
+    )
+
+
+class _SystemReader(Reader):
+    """The sections of a system, one method each."""
+
+    def __init__(
+        self, problems: Problems, project: Project, overrides: dict[str, ScalarNode]
+    ) -> None:
+        super().__init__(problems)
+        self.project = project
+        self.overrides = overrides
+        self.used_overrides: set[str] = set()
+        self.documents: dict[Path, Document] = {}
+        self.automaton_cache: dict[tuple[object, ...], Automaton] = {}
+
+    def read(self, document: Document) -> System:
+        tree = self.read_mapping(document.root, f"system {document.name}", SYSTEM_KEYS)
+        inputs = {
+            e.key: self._read_input(e) for e in self.named_entries(tree.get("inputs"), "inputs")
+        }
+        instances = {}
+        for entry in self.named_entries(tree.get("instances"), "instances"):
+            with self.problems.collect_errors():
+                instances[entry.key] = self._read_instance(entry)
+        if not self.problems.has_errors:
+            self._report_unused_overrides(instances)
+        self.problems.raise_if_errors()
+        wires = ConnectionReader(self.problems, inputs, instances)
+        wires.read_sensors(tree.get("sensors"))
+        connections = wires.read_connections(tree.get("connections"))
+        self._report_unconnected_inputs(connections, instances)
+        outputs = wires.read_outputs(tree.get("outputs"))
+        self.problems.raise_if_errors()
+        order = self._execution_order(wires, connections, document.name_span)
+        return System(
+            name=document.name,
+            inputs=inputs,
+            instances=instances,
+            connections=connections,
+            outputs=outputs,
+            order=order,
+            span=document.name_span,
+            sensors=wires.sensors,
+            delayed_signals=wires.lines,
+            dimensions=wires.dimensions,
+        )
+
+    def _read_input(self, entry: Entry) -> SystemInput:
+        table = self.read_mapping(entry.node, f"inputs.{entry.key}", SYSTEM_INPUT_KEYS)
+        kind, values = self.read_type(table, entry.key)
+        unit = self.read_unit(table.get("unit"))
+        default = self.read_default(table, f"inputs.{entry.key}", unit, kind, values)
+        return SystemInput(entry.key, unit, default, entry.span, kind, values)
+
+    def _read_instance(self, entry: Entry) -> Instance:
+        key = f"instances.{entry.key}"
+        table = self.read_mapping(entry.node, key, INSTANCE_KEYS)
+        of = self.read_scalar(table.get("of"), "of", entry.span)
+        values: dict[str, YamlNode] = {}
+        for value in self.read_mapping(table.get("values"), f"{key}.values"):
+            is_table = isinstance(value.node, MappingNode)
+            if is_table or self.read_scalar(value.node, f"values.{value.key}", value.span):
+                values[value.key] = value.node
+        offset, unit = Fraction(0), None
+        node = table.get("offset")
+        if node is not None:
+            offset, unit = self.read_quantity(node, "offset", node.span, None)
+            if offset < 0 or (offset and not are_compatible(unit.dimension, SECOND)):
+                self.problems.error("range", node.span, "`offset` is a time of at least 0 s")
+        if of is None:
+            raise SpecError(())
+        automaton = self._read_automaton(of, values)
+        mine = self._overrides_of(entry.key, automaton)
+        if mine:
+            automaton = self._read_automaton(of, {**values, **mine})
+        return Instance(entry.key, automaton, offset, key, entry.span)
+
+    def _read_automaton(self, reference: ScalarNode, values: Mapping[str, YamlNode]) -> Automaton:
+        """Return a checked automaton; instances of one with equal values share it."""
+        wanted = (reference.text, *((name, format_inline(value)) for name, value in values.items()))
+        if wanted not in self.automaton_cache:
+            path = self.project.path_of(reference.text, reference.span)
+            if path not in self.documents:
+                self.documents[path] = self.project.read(path)
+            made = automaton_of(self.documents[path], self.project, values)
+            self.automaton_cache[wanted] = made
+        return self.automaton_cache[wanted]
+
+    def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, ScalarNode]:
+        found = {}
+        for name, value in sorted(self.overrides.items(), key=lambda item: "." in item[0]):
+            owner, _, parameter = name.rpartition(".")
+            if owner == instance or (not owner and parameter in automaton.parameters):
+                found[parameter] = value
+                self.used_overrides.add(name)
+        return found
+
+    def _report_unused_overrides(self, instances: Mapping[str, Instance]) -> None:
+        known = {
+            name
+            for instance in instances.values()
+            for p in instance.automaton.parameters
+            for name in (p, f"{instance.name}.{p}")
+        }
+        for name, value in self.overrides.items():
+            if name not in self.used_overrides:
+                label = f"no instance has a parameter `{name}`"
+                self.problems.error("name", value.span, label, suggest_name(name, known))
+
+    def _report_unconnected_inputs(
+        self,
+        connections: Mapping[tuple[str, str], Connection],
+        instances: Mapping[str, Instance],
+    ) -> None:
+        for instance in instances.values():
+            for name, thing in instance.automaton.inputs.items():
+                if (instance.name, name) not in connections and thing.default is None:
+                    label = f"input `{instance.name}.{name}` is not connected"
+                    hint = "connect it, or give it a `default` in the automaton"
+                    self.problems.error("missing", instance.span, label, hint)
+
+    def _execution_order(
+        self, wires: ConnectionReader, connections: Connections, span: Span
+    ) -> ExecutionOrder:
+        """Instances at one instant run in the order of direct feed-through (rule 19)."""
+        instances = wires.instances
+        edges: dict[str, list[str]] = {name: [] for name in (*instances, *wires.sensors)}
+        for sensor in wires.sensors.values():
+            owner = sensor.source.partition(".")[0]
+            if not sensor.delay and owner in instances:
+                edges[owner].append(sensor.name)
+        for connection in connections.values():
+            target = instances[connection.target[0]]
+            for read in connection.reads:
+                owner = read.partition(".")[0] if read not in wires.lines else ""
+                self._check_continuous_read(wires, read, target, connection)
+                if owner in edges and target.automaton.is_sampled:
+                    edges[owner].append(target.name)
+        found = topological_sort(edges)
+        if found is None:
+            label = (
+                f"instances read each other at the same instant: {format_cycle(find_cycle(edges))}"
+            )
+            hint = "a delay breaks the circle: `delay(signal, 1 ms)`, or a sensor with `delay`"
+            self.problems.error("loop", span, label, hint)
+        return tuple(found or instances)
+
+    def _check_continuous_read(
+        self, wires: ConnectionReader, read: str, target: Instance, at: Connection
+    ) -> None:
+        """Refuse what a continuous automaton would read inside its integration."""
+        if target.automaton.is_sampled:
+            return
+        sensor = wires.sensors.get(read)
+        if sensor and sensor.period is None:
+            label = (
+                f"`{target.name}` is continuous and reads sensor `{read}`, which has no `sample`"
+            )
+            self.problems.error("connection", at.span, label, "like `sample: 1 ms`")
+        source = wires.lines[read].source if read in wires.lines else read
+        owner = wires.instances.get(source.partition(".")[0])
+        if owner and "." in source:
+            self._report_both_continuous(owner, target, at)
+
+    def _report_both_continuous(self, owner: Instance, target: Instance, at: Connection) -> None:
+        if not owner.automaton.is_sampled and not target.automaton.is_sampled:
+            label = f"`{owner.name}` and `{target.name}` are both continuous"
+            hint = "this version connects a continuous automaton to sampled ones only"
+            self.problems.error("connection", at.span, label, hint)

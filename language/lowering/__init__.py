@@ -1,0 +1,1 @@
+"""Lowering of model parts to operations: expressions, waits, resets, delays, ranges."""

@@ -1,0 +1,152 @@
+"""Action: entry, exit, reset and update as stages of assignments, each committed as a whole.
+
+Rules 5 and 6: a stage reads the values before it and commits all of its assignments together; of a
+transition the stages are the exit of the source, the reset, the entry of the target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from language.ir.ops import Assign, Block, Op, Ref, Switch
+from language.ir.program import Variable, value_type
+from language.lowering.expressions import (
+    WHOLE_TYPES,
+    NameBindings,
+    lower_assigned_value,
+    lower_equations,
+    names_read,
+)
+from language.lowering.program_builder import event_range
+from language.lowering.range_saturation import store_saturated
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.declaration import Formula
+from language.model.region_queries import equation_formulas
+
+
+def storage_of(automaton: Automaton, name: str) -> str:
+    """Return the variable of a state or discrete variable."""
+    return f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
+
+
+def lower_stage(
+    automaton: Automaton,
+    formulas: Mapping[str, Formula],
+    known: NameBindings,
+    stage_name: str = "reset",
+) -> list[Op]:
+    """Return assignments that all read the values before, then commit together."""
+    return [
+        *read_stage(automaton, formulas, known, stage_name),
+        *commit_stage(automaton, formulas, stage_name),
+    ]
+
+
+def read_stage(
+    automaton: Automaton,
+    formulas: Mapping[str, Formula],
+    known: NameBindings,
+    stage_name: str = "reset",
+) -> list[Op]:
+    """Return what reads the values before a stage."""
+    found: list[Op] = []
+    for name, formula in formulas.items():
+        value = lower_assigned_value(
+            formula.tree, known, automaton.state_variables[name].type in WHOLE_TYPES
+        )
+        key = f"{automaton.name} {formula.key}"
+        found.append(Assign(f"work.{stage_name}_{name}", value, key))
+    return found
+
+
+def commit_stage(automaton: Automaton, names: Iterable[str], stage_name: str = "reset") -> list[Op]:
+    """Return what commits the assignments of a stage together."""
+    found: list[Op] = []
+    for name in names:
+        whole = automaton.state_variables[name].type in WHOLE_TYPES
+        found += store_saturated(automaton, name, Ref(f"work.{stage_name}_{name}", whole))
+    return found
+
+
+def lower_stage_of_regions(
+    automaton: Automaton,
+    selected_variable: Callable[[str], str],
+    number_of: Callable[[Transition], int],
+    assignments_of: Callable[[Transition], Mapping[str, Formula]],
+    known: NameBindings,
+) -> Block:
+    """Return one stage of the transitions that all regions take: all read, then all commit.
+
+    `selected_variable` is the variable of a region that holds the number of its transition, 0 for none.
+    """
+    reads: list[Op] = []
+    commits: list[Op] = []
+    for region in automaton.all_regions:
+        ways = [
+            way for mode in region.modes.values() for way in mode.transitions if assignments_of(way)
+        ]
+        numbers = [number_of(way) for way in ways]
+        read = [tuple(read_stage(automaton, assignments_of(way), known)) for way in ways]
+        commit = [tuple(commit_stage(automaton, assignments_of(way))) for way in ways]
+        if ways:
+            reads.append(
+                Switch(selected_variable(region.name), tuple(zip(numbers, read, strict=True)))
+            )
+            commits.append(
+                Switch(selected_variable(region.name), tuple(zip(numbers, commit, strict=True)))
+            )
+    return (*reads, *commits)
+
+
+def lower_entry(
+    automaton: Automaton, target: Mode, assignments: Mapping[str, Formula], known: NameBindings
+) -> Block:
+    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    if not assignments:
+        return ()
+    inside = {name: place for name, place in known.items() if name not in equation_formulas(target)}
+    wanted = names_read(formula.tree for formula in assignments.values())
+    ops = lower_equations(target, inside, "equation.", f"{automaton.name} ", wanted)
+    return (*ops, *lower_stage(automaton, assignments, inside))
+
+
+def initial_entry_assignments(automaton: Automaton) -> dict[str, Formula]:
+    """Return what the entry of the initial modes of all regions writes."""
+    initial = [region.modes[region.initial] for region in automaton.all_regions]
+    return {name: formula for mode in initial for name, formula in mode.entry.items()}
+
+
+def action_variables(automaton: Automaton) -> list[Variable]:
+    """Return the work variables of all stages."""
+    found: dict[str, Variable] = {}
+    for mode in automaton.all_modes:
+        resets = [transition.reset for transition in mode.transitions]
+        for formulas in (*resets, mode.entry, mode.exit):
+            for name in sorted(formulas):
+                found[f"reset_{name}"] = stage_variable(automaton, "reset", name)
+        for name in mode.update:
+            found[f"next_{name}"] = stage_variable(automaton, "next", name)
+    return list(found.values())
+
+
+def discrete_variables(automaton: Automaton) -> list[Variable]:
+    """Return the discrete variables of an automaton."""
+    return [
+        Variable(
+            f"discrete.{name}",
+            value_type(thing.type),
+            str(thing.unit.dimension),
+            about=thing.key,
+            values=thing.values,
+            range=event_range(automaton, thing),
+        )
+        for name, thing in automaton.discrete.items()
+    ]
+
+
+def stage_variable(automaton: Automaton, stage_name: str, name: str) -> Variable:
+    """Return the variable of what a stage has computed and not yet committed."""
+    thing = automaton.state_variables[name]
+    unit = str(thing.unit.dimension)
+    kind = value_type(thing.type)
+    return Variable(f"work.{stage_name}_{name}", kind, unit, values=thing.values)

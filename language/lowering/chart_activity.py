@@ -1,0 +1,54 @@
+"""Activity: whether nodes of a chart are active or complete, from the variables of its regions."""
+
+from __future__ import annotations
+
+from language.ir.ops import Binary, Compare, Expr, Ref, Value, integer
+from language.ir.program import mode_variable
+from language.model.statechart import Chart, ChartNode
+
+
+def is_active(chart: Chart, node: ChartNode, base: str) -> Expr:
+    """Return whether a node is active: its region is in one of the innermost modes inside it."""
+    variable = Ref(mode_variable(base, node.region))
+    wanted = sorted(leaf.number for leaf in chart.leaves_of(node) if leaf.number is not None)
+    others = {leaf.number for leaf in chart.leaves(node.region)} - {*wanted}
+    low, high = wanted[0], wanted[-1]
+    if low < high and not any(number is not None and low < number < high for number in others):
+        above, below = Compare(">=", variable, integer(low)), Compare("<=", variable, integer(high))
+        return Binary("and", above, below)
+    found: Expr = Compare("==", variable, integer(low))
+    for number in wanted[1:]:
+        found = Binary("or", found, Compare("==", variable, integer(number)))
+    return found
+
+
+def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
+    """Return whether a node has come to its end: in a final mode, or in one in each region."""
+    if node.kind == "parallel":
+        return _conjunction(
+            [is_complete(chart, region, base) for region in chart.child_regions(node)]
+        )
+    if node.kind == "atomic":
+        return Value(node.is_final)
+    ends = [chart.nodes[child] for child in node.children if chart.nodes[child].is_final]
+    found: Expr = Value(False)
+    for number, end in enumerate(ends):
+        here = is_active(chart, end, base)
+        found = here if number == 0 else Binary("or", found, here)
+    return found
+
+
+def may_complete(chart: Chart, node: ChartNode) -> bool:
+    """Tell whether a node can come to its end."""
+    if node.kind == "parallel":
+        return all(may_complete(chart, region) for region in chart.child_regions(node))
+    if node.kind == "atomic":
+        return node.is_final
+    return any(chart.nodes[child].is_final for child in node.children)
+
+
+def _conjunction(parts: list[Expr]) -> Expr:
+    found = parts[0]
+    for part in parts[1:]:
+        found = Binary("and", found, part)
+    return found

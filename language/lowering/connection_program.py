@@ -1,0 +1,78 @@
+"""Wires: the expressions between the instances of a system, as a Program of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.expressions.syntax_tree import names
+from language.ir.ops import Assign, Block, Ref
+from language.ir.program import Program, Variable
+from language.lowering.expressions import lower_expression
+from language.lowering.program_builder import finalise_program
+from language.model.declaration import Formula
+from language.model.system import Connection, Scenario, System
+
+WIRE_RESULT = "wire.value"
+
+
+def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
+    """Return the expressions of a system and a scenario: connections, outputs, inputs."""
+    found: dict[str, Formula] = {}
+    for connection in system.connections.values():
+        if isinstance(connection.source, Formula):
+            found[connection_block(connection)] = connection.source
+    for name, output in system.outputs.items():
+        if isinstance(output, Formula):
+            found[output_block(name)] = output
+    for name, stimulus in scenario.inputs.items():
+        for number, piece in enumerate(stimulus.pieces):
+            if piece.formula:
+                found[piece_block(name, number)] = piece.formula
+    return found
+
+
+def connection_block(connection: Connection) -> str:
+    """Return the name of the block that evaluates a connection."""
+    return "connection." + ".".join(connection.target)
+
+
+def piece_block(name: str, number: int) -> str:
+    """Return the name of the block that evaluates a piece of an input."""
+    return f"piece.{name}.{number}"
+
+
+def output_block(name: str) -> str:
+    """Return the name of the block that evaluates an output of the system."""
+    return f"output.{name}"
+
+
+def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Program:
+    """Return a Program with a block for each expression: `signal.<name>` to `wire.value`.
+
+    `truths` are the signals that are true or false.
+    """
+    read = {name.path for formula in formulas.values() for name in names(formula.tree)}
+    known = {name: Ref(f"signal.{name}") for name in read}
+    blocks: dict[str, Block] = {
+        key: (Assign(WIRE_RESULT, lower_expression(formula.tree, known), formula.key),)
+        for key, formula in formulas.items()
+    }
+    variables = [
+        Variable(f"signal.{name}", "truth" if name in truths else "real") for name in sorted(read)
+    ]
+    program = Program(
+        name="wires",
+        number_type="float64",
+        period=None,
+        major_step=Fraction(1),
+        constants=(),
+        variables=(*variables, Variable(WIRE_RESULT, "real")),
+        outputs=(),
+        modes=(),
+        transitions=(),
+        faults=(),
+        functions=(),
+        blocks=blocks,
+    )
+    return finalise_program(program, tuple(blocks), keep=(WIRE_RESULT,))

@@ -1,0 +1,293 @@
+"""Lower: expressions and formulas of a model to expressions and operations of a Program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from language.expressions.balance_form import coefficient_of
+from language.expressions.syntax_tree import (
+    MEMORY_FUNCTIONS,
+    Arithmetic,
+    BoolLiteral,
+    Conditional,
+    ErrorNode,
+    FunctionCall,
+    Logic,
+    Name,
+    Negation,
+    Not,
+    NumberLiteral,
+    Power,
+    Relation,
+    SyntaxTree,
+    integer_literal,
+    memory_key,
+    names,
+)
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Call,
+    Compare,
+    Expr,
+    Item,
+    Op,
+    Ref,
+    Select,
+    Switch,
+    Unary,
+    Value,
+    divide,
+    multiply,
+    real,
+)
+from language.lowering.range_saturation import has_saturation
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Balance, Mode, Region
+from language.model.declaration import Formula
+from language.model.evaluation_order import equation_order
+from language.model.region_queries import equation_closure, equation_formulas, region_of_equation
+from language.text.diagnostic import SpecError
+from language.typecheck.function_calls import SAME_UNIT_FUNCTIONS, is_integer_call
+from language.typecheck.integer_functions import lower_integer_call
+
+WHOLE_TYPES = ("int", "enum")
+NameBindings = Mapping[str, Expr]
+"""What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`,
+what functions with memory are under their `memory_key`."""
+
+
+def lower_expression(tree: SyntaxTree, known: NameBindings) -> Expr:
+    """Return the Program's expression of a tree: same order of operations, nothing simplified."""
+    return _lower_typed(tree, known)[0]
+
+
+def _lower_typed(tree: SyntaxTree, known: NameBindings) -> tuple[Expr, bool]:
+    """Return the expression of a tree, and whether its value is a whole number."""
+    match tree:
+        case Name(path, _):
+            return known[path], is_whole(known[path])
+        case NumberLiteral(value, _, _):
+            return real(value), False
+        case Arithmetic("/", left, right, _):
+            return Binary("/", _lower_real(left, known), _lower_real(right, known)), False
+        case Arithmetic(operator, left, right, _):
+            first, second, whole = _lower_operands(left, right, known)
+            return Binary(operator, first, second), whole  # type: ignore[arg-type]
+        case FunctionCall():
+            made = _lower_application(tree, known)
+            return made, is_whole(made)
+        case BoolLiteral(value, _):
+            return Value(value), False
+        case Negation(operand, _):
+            inner, whole = _lower_typed(operand, known)
+            return Unary("-", inner), whole
+        case Not(operand, _):
+            return Unary("not", lower_expression(operand, known)), False
+        case Logic(operator, left, right, _):
+            sides = lower_expression(left, known), lower_expression(right, known)
+            return Binary(operator, *sides), False  # type: ignore[arg-type]
+        case Relation(operator, left, right, _):
+            first, second, _ = _lower_operands(left, right, known)
+            return Compare(operator, first, second), False  # type: ignore[arg-type]
+        case Power(base, exponent, _):
+            return _expand_power(_lower_real(base, known), exponent), False
+        case Conditional(condition, then, other, _):
+            first, second, whole = _lower_operands(then, other, known)
+            return Select(lower_expression(condition, known), first, second), whole
+        case ErrorNode():
+            raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
+
+
+def _lower_application(tree: FunctionCall, known: NameBindings) -> Expr:
+    """Return a call; what reads the automaton's mode, memory or tables is known by its key."""
+    match tree:
+        case FunctionCall("in", (Name(path, _),), _):
+            return known[f"in {path}"]
+        case FunctionCall("lookup", (Name(path, _), *arguments), _):
+            axes = [known[f"{path} axis {k}"] for k in range(1, len(arguments) + 1)]
+            sizes = [known[f"{path} size {k}"] for k in range(1, len(arguments) + 1)]
+            read = [_lower_real(part, known) for part in arguments]
+            function = "lookup" if len(arguments) == 1 else "lookup2"
+            return Call(function, (*axes, *sizes, known[path], *read))
+        case FunctionCall(function, _, _) if function in MEMORY_FUNCTIONS:
+            return known[memory_key(tree)]
+        case FunctionCall(function, arguments, _):
+            wholes = (
+                _lower_whole_arguments(arguments, known)
+                if function in SAME_UNIT_FUNCTIONS
+                else None
+            )
+            if wholes:
+                return lower_integer_call(function, wholes)
+            return Call(function, tuple(_lower_real(part, known) for part in arguments))
+
+
+def _lower_whole_arguments(
+    arguments: Sequence[SyntaxTree], known: NameBindings
+) -> list[Expr] | None:
+    """Return arguments as whole numbers, where they are and literals beside them; else None."""
+    made = [_lower_typed(argument, known) for argument in arguments]
+    if not is_integer_call(arguments, [whole for _, whole in made]):
+        return None
+    pairs = zip(arguments, made, strict=True)
+    return [expr if whole else Value(integer_literal(tree) or 0) for tree, (expr, whole) in pairs]
+
+
+def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> Expr:
+    """Return the expression of a tree for a target that is whole, or not."""
+    number = integer_literal(tree)
+    if whole and number is not None:
+        return Value(number)
+    value = lower_expression(tree, known)
+    if whole:
+        return value if is_whole(value) else Call("whole", (value,))
+    return to_real(value)
+
+
+def to_real(expr: Expr) -> Expr:
+    """Return an expression that is whole as a real."""
+    return Call("real", (expr,)) if is_whole(expr) else expr
+
+
+def is_whole(expr: Expr) -> bool:
+    """Tell whether the value of an expression is a whole number (an enumeration's too)."""
+    match expr:
+        case Ref(_, whole) | Item(_, _, whole):
+            return whole
+        case Value(value):
+            return type(value) is int
+        case Unary("-", operand):
+            return is_whole(operand)
+        case Binary(operator, left, _):
+            return operator in "+-*" and is_whole(left)
+        case Select(_, then, _):
+            return is_whole(then)
+        case Call(function, _):
+            return function == "whole"
+        case _:
+            return False
+
+
+def _lower_real(tree: SyntaxTree, known: NameBindings) -> Expr:
+    value, whole = _lower_typed(tree, known)
+    return Call("real", (value,)) if whole else value
+
+
+def _lower_operands(
+    left: SyntaxTree, right: SyntaxTree, known: NameBindings
+) -> tuple[Expr, Expr, bool]:
+    """Two operands of one type and whether they are whole.
+
+    A literal like `2` beside a whole number is one, else they are reals.
+    """
+    (first, is_first), (second, is_second) = _lower_typed(left, known), _lower_typed(right, known)
+    if is_first == is_second:
+        return first, second, is_first
+    if is_first and (number := integer_literal(right)) is not None:
+        return first, Value(number), True
+    if is_second and (number := integer_literal(left)) is not None:
+        return Value(number), second, True
+    return to_real(first), to_real(second), False
+
+
+def _expand_power(base: Expr, exponent: int) -> Expr:
+    """x^n by multiplications from the left; a negative n divides 1 by it."""
+    if exponent == 0:
+        return real(1.0)
+    result = base
+    for _ in range(abs(exponent) - 1):
+        result = multiply(result, base)
+    return divide(real(1.0), result) if exponent < 0 else result
+
+
+def lower_rate(balance: Balance, known: NameBindings) -> Expr:
+    """Return der(state): the right side, divided once by the coefficient."""
+    factor = coefficient_of(balance.left, balance.state)
+    if isinstance(factor, SpecError):
+        raise factor
+    right = _lower_real(balance.right, known)
+    return right if factor is None else divide(right, _lower_real(factor, known))
+
+
+def lower_equations(
+    mode: Mode,
+    known: dict[str, Expr],
+    group: str,
+    prefix: str,
+    required_names: Iterable[str] | None = None,
+) -> list[Op]:
+    """Return the assignments of a mode's equations in order, and make them known.
+
+    `required_names` limits them to those that these names need, directly or through others.
+    """
+    order = equation_order(mode)
+    needed = set(order) if required_names is None else equation_closure(mode, required_names)
+    ops: list[Op] = []
+    for name in order:
+        if name in needed:
+            ops.append(_lower_equation(mode, name, known, group, prefix))
+            whole = any(formula.is_integer for formula in equation_formulas(mode)[name])
+            known[name] = Ref(f"{group}{name}", whole)
+    return ops
+
+
+def _lower_equation(mode: Mode, name: str, known: NameBindings, group: str, prefix: str) -> Op:
+    """Return what sets an equation: one formula, or that of the active mode of a region beside."""
+
+    def set_to(formula: Formula) -> Assign:
+        value = lower_assigned_value(formula.tree, known, formula.is_integer)
+        return Assign(f"{group}{name}", value, prefix + formula.key)
+
+    region = region_of_equation(mode, name)
+    if region is None:
+        return set_to(mode.equations[name])
+    return choose_by_mode(
+        region,
+        known,
+        {other.name: (set_to(other.equations[name]),) for other in region.modes.values()},
+    )
+
+
+def choose_by_mode(region: Region, known: NameBindings, blocks: Mapping[str, Block]) -> Switch:
+    """Return the choice of a block by the mode that a region is in."""
+    selector = known[f"mode {region.name}"]
+    assert isinstance(selector, Ref)
+    cases = tuple((region.modes[name].number, block) for name, block in blocks.items())
+    return Switch(selector.name, cases)
+
+
+def equation_bindings(automaton: Automaton, prefix: str) -> dict[str, Expr]:
+    """Return the equations of all modes as what a Program reads."""
+    return {
+        name: Ref(f"{prefix}{name}", whole) for name, whole in _whole_equations(automaton).items()
+    }
+
+
+@cache_on_owner
+def _whole_equations(automaton: Automaton) -> dict[str, bool]:
+    """Return, for each equation that any mode has, whether it is a whole number."""
+    modes = automaton.all_modes
+    return {name: formula.is_integer for mode in modes for name, formula in mode.equations.items()}
+
+
+def variable_bindings(automaton: Automaton, input_group: str) -> dict[str, Expr]:
+    """Return inputs (of a group), states and discrete variables as what a Program reads."""
+    found: dict[str, Expr] = {}
+    for name, thing in automaton.inputs.items():
+        group = (
+            "latched"
+            if input_group == "input" and has_saturation(automaton, thing)
+            else input_group
+        )
+        found[name] = Ref(f"{group}.{name}", thing.type in WHOLE_TYPES)
+    found.update({name: Ref(f"state.{name}") for name in automaton.states})
+    for name, variable in automaton.discrete.items():
+        found[name] = Ref(f"discrete.{name}", variable.type in WHOLE_TYPES)
+    return found
+
+
+def names_read(trees: Iterable[SyntaxTree]) -> list[str]:
+    """Return the names read in some trees."""
+    return [read.path for tree in trees for read in names(tree)]

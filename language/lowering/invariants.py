@@ -1,0 +1,61 @@
+"""Invariant: assertions about modes, which the engine checks and C leaves out (rule 11).
+
+Block `invariants` sets `check.<mode>_<name>` for those of the active modes; nothing reads them.
+"""
+
+from __future__ import annotations
+
+from language.ir.ops import Assign, Block, Switch
+from language.ir.program import InvariantInfo, Variable, mode_variable
+from language.lowering.expressions import NameBindings, equation_bindings, lower_expression
+from language.model.automaton import Automaton
+
+INVARIANTS = "invariants"
+"""The block; generated code has it not."""
+INVARIANT_PREFIX = "check."
+
+
+def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
+    """Return the invariants of all modes, in the order of the file."""
+    return tuple(
+        InvariantInfo(
+            name,
+            mode.number,
+            mode.region,
+            f"{INVARIANT_PREFIX}{mode.label}_{name}",
+            invariant.message,
+        )
+        for mode in automaton.all_modes
+        for name, invariant in mode.invariants.items()
+    )
+
+
+def invariant_variables(automaton: Automaton) -> list[Variable]:
+    """Return what holds the truth of each invariant."""
+    return [
+        Variable(info.variable, "truth", about=info.name) for info in invariant_infos(automaton)
+    ]
+
+
+def invariant_blocks(automaton: Automaton, known: NameBindings) -> dict[str, Block]:
+    """Return the block that looks at the active modes; nothing where there are no invariants."""
+    if not invariant_infos(automaton):
+        return {}
+    here = {**known, **equation_bindings(automaton, "equation.")}
+    found: list[Switch] = []
+    for region in automaton.all_regions:
+        cases: list[tuple[int, Block]] = []
+        for mode in region.modes.values():
+            ops = tuple(
+                Assign(
+                    f"{INVARIANT_PREFIX}{mode.label}_{name}",
+                    lower_expression(invariant.condition.tree, here),
+                    f"{automaton.name} {invariant.condition.key}",
+                )
+                for name, invariant in mode.invariants.items()
+            )
+            if ops:
+                cases.append((mode.number, ops))
+        if cases:
+            found.append(Switch(mode_variable("memory.mode", region.name), tuple(cases)))
+    return {INVARIANTS: tuple(found)}

@@ -1,0 +1,294 @@
+"""Wiring: variables, outputs and start values that every Program has, and the last clean-up."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+
+from language.expressions.units import Dimension
+from language.ir.number_type import NumberType, round_to_type
+from language.ir.ops import Assign, Binary, Block, Compare, Expr, Op, Ref, RunBlock, integer
+from language.ir.program import (
+    Constant,
+    Function,
+    ModeInfo,
+    OutputWire,
+    Program,
+    RegionInfo,
+    TransitionInfo,
+    ValueType,
+    Variable,
+    fired_variable,
+    mode_variable,
+    value_type,
+)
+from language.ir.regions import CHART
+from language.ir.round_literals import round_program
+from language.ir.traversal import block_names, walk_ops
+from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
+from language.lowering.invariants import invariant_infos
+from language.lowering.parameter_bindings import cast_to_type
+from language.lowering.range_saturation import store_initial_value
+from language.model.automaton import Automaton, Region
+from language.model.declaration import State
+from language.model.graphs import post_order
+from language.model.statechart import Chart
+from language.numerics.function_table import FUNCTIONS_BY_TYPE
+from language.typecheck.types import EnumType, IntType
+
+INACTIVE = "inactive"
+"""What a region inside a mode is in while that is left."""
+
+
+def input_variables(automaton: Automaton, group: str) -> list[Variable]:
+    """Return the inputs of an automaton as variables of a group."""
+    return [
+        Variable(
+            f"{group}.{name}",
+            value_type(thing.type),
+            str(thing.unit.dimension),
+            about="; ".join(filter(None, (thing.key, thing.about))) if group == "input" else "",
+            values=thing.values,
+        )
+        for name, thing in automaton.inputs.items()
+    ]
+
+
+def state_variables(automaton: Automaton) -> list[Variable]:
+    """Return the states and equations of an automaton as variables."""
+    found = [
+        Variable(
+            f"state.{name}",
+            "real",
+            str(thing.unit.dimension),
+            about=thing.about,
+            range=event_range(automaton, thing),
+        )
+        for name, thing in automaton.states.items()
+    ]
+    return [*found, *equation_variables(automaton, "equation.")]
+
+
+def event_range(automaton: Automaton, thing: State) -> tuple[float, float] | None:
+    """Return the range whose leaving is an event: that of a continuous automaton's variable."""
+    if automaton.is_sampled or thing.range is None:
+        return None
+    return round_to_type(thing.range[0]), round_to_type(thing.range[1])
+
+
+def equation_variables(automaton: Automaton, group: str) -> list[Variable]:
+    """Return the equations of an automaton as variables of a group."""
+    found = []
+    for name in dict.fromkeys(n for mode in automaton.all_modes for n in mode.equations):
+        kind, unit, values = _equation_type(automaton, name)
+        found.append(Variable(f"{group}{name}", kind, unit, values=values))
+    return found
+
+
+def _equation_type(automaton: Automaton, name: str) -> tuple[ValueType, str, tuple[str, ...]]:
+    """Return type, unit and names of an equation."""
+    kind = automaton.name_types.get(name)
+    if isinstance(kind, Dimension):
+        return "real", str(kind), ()
+    values = kind.values if isinstance(kind, EnumType) else ()
+    return ("whole" if isinstance(kind, IntType | EnumType) else "truth"), "1", values
+
+
+def output_wires(automaton: Automaton) -> tuple[OutputWire, ...]:
+    """Return the outputs in the order of the file; `mode` brings the regions not named there."""
+    found = []
+    for output in automaton.outputs:
+        name = automaton.output_source(output)
+        if name == "faults":
+            found.append(OutputWire(output, "memory.faults", "whole", "1"))
+            continue
+        if name == "mode":
+            for region in automaton.all_regions:
+                variable = mode_variable("memory.mode", region.name)
+                wire = output if region.name == CHART else region.name.replace(".", "_")
+                if wire == output or wire not in automaton.outputs:
+                    found.append(OutputWire(wire, variable, "whole", "1"))
+            continue
+        if name in (region.name for region in automaton.all_regions):
+            found.append(OutputWire(output, mode_variable("memory.mode", name), "whole", "1"))
+            continue
+        thing = automaton.state_variables.get(name)
+        if thing:
+            group = "discrete" if name in automaton.discrete else "state"
+            unit = str(thing.unit.dimension)
+            found.append(OutputWire(output, f"{group}.{name}", value_type(thing.type), unit))
+            continue
+        kind, unit, _ = _equation_type(automaton, name)
+        found.append(OutputWire(output, f"equation.{name}", kind, unit))
+    return tuple(found)
+
+
+def region_variables(automaton: Automaton, activation_unit: str) -> list[Variable]:
+    """Return the variables of the modes of all regions and of what fires in them."""
+    found = []
+    for region in automaton.all_regions:
+        where = "" if region.name == CHART else f" of region {region.name}"
+        mode = mode_variable("memory.mode", region.name)
+        found.append(Variable(mode, "whole", about=f"active mode{where}"))
+        about = f"transition{where} of this {activation_unit}, 0: none"
+        found.append(Variable(fired_variable(region.name), "whole", about=about))
+    return found
+
+
+def clear_fired(automaton: Automaton) -> list[Op]:
+    """Return what forgets the transitions of before."""
+    return [Assign(fired_variable(region.name), integer(0)) for region in automaton.all_regions]
+
+
+def any_fired_condition(automaton: Automaton) -> Expr:
+    """Return whether a transition has fired in any region."""
+    found: Expr | None = None
+    for region in automaton.all_regions:
+        here = Compare("!=", Ref(fired_variable(region.name)), integer(0))
+        found = here if found is None else Binary("or", found, here)
+    assert found is not None
+    return found
+
+
+def enter_initial_modes(automaton: Automaton, base: str) -> list[Assign]:
+    """Return what makes the initial modes active; `base` is the variable of the chart."""
+    if automaton.statechart:
+        return _enter_initial_nodes(automaton, automaton.statechart, base)
+    return [
+        Assign(mode_variable(base, region.name), integer(region.modes[region.initial].number))
+        for region in automaton.all_regions
+    ]
+
+
+def _enter_initial_nodes(automaton: Automaton, chart: Chart, base: str) -> list[Assign]:
+    numbers = {
+        node.region: node.number
+        for node in chart.initial_configuration()
+        if node.number is not None
+    }
+    found = []
+    for region in automaton.all_regions:
+        number = numbers.get(region.name, region.inactive)
+        assert number is not None
+        found.append(Assign(mode_variable(base, region.name), integer(number)))
+    return found
+
+
+def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
+    """Return the start values, each after those that it reads."""
+    ops: list[Op] = []
+    carried = automaton.state_variables
+    for name in post_order({name: state.initial.reads for name, state in carried.items()}):
+        state = carried[name]
+        value = lower_assigned_value(state.initial.tree, known, state.type in WHOLE_TYPES)
+        ops += store_initial_value(automaton, name, value, prefix + state.initial.key)
+    return ops
+
+
+def input_defaults(automaton: Automaton) -> dict[str, float | bool]:
+    """Return the values of inputs that nothing is connected to."""
+    found: dict[str, float | bool] = {}
+    for name, thing in automaton.inputs.items():
+        if thing.default is not None:
+            found[name] = cast_to_type(round_to_type(thing.default, automaton.numbers), thing.type)
+    return found
+
+
+def assemble_program(
+    automaton: Automaton,
+    blocks: Mapping[str, Block],
+    constants: Iterable[Constant],
+    variables: Iterable[Variable],
+    transitions: tuple[TransitionInfo, ...],
+) -> Program:
+    """Return a program of blocks with what follows from the automaton alone."""
+    return Program(
+        name=automaton.name,
+        number_type=automaton.numbers,
+        period=automaton.period,
+        major_step=automaton.period or automaton.step,
+        constants=tuple(constants),
+        variables=tuple({variable.name: variable for variable in variables}.values()),
+        outputs=output_wires(automaton),
+        modes=mode_infos(automaton.root_region),
+        invariants=invariant_infos(automaton),
+        regions=tuple(RegionInfo(r.name, mode_infos(r)) for r in automaton.regions),
+        transitions=transitions,
+        faults=(),
+        functions=(),
+        blocks=blocks,
+        defaults=input_defaults(automaton),
+    )
+
+
+def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
+    """Return the modes of a region with their numbers."""
+    found = [ModeInfo(mode.name, mode.number) for mode in region.modes.values()]
+    if region.inactive is not None:
+        found.append(ModeInfo(INACTIVE, region.inactive))
+    return tuple(found)
+
+
+def finalise_program(
+    program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()
+) -> Program:
+    """Return the program with only what its entries use, and the variables to keep anyway."""
+    blocks = _reachable_blocks(program.blocks, entries)
+    used = {name for block in blocks.values() for name in block_names(block)}
+    used |= {*keep, *(wire.source for wire in program.outputs)}
+    constants = [c for c in program.constants if c.name in used]
+    while True:
+        needed = {name for c in constants if c.kind == "solved" for name in c.depends_on}
+        more = {f"calibration.{name}" for name in needed} - {c.name for c in constants}
+        if not more:
+            break
+        constants += [c for c in program.constants if c.name in more]
+    functions = _used_functions(used, program.number_type)
+    kept = ("input.", "is_new.")
+    variables = [v for v in program.variables if v.name in used or v.name.startswith(kept)]
+    variables = _remove_unused_before(program, variables, blocks)
+    return round_program(
+        dataclasses.replace(
+            program,
+            constants=tuple(constants),
+            variables=tuple(variables),
+            functions=functions,
+            blocks=blocks,
+        )
+    )
+
+
+def _remove_unused_before(
+    program: Program, variables: list[Variable], blocks: dict[str, Block]
+) -> list[Variable]:
+    """Leave out the memory of inputs that nobody reads."""
+    if "remember" not in blocks:
+        return variables
+    reading = {n for name, b in blocks.items() if name != "remember" for n in block_names(b)}
+    kept = tuple(op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading)
+    blocks["remember"] = kept
+    targets = {op.target for op in kept}
+    return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
+
+
+def _reachable_blocks(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> dict[str, Block]:
+    seen: set[str] = set()
+    stack = [entry for entry in entries if entry in blocks]
+    while stack:
+        name = stack.pop()
+        if name not in seen:
+            seen.add(name)
+            stack += [op.block for op in walk_ops(blocks[name]) if isinstance(op, RunBlock)]
+    return {name: block for name, block in blocks.items() if name in seen}
+
+
+def _used_functions(used: set[str], number: NumberType) -> tuple[Function, ...]:
+    known = FUNCTIONS_BY_TYPE[number]
+    stack = [name.removeprefix("call ") for name in used if name.startswith("call ")]
+    found: set[str] = set()
+    while stack:
+        name = stack.pop()
+        if name in known and name not in found:
+            found.add(name)
+            stack += [called.removeprefix("call ") for called in block_names(known[name].body)]
+    return tuple(function for name, function in known.items() if name in found)

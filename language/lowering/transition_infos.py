@@ -1,0 +1,106 @@
+"""What the engine reports of a transition: number, names, wait and events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from itertools import accumulate
+
+from language.ir.ops import (
+    Assign,
+    Expr,
+    Op,
+    Ref,
+    RunBlock,
+    integer,
+)
+from language.ir.program import TransitionInfo
+from language.lowering.constants import evaluate_exactly
+from language.lowering.guard_slots import guard_slot
+from language.lowering.tick_history import rollbacks_of
+from language.lowering.wait_ticks import MAX_WAIT_TICKS, seconds_to_ticks, tunable_wait
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Mode, Transition
+from language.text.diagnostic import Problems
+
+
+def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
+    """Return the transitions, numbered from 1 in the order of the file, waits exact."""
+    found: list[TransitionInfo] = []
+    back = {id(rewinding.transition): rewinding.max_ticks for rewinding in rollbacks_of(automaton)}
+    for mode in automaton.all_modes:
+        for k, transition in enumerate(mode.transitions):
+            wait = Fraction(0)
+            if transition.wait:
+                with problems.collect_errors():
+                    wait = evaluate_exactly(transition.wait, automaton)
+            ticks = seconds_to_ticks(automaton, wait) if automaton.period else 0
+            tunable = tunable_wait(automaton, transition.wait)
+            if transition.wait and wait < 0:
+                problems.error("wait", transition.wait.span, "a wait is not negative")
+            if transition.wait and ticks > MAX_WAIT_TICKS:
+                label = f"a wait of {ticks} ticks is longer than {MAX_WAIT_TICKS}"
+                problems.error("wait", transition.wait.span, label)
+            timed = (ticks > 0 or tunable is not None) if automaton.period else wait > 0
+            target = 0 if automaton.statechart else automaton.target_mode(transition).number
+            found.append(
+                TransitionInfo(
+                    number=len(found) + 1,
+                    name=transition.name,
+                    source=mode.number,
+                    target=target,
+                    wait=wait,
+                    ticks=ticks,
+                    timer=f"timer.{mode.label}_{transition.name}" if timed else None,
+                    key=f"{automaton.name} {transition.key}",
+                    region=mode.region,
+                    slot=guard_slot(mode.region, k),
+                    rewind_ticks=back.get(id(transition), 0),
+                    chart_endpoints=_chart_endpoints(automaton, transition),
+                    tunable_wait=f"calibration.{tunable}" if tunable else None,
+                )
+            )
+    return tuple(found)
+
+
+def wait_ticks(info: TransitionInfo) -> Expr:
+    """Return the ticks that a guard must have held, without the first."""
+    return Ref(info.tunable_wait, is_integer=True) if info.tunable_wait else integer(info.ticks)
+
+
+def _chart_endpoints(automaton: Automaton, transition: Transition) -> tuple[str, str] | None:
+    """Return the paths of source and target in a chart; where nothing is entered, no target."""
+    if automaton.statechart is None:
+        return None
+    way, nodes = automaton.statechart.transitions[transition.key], automaton.statechart.nodes
+    source = nodes[way.source].path
+    return source, ", ".join(nodes[target].path for target in way.targets)
+
+
+def infos_of_mode(
+    automaton: Automaton, mode: Mode, infos: tuple[TransitionInfo, ...]
+) -> tuple[TransitionInfo, ...]:
+    """Return the transitions that leave a mode, in the order of the file."""
+    first = _first_index_by_mode(automaton)[mode.key]
+    return infos[first : first + len(mode.transitions)]
+
+
+@cache_on_owner
+def _first_index_by_mode(automaton: Automaton) -> Mapping[str, int]:
+    """Return, by the key of a mode, how many transitions leave the modes before it."""
+    modes = automaton.all_modes
+    counts = accumulate((len(mode.transitions) for mode in modes), initial=0)
+    return dict(zip((mode.key for mode in modes), counts, strict=False))
+
+
+def start_run(automaton: Automaton, target: Mode) -> list[Op]:
+    """Return what starts the run of a mode that is entered, and the covariance of its observer."""
+    ops: list[Op] = []
+    observer = target.observer
+    if observer and observer.gain == "recursive" and observer.covariance == "steady":
+        ops.append(RunBlock(f"cover_{target.name}"))
+    if target.run is None or automaton.model is None:
+        return ops
+    number = automaton.model.modes[target.run.mode].number
+    ops.append(Assign("memory.run_mode", integer(number), f"{automaton.name} {target.run.key}"))
+    return ops

@@ -1,0 +1,87 @@
+"""Wait: how long a guard of a sampled automaton must hold, in ticks, fixed or tunable (rule 4).
+
+A tunable wait is kept as a count of ticks: a time in seconds would be rounded to the working type
+and then up to one tick more than was asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+from language.expressions.syntax_tree import Name
+from language.ir.program import MAX_TIMER_TICKS
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Transition
+from language.model.declaration import Formula, Parameter, Range
+from language.model.names_read import names_read_by
+from language.text.diagnostic import Problems
+
+MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1
+"""Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
+
+
+def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
+    """Return the tunable parameter that a wait is, None where it is fixed."""
+    if wait is None or not automaton.period or not isinstance(wait.tree, Name):
+        return None
+    parameter = automaton.parameters.get(wait.tree.path)
+    return parameter.name if parameter and parameter.kind == "tunable" else None
+
+
+@cache_on_owner
+def tunable_waits(automaton: Automaton) -> frozenset[str]:
+    """Return the tunable parameters that are waits."""
+    found = (tunable_wait(automaton, one.wait) for one in _all_transitions(automaton))
+    return frozenset(name for name in found if name)
+
+
+def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
+    """Return a time [s] in ticks, rounded up, exactly."""
+    assert automaton.period
+    return math.ceil(time / automaton.period)
+
+
+def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
+    """Return the ticks that a tunable wait may have: those within its range."""
+    if parameter.range is None:
+        return Fraction(0), Fraction(MAX_WAIT_TICKS)
+    assert automaton.period
+    low, high = (end / automaton.period for end in parameter.range)
+    return Fraction(math.ceil(low)), Fraction(math.floor(high))
+
+
+def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
+    """Report a tunable wait that something else reads, or that may be too long."""
+    waits = tunable_waits(automaton)
+    if not waits:
+        return
+    read = set(names_read_by(automaton, include_waits=False))
+    for name in sorted(waits):
+        parameter = automaton.parameters[name]
+        if automaton.model and name in automaton.model.parameters:
+            label = f"`{name}` is a parameter of the model `{automaton.model.name}`"
+            hint = "a tunable wait is kept in ticks: take a parameter that the model does not have"
+            problems.error("wait", parameter.span, label, hint)
+        elif name in read:
+            label = f"`{name}` is a tunable wait, and read elsewhere too"
+            hint = "it is kept in ticks: take another parameter beside it"
+            problems.error("wait", parameter.span, label, hint)
+        low, high = wait_range_in_ticks(automaton, parameter)
+        ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))
+        if (parameter.range and parameter.range[0] < 0) or high > MAX_WAIT_TICKS:
+            label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
+            problems.error("wait", parameter.span, label)
+        elif low > high:
+            label = f"`{name}` is a wait: its range has no whole tick of {automaton.period} s"
+            problems.error("wait", parameter.span, label)
+        elif not low <= ticks <= high:
+            label = f"`{name}` is a wait of {ticks} ticks: within its range are {low} to {high}"
+            hint = "a wait is rounded up to whole ticks"
+            problems.error("wait", parameter.span, label, hint)
+
+
+def _all_transitions(automaton: Automaton) -> Iterator[Transition]:
+    for mode in automaton.all_modes:
+        yield from mode.transitions

@@ -1,0 +1,1 @@
+"""The checked model: automata, charts, systems and queries about them."""

@@ -1,0 +1,92 @@
+"""Precedence: which transitions of a chart come before another one, wherever both are enabled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.expressions.syntax_tree import MEMORY_FUNCTIONS, FunctionCall, walk
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.region_queries import transitions_by_priority
+from language.model.statechart import ChartNode
+
+
+def node_of(automaton: Automaton, mode: Mode) -> ChartNode | None:
+    """Return the node of a mode in its chart, None where modes stand side by side alone."""
+    nodes = automaton.statechart.nodes if automaton.statechart else ()
+    return next((node for node in nodes if node.mode_key == mode.key), None)
+
+
+def preceding_transitions(
+    automaton: Automaton, mode: Mode, transition: Transition
+) -> list[Transition]:
+    """Return the transitions that win against one of a mode, guards and waits aside.
+
+    Those of smaller priority, and with `order: outer_first` those of the modes around it.
+    """
+    position = [way for _, way in transitions_by_priority(mode)].index(transition)
+    result = [way for _, way in transitions_by_priority(mode)[:position]]
+    chart, node = automaton.statechart, node_of(automaton, mode)
+    if chart and node and chart.order == "outer_first":
+        result += [
+            way
+            for outer in chart.region_ancestors(node)[1:]
+            for way in _transitions_of(automaton, outer)
+        ]
+    return [way for way in result if covers_events(automaton, way, transition)]
+
+
+def inner_preceding_transitions(
+    automaton: Automaton, mode: Mode
+) -> Iterator[tuple[Mode, list[Transition]]]:
+    """Yield the innermost modes of a superstate with the transitions inside that win against its.
+
+    With `order: outer_first` there are none.
+    """
+    chart, node = automaton.statechart, node_of(automaton, mode)
+    if chart is None or node is None or chart.order != "inner_first":
+        return
+    for leaf in chart.leaves_of(node) if node.number is None else ():
+        chain = chart.region_ancestors(leaf)
+        inner = chain[: _position_of(chain, node)]
+        found = [way for each in inner for way in _transitions_of(automaton, each)]
+        yield automaton.modes_by_key[leaf.mode_key], found
+
+
+def covers_events(automaton: Automaton, transition: Transition, other: Transition) -> bool:
+    """Tell whether a transition may be taken in every micro-step in which another may."""
+    if not transition.events or not other.events:
+        return not transition.events
+    return {*other.events} & possible_events(automaton) <= {*transition.events}
+
+
+@cache_on_owner
+def possible_events(automaton: Automaton) -> frozenset[str]:
+    """Return the events of a chart that are inputs or that a transition raises."""
+    signals = automaton.statechart.events if automaton.statechart else {}
+    raised = (way.raises for mode in automaton.all_modes for way in mode.transitions)
+    inputs = (name for name, signal in signals.items() if signal.is_input)
+    return frozenset((*inputs, *(name for names in raised for name in names)))
+
+
+def is_guard_portable(transition: Transition) -> bool:
+    """Tell whether the guard of a mode can be read where one inside it reads its own.
+
+    Edges and beats are those of an activation. Of `after` is known that no mode is active for
+    longer than one around it.
+    """
+    parts = walk(transition.when.tree)
+    used = {part.function for part in parts if isinstance(part, FunctionCall)}
+    return used.isdisjoint({*MEMORY_FUNCTIONS} - {"after"})
+
+
+def _transitions_of(automaton: Automaton, node: ChartNode) -> tuple[Transition, ...]:
+    return (
+        automaton.modes_by_key[node.mode_key].transitions
+        if node.mode_key in automaton.modes_by_key
+        else ()
+    )
+
+
+def _position_of(chain: tuple[ChartNode, ...], node: ChartNode) -> int:
+    return next(place for place, each in enumerate(chain) if each.index == node.index)

@@ -1,0 +1,1 @@
+"""Numbers computed at check time, and elementary functions with fixed bits."""

@@ -1,0 +1,1 @@
+"""Lowering of observers: Kalman filters with steady or recursive gain."""

@@ -1,0 +1,1 @@
+"""Overlays on a document: variants, effects, calibrations, values at points."""

@@ -1,0 +1,154 @@
+"""Calibration: parameter values with where they come from, apart from the structure they fit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.overlays.parameter_override import overlay_value, override_parameter
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
+from language.text.node_edit import find_node, put_node
+
+CALIBRATION_KEYS = ("language", "calibration", "of", "from", "date", "parameters")
+VALUE_KEYS = ("value", "points", "std", "from", "date")
+DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
+
+
+@dataclass(frozen=True)
+class CalibratedValue:
+    """A value of a parameter, its standard deviation and its origin as texts (empty: not told).
+
+    Of a table the value is `{points: ...}`.
+    """
+
+    name: str
+    value: YamlNode
+    std: str
+    origin: str
+    date: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Values of the parameters of an automaton or system; `of` names it."""
+
+    name: str
+    of: ScalarNode
+    values: Mapping[str, CalibratedValue]
+    span: Span
+
+
+def read_calibration(document: Document, problems: Problems) -> Calibration:
+    """Read a calibration; its names are looked up by who uses it. Raises SpecError."""
+    require_kind(document, "calibration", problems)
+    return _CalibrationReader(problems).read(document)
+
+
+def apply_calibration(
+    tree: MappingNode,
+    calibration: Calibration,
+    parameters: Mapping[str, MappingNode],
+    instance_parameters: Mapping[str, tuple[str, str]],
+    problems: Problems,
+) -> MappingNode:
+    """Return the tree of an automaton with the values of a calibration.
+
+    `parameters` are its parameters by name, those of its model too, `instance_parameters` those of its instances: the
+    instance and the parameter. Unknown ones are problems.
+    """
+    for name, value in calibration.values.items():
+        if name in instance_parameters:
+            tree = set_instance_value(tree, instance_parameters[name], value.value)
+        elif name not in parameters:
+            report_unknown_parameter(
+                calibration, value, {**parameters, **instance_parameters}, problems
+            )
+        elif "derived" in parameters[name].entries:
+            label = f"`{name}` is derived: set what it follows from"
+            problems.error("values", value.span, label)
+        else:
+            made = override_parameter(parameters[name], value.value, problems)
+            tree = put_node(tree, ("parameters", name), made)
+    return tree
+
+
+def set_instance_value(tree: MappingNode, place: tuple[str, str], value: YamlNode) -> MappingNode:
+    """Return the tree of a system or automaton in which an instance has another value.
+
+    `place` is the instance and the parameter.
+    """
+    path = ("instances", place[0], "values", place[1])
+    return put_node(tree, path, overlay_value(find_node(tree, path), value))
+
+
+def report_unknown_parameter(
+    calibration: Calibration,
+    value: CalibratedValue,
+    candidates: Mapping[str, object],
+    problems: Problems,
+) -> None:
+    """Report a value of a parameter that is not there."""
+    label = f"`{calibration.of.text}` has no parameter `{value.name}`"
+    problems.error("name", value.span, label, suggest_name(value.name, candidates))
+
+
+class _CalibrationReader(Reader):
+    """The sections of a calibration."""
+
+    def read(self, document: Document) -> Calibration:
+        tree = self.read_mapping(document.root, f"calibration {document.name}", CALIBRATION_KEYS)
+        of = self.read_scalar(tree.get("of"), "of", document.name_span)
+        origin, date = self._read_origin_and_date(tree)
+        values = {}
+        for entry in self.read_mapping(tree.get("parameters"), "parameters"):
+            value = self._read_value(entry, origin, date)
+            if value:
+                values[entry.key] = value
+        self.problems.raise_if_errors()
+        assert of is not None
+        return Calibration(document.name, of, values, document.name_span)
+
+    def _read_value(self, entry: Entry, origin: str, date: str) -> CalibratedValue | None:
+        what = f"parameters.{entry.key}"
+        if isinstance(entry.node, ScalarNode):
+            return CalibratedValue(entry.key, entry.node, "", origin, date, entry.span)
+        table = self.read_mapping(entry.node, what, VALUE_KEYS)
+        if "points" in table.entries:
+            return self._read_points(entry, table, origin, date)
+        value = self.read_scalar(table.get("value"), f"{what}.value", entry.span)
+        own, own_date = self._read_origin_and_date(table)
+        node = table.get("std")
+        if value is None:
+            return None
+        if node is not None:
+            _, unit = self.read_quantity(value, f"{what}.value", value.span, None)
+            size, _ = self.read_quantity(node, f"{what}.std", node.span, unit)
+            if size < 0:
+                self.problems.error("range", node.span, "`std` is not below zero")
+        std = node.text if isinstance(node, ScalarNode) else ""
+        return CalibratedValue(entry.key, value, std, own or origin, own_date or date, entry.span)
+
+    def _read_points(
+        self, entry: Entry, table: MappingNode, origin: str, date: str
+    ) -> CalibratedValue:
+        for key in ("value", "std"):
+            if key in table.entries:
+                label = f"a table has `points`, no `{key}`"
+                self.problems.error("form", table.entries[key].span, label)
+        own, own_date = self._read_origin_and_date(table)
+        points = MappingNode({"points": table.entries["points"]}, table.span)
+        return CalibratedValue(entry.key, points, "", own or origin, own_date or date, entry.span)
+
+    def _read_origin_and_date(self, table: MappingNode) -> tuple[str, str]:
+        texts = []
+        for key in ("from", "date"):
+            node = table.get(key)
+            texts.append(self.read_string(node, key, node.span) if node else "")
+        if texts[1] and not DATE.fullmatch(texts[1]):
+            span = table.entries["date"].node.span
+            self.problems.error("form", span, "a date is written as `2026-11-21`")
+        return texts[0], texts[1]

@@ -1,0 +1,101 @@
+"""Check of an effect on its own: what would be wrong with it at every place where it is laid."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from language.expressions.syntax_tree import FunctionCall, SyntaxTree, children
+from language.expressions.units import NO_UNIT, UNKNOWN_UNIT
+from language.reading.parameter_reader import ParameterReader
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.node_edit import entries, format_inline, put_node, scalars_of
+from language.typecheck.function_calls import FUNCTION_NAMES, argument_count_error
+
+HOLE_PATTERN = re.compile(r"\$[A-Za-z]\w*")
+KEY_HOLE_SECTIONS = ("terms", "equations", "redirect", "move")
+"""Sections whose keys may be holes."""
+UNIT_SECTIONS = ("parameters", "states", "discrete")
+"""Sections of what has a unit, which may be a hole."""
+QUANTITY_KEYS = ("value", "range", "neutral", "plain", "starts")
+"""Keys of a parameter that are numbers in its unit."""
+
+
+def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -> None:
+    """Report keys and units with a hole that no place of the effect has."""
+    texts = [
+        (entry.key, entry.span)
+        for section in KEY_HOLE_SECTIONS
+        for entry in entries(tree.get(section))
+    ]
+    for section in UNIT_SECTIONS:
+        for entry in entries(tree.get(section)):
+            unit = entry.node.get("unit") if isinstance(entry.node, MappingNode) else None
+            if isinstance(unit, ScalarNode):
+                texts.append((unit.text, unit.span))
+    for text, span in texts:
+        for found in HOLE_PATTERN.finditer(text):
+            hole = found.group()
+            if hole not in holes:
+                report_unknown_hole(hole, span.subspan(found.start(), len(hole)), holes, problems)
+
+
+def report_unknown_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
+    """Report a hole that no place of the effect has."""
+    label = f"`{hole}` is not a hole of the places where this effect fits"
+    hint = suggest_name(hole, holes) or f"or `has: [{hole[1:]}]` says that it is"
+    problems.error("effect", span, label, hint)
+
+
+def check_functions(tree: SyntaxTree, problems: Problems) -> None:
+    """Report functions that are none, or that take another number of arguments."""
+    if isinstance(tree, FunctionCall):
+        if tree.function not in FUNCTION_NAMES:
+            hint = (
+                suggest_name(tree.function, FUNCTION_NAMES)
+                or f"there are `{' '.join(FUNCTION_NAMES)}`"
+            )
+            span = tree.span.subspan(0, len(tree.function))
+            problems.error("name", span, f"`{tree.function}` is not a function", hint)
+        elif label := argument_count_error(tree):
+            problems.error("arguments", tree.span, label)
+    for part in children(tree):
+        check_functions(part, problems)
+
+
+def check_parameters(tree: MappingNode, problems: Problems) -> None:
+    """Report values, ranges and starts of parameters that are none or do not go together."""
+    known = tree.get("parameters")
+    if isinstance(known, MappingNode):
+        made = {entry.key: _remove_hole_unit(entry) for entry in known}
+        tree = put_node(
+            tree, ("parameters",), MappingNode({k: e for k, e in made.items() if e}, known.span)
+        )
+    ParameterReader(problems, tree).read_parameters()
+
+
+def _remove_hole_unit(entry: Entry) -> Entry | None:
+    """Return a parameter whose unit, where it is a hole, is a number.
+
+    None for one whose units are known where the effect is laid alone: it mixes a hole with units
+    of its own, or has a table with holes.
+    """
+    table = entry.node
+    if not isinstance(table, MappingNode) or not HOLE_PATTERN.search(format_inline(table)):
+        return entry
+    if "table" in table.entries:
+        return None
+    if not (isinstance(unit := table.get("unit"), ScalarNode) and HOLE_PATTERN.search(unit.text)):
+        return entry
+    if any(_has_unit(table.get(key)) for key in QUANTITY_KEYS):
+        return None
+    kept = {key: part for key, part in table.entries.items() if key != "unit"}
+    return Entry(entry.key, entry.span, MappingNode(kept, table.span))
+
+
+def _has_unit(node: YamlNode | None) -> bool:
+    reader = Reader(Problems())
+    own = [reader.read_quantity(item, "value", item.span, None)[1] for item in scalars_of(node)]
+    return any(unit not in (NO_UNIT, UNKNOWN_UNIT) for unit in own)

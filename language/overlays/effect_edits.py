@@ -1,0 +1,200 @@
+"""Redirect: within parts of an automaton's tree, what is read under one name becomes another."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from language.expressions.text_rewrite import (
+    join_summands,
+    names_in_text,
+    split_balance,
+    split_summands,
+    substitute_reads,
+)
+from language.overlays.tree_types import formula_entries
+from language.reading.element_reader import outputs_as_mapping
+from language.text.diagnostic import Span
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.formula_sites import AUTOMATON_SITES, KeyPath, map_formulas
+from language.text.node_edit import entries, find_node, put_node
+
+MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
+
+PathPredicate = Callable[[KeyPath], bool]
+
+
+@dataclasses.dataclass(frozen=True)
+class Redirection:
+    """A part of a tree in which reads are redirected: `new` by old name; asked for at `span`."""
+
+    paths: tuple[str, ...]
+    exceptions: tuple[str, ...]
+    replacements: Mapping[str, str]
+    span: Span
+
+
+def redirect_reads(
+    tree: MappingNode, redirection: Redirection
+) -> tuple[MappingNode, frozenset[str]]:
+    """Return a tree with the reads in a part redirected, and the names that were found there.
+
+    In an equation the redirection reaches those that it alone reads, too: they are parts of it.
+    """
+    redirected_names: set[str] = set()
+    applies_to = _path_predicate(tree, redirection)
+
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        if not applies_to(path):
+            return scalar
+        text, hits = substitute_reads(scalar.text, redirection.replacements)
+        redirected_names.update(hits)
+        return rewrite_scalar(scalar, text, redirection.span) if hits else scalar
+
+    tree = map_formulas(tree, AUTOMATON_SITES, change)
+    outputs = tree.get("outputs")
+    if outputs is not None and {"outputs", "everywhere"} & set(redirection.paths):
+        table, hits = _redirect_outputs(outputs_as_mapping(outputs), redirection)
+        redirected_names.update(hits)
+        if hits:
+            span = tree.entries["outputs"].span
+            tree = MappingNode(
+                {**tree.entries, "outputs": Entry("outputs", span, table)}, tree.span
+            )
+    return tree, frozenset(redirected_names)
+
+
+def rewrite_scalar(scalar: ScalarNode, text: str, span: Span) -> ScalarNode:
+    """Return a scalar with another text, made so by the overlay at `span`."""
+    return dataclasses.replace(scalar, text=text, changes=(*scalar.changes, span))
+
+
+def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> MappingNode:
+    """Return a tree whose equation of a name is a formula; `base` in it is what it was."""
+
+    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        if not _matches_key(path, f"equations.{name}"):
+            return scalar
+        text, _ = substitute_reads(formula.text, {"base": scalar.text})
+        return rewrite_scalar(scalar, text, formula.span)
+
+    return map_formulas(tree, AUTOMATON_SITES, change)
+
+
+def has_formula_at(tree: MappingNode, key: str) -> bool:
+    """Tell whether an expression stands under a key path such as `flow.w_w`."""
+    if key in ("everywhere", "outputs"):
+        return True
+    matches = []
+
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        matches.append(_matches_key(path, key))
+        return scalar
+
+    map_formulas(tree, AUTOMATON_SITES, look)
+    return any(matches)
+
+
+def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicate:
+    if "everywhere" in redirection.paths:
+        return lambda path: not any(_matches_key(path, key) for key in redirection.exceptions)
+    keys = [name for path in redirection.paths for name in _equation_keys(tree, path)]
+    return lambda path: any(_matches_key(path, key) for key in keys)
+
+
+def _matches_key(path: KeyPath, key: str) -> bool:
+    """Tell whether a path is a key path or below it; `flow.w` is that of the modes, too."""
+    wanted = tuple(key.split("."))
+    if path[: len(wanted)] == wanted:
+        return True
+    return path[0] in MODE_CONTAINERS and path[-len(wanted) :] == wanted
+
+
+def _equation_keys(tree: MappingNode, key: str) -> list[str]:
+    """Return an equation's key path with those of the equations that only it reads."""
+    section, _, name = key.partition(".")
+    if section != "equations":
+        return [key]
+    readers: dict[str, set[str]] = {}
+    equations = {equation for equation, _ in formula_entries(tree, "equations")}
+
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        reader = path[-1] if path[-2:-1] == ("equations",) else ".".join(path)
+        if path[0] not in ("elements", "places"):
+            for read in names_in_text(scalar.text):
+                readers.setdefault(read, set()).add(reader)
+        return scalar
+
+    map_formulas(tree, AUTOMATON_SITES, look)
+    inside = {name}
+    while True:
+        more = {e for e in equations - inside if readers.get(e) and readers[e] <= inside}
+        if not more:
+            return [f"equations.{equation}" for equation in sorted(inside)]
+        inside |= more
+
+
+def _redirect_outputs(
+    outputs: MappingNode, redirection: Redirection
+) -> tuple[MappingNode, set[str]]:
+    entries, hits = {}, set()
+    for entry in outputs:
+        node = entry.node
+        if isinstance(node, ScalarNode) and node.text in redirection.replacements:
+            hits.add(node.text)
+            node = rewrite_scalar(node, redirection.replacements[node.text], redirection.span)
+        entries[entry.key] = Entry(entry.key, entry.span, node)
+    return MappingNode(entries, outputs.span), hits
+
+
+@dataclass(frozen=True)
+class MovedSummands:
+    """A tree without the summands that left, and these with their signs; terms by name."""
+
+    tree: MappingNode
+    summands: list[tuple[str, str]]
+    terms: dict[str, YamlNode]
+    source: Span
+
+
+def remove_summands(
+    tree: MappingNode, state: str, names: set[str], span: Span
+) -> MovedSummands | None:
+    """Take the top-level summands that name some variables out of the balance of a state.
+
+    Its terms count as summands. None where the balance is not the same in every mode.
+    """
+    balance = find_node(tree, ("flow", state))
+    if not isinstance(balance, ScalarNode):
+        return None
+    left, right = split_balance(balance.text)
+    parts = split_summands(right)
+    removed = [part for part in parts if names & set(names_in_text(part[1]))]
+    remaining = [part for part in parts if part not in removed]
+    if removed:
+        text = f"{left} = {join_summands(remaining)}"
+        tree = put_node(tree, ("flow", state), rewrite_scalar(balance, text, span))
+    moved: dict[str, YamlNode] = {}
+    kept = {}
+    terms = find_node(tree, ("terms", state))
+    for entry in entries(terms):
+        if isinstance(entry.node, ScalarNode) and names & set(names_in_text(entry.node.text)):
+            moved[entry.key] = entry.node
+        else:
+            kept[entry.key] = entry
+    if moved and terms:
+        tree = put_node(tree, ("terms", state), MappingNode(kept, terms.span))
+    return MovedSummands(tree, removed, moved, balance.span)
+
+
+def insert_summands(body: MappingNode, state: str, moved: MovedSummands) -> MappingNode:
+    """Return an effect's body with the summands that moved in the balance of its state."""
+    balance = find_node(body, ("flow", state))
+    if isinstance(balance, ScalarNode) and moved.summands:
+        left, right = split_balance(balance.text)
+        text = f"{left} = {join_summands([*split_summands(right), *moved.summands])}"
+        body = put_node(body, ("flow", state), rewrite_scalar(balance, text, moved.source))
+    for name, node in moved.terms.items():
+        body = put_node(body, ("terms", state, name), node)
+    return body

@@ -1,0 +1,229 @@
+"""Place: where in an automaton's tree an effect is laid, and what its holes are there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.expressions.text_rewrite import split_balance
+from language.expressions.units import SECOND, Dimension, are_compatible
+from language.overlays.effect_reader import ELEMENT_PARTS, Effect, PlacePattern
+from language.overlays.tree_types import TreeTypes, format_si_unit, formula_entries
+from language.reading.element_reader import outputs_as_mapping
+from language.text.diagnostic import suggest_name
+from language.text.document import MappingNode, ScalarNode
+from language.text.node_edit import scalars_of
+
+Hole = str | tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EffectPlace:
+    """A place that an effect fits: `balanced` is the state whose balance it belongs to."""
+
+    name: str
+    holes: Mapping[str, Hole]
+    balance_state: str | None = None
+
+
+@dataclass(frozen=True)
+class PlaceMismatch:
+    """Why an effect cannot be laid at a place, and what would help."""
+
+    reason: str
+    help: str = ""
+
+
+def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPlace | PlaceMismatch:
+    """Return the place of that name where the effect fits, or why there is none."""
+    known = TreeTypes(tree)
+    misfits = []
+    for fit in effect.place_patterns:
+        found = PLACE_FINDERS[fit.kind](tree, known, fit, name)
+        if isinstance(found, EffectPlace):
+            lacking = [key for key in fit.has if key not in found.holes]
+            if not lacking:
+                return found
+            found = _missing_hole(fit, name, lacking[0])
+        misfits.append(found)
+    hints = dict.fromkeys(misfit.help for misfit in misfits if misfit.help)
+    return PlaceMismatch("; ".join(misfit.reason for misfit in misfits), "; ".join(hints))
+
+
+def _missing_hole(pattern: PlacePattern, name: str, key: str) -> PlaceMismatch:
+    if pattern.kind == "element":
+        return PlaceMismatch(
+            f"element `{name}` has no `{key}`", f"`elements.{name}.{key}` would do"
+        )
+    label = f"the {pattern.kind} of `{name}` declares no `{key}`"
+    return PlaceMismatch(label, f"`places: {{{name}: {{{key}: ...}}}}` would do")
+
+
+def _find_balance(
+    tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
+) -> EffectPlace | PlaceMismatch:
+    balances = list(formula_entries(tree, "flow"))
+    found = [scalar for state, scalar in balances if state == name]
+    if not found:
+        return PlaceMismatch(
+            f"there is no balance of `{name}`", suggest_name(name, {s for s, _ in balances})
+        )
+    kind = known.type_of_name(name)
+    if not isinstance(kind, Dimension):
+        return PlaceMismatch(f"the unit of `{name}` is not known")
+    if pattern.of == "rate" and kind.powers[2] != -1:
+        return PlaceMismatch(f"`{name}` is in `{kind}`: it is no speed")
+    force = known.balance_dimension(name, found[0])
+    if pattern.unit and (force is None or not are_compatible(force, pattern.unit)):
+        return PlaceMismatch(f"the balance of `{name}` is in `{force}`, not in `{pattern.unit}`")
+    holes: dict[str, Hole] = {"x": name, "unit": format_si_unit(kind)}
+    if force is not None:
+        holes["force"] = format_si_unit(force)
+        inertia = _multiply_dimensions(_multiply_dimensions(force, kind, -1), SECOND)
+        holes["inertia_unit"] = format_si_unit(Dimension(inertia.powers))
+        holes["damping_unit"] = format_si_unit(_multiply_dimensions(force, kind, -1))
+        holes["drag_unit"] = format_si_unit(
+            _multiply_dimensions(_multiply_dimensions(force, kind, -1), kind, -1)
+        )
+        factors = {_balance_coefficient(scalar.text, name) for scalar in found}
+        if len(factors) == 1:
+            holes["inertia"] = factors.pop()
+    return EffectPlace(name, {**holes, **_declared_holes(tree, name)}, name)
+
+
+def _find_input(
+    tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
+) -> EffectPlace | PlaceMismatch:
+    table = tree.get("inputs")
+    names = table.entries if isinstance(table, MappingNode) else {}
+    if name not in names:
+        return PlaceMismatch(f"there is no input `{name}`", suggest_name(name, names))
+    return _signal_place(tree, known, pattern, name, "u", name)
+
+
+def _find_output(
+    tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
+) -> EffectPlace | PlaceMismatch:
+    node = tree.get("outputs")
+    outputs = outputs_as_mapping(node) if node else MappingNode({}, tree.span)
+    source = outputs.get(name)
+    if not isinstance(source, ScalarNode):
+        return PlaceMismatch(f"there is no output `{name}`", suggest_name(name, outputs.entries))
+    return _signal_place(tree, known, pattern, name, "y", source.text)
+
+
+def _signal_place(
+    tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str, hole: str, read_name: str
+) -> EffectPlace | PlaceMismatch:
+    kind = known.type_of_name(read_name)
+    if not isinstance(kind, Dimension):
+        return PlaceMismatch(f"`{name}` is no quantity")
+    if pattern.unit and not are_compatible(kind, pattern.unit):
+        return PlaceMismatch(f"`{name}` is in `{kind}`, not in `{pattern.unit}`")
+    units = {
+        "unit": format_si_unit(kind),
+        "unit_rate": format_si_unit(_multiply_dimensions(kind, SECOND, -1)),
+    }
+    return EffectPlace(name, {hole: read_name, **units, **_declared_holes(tree, name)})
+
+
+def _find_element(
+    tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
+) -> EffectPlace | PlaceMismatch:
+    table = tree.get("elements")
+    elements = table.entries if isinstance(table, MappingNode) else {}
+    element = elements[name].node if name in elements else None
+    if not isinstance(element, MappingNode):
+        return PlaceMismatch(f"there is no element `{name}`", suggest_name(name, elements))
+    kind = element.get("kind")
+    if not isinstance(kind, ScalarNode) or kind.text != pattern.of:
+        shown = kind.text if isinstance(kind, ScalarNode) else "?"
+        return PlaceMismatch(f"element `{name}` is {shown}, not {pattern.of}")
+    holes: dict[str, Hole] = {}
+    kinds: dict[str, Dimension] = {}
+    for part in ELEMENT_PARTS:
+        node = element.get(part)
+        if isinstance(node, ScalarNode):
+            holes[part] = node.text
+            dimension = known.type_of_formula(node)
+            if isinstance(dimension, Dimension):
+                kinds[part] = dimension
+    if "far" in element.entries:
+        holes["far"] = tuple(item.text for item in scalars_of(element.get("far")))
+    measured = "torque" if pattern.of == "elastic" else "inertia"
+    unit = kinds.get(measured)
+    if pattern.unit and (unit is None or not are_compatible(unit, pattern.unit)):
+        return PlaceMismatch(f"the {measured} of `{name}` is in `{unit}`, not in `{pattern.unit}`")
+    holes.update(_element_units(pattern.of, kinds))
+    holes.update(_gap_holes(tree, holes))
+    return EffectPlace(name, holes, _text_or_none(holes.get("speed")))
+
+
+def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
+    """Return the units that follow from the parts of an element."""
+    units = dict(kinds)
+    angle, force = kinds.get("twist"), kinds.get("torque")
+    if of == "inertia" and {"speed", "inertia"} <= set(kinds):
+        angle = _multiply_dimensions(kinds["speed"], SECOND)
+        force = _multiply_dimensions(
+            _multiply_dimensions(kinds["inertia"], kinds["speed"]), SECOND, -1
+        )
+        force = Dimension(force.powers, kinds["inertia"].angle or 0)
+    found: dict[str, Hole] = {}
+    if angle is not None and force is not None:
+        units["angle"], units["force"] = angle, force
+        units.setdefault("stiffness", _multiply_dimensions(force, angle, -1))
+        units.setdefault(
+            "damping", _multiply_dimensions(_multiply_dimensions(force, angle, -1), SECOND)
+        )
+    for part, dimension in units.items():
+        found[part if part in ("angle", "force") else f"{part}_unit"] = format_si_unit(dimension)
+    unit = units.get("force" if of == "elastic" else "speed")
+    return {**found, "unit": format_si_unit(unit)} if unit else found
+
+
+def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
+    """Return the stretch of the spring alone, and the rate of the gap beside it (0 without)."""
+    twist, gap = holes.get("twist"), holes.get("gap")
+    if twist is None or gap is None:
+        return {"stretch": twist, "gap_rate": "0"} if twist else {}
+    found: dict[str, Hole] = {"stretch": f"{twist} - {gap}"}
+    balances = {scalar.text for state, scalar in formula_entries(tree, "flow") if state == gap}
+    if len(balances) == 1:
+        left, right = split_balance(balances.pop())
+        if left == f"der({gap})":
+            found["gap_rate"] = right
+    return found
+
+
+def _declared_holes(tree: MappingNode, name: str) -> dict[str, Hole]:
+    """Return the keys that `places` declares for a balance, input or output."""
+    places = tree.get("places")
+    table = places.get(name) if isinstance(places, MappingNode) else None
+    entries = table if isinstance(table, MappingNode) else ()
+    return {entry.key: entry.node.text for entry in entries if isinstance(entry.node, ScalarNode)}
+
+
+def _balance_coefficient(balance: str, state: str) -> str:
+    left, _ = split_balance(balance)
+    factor = left.replace(f"der({state})", "").strip().strip("*").strip()
+    return factor or "1"
+
+
+def _multiply_dimensions(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
+    """Return a product (or quotient) whose power of the angle is counted."""
+    powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
+    return Dimension(powers, (a.angle or 0) + sign * (b.angle or 0))
+
+
+def _text_or_none(hole: Hole | None) -> str | None:
+    return hole if isinstance(hole, str) else None
+
+
+PLACE_FINDERS = {
+    "balance": _find_balance,
+    "input": _find_input,
+    "output": _find_output,
+    "element": _find_element,
+}
+"""How a place of each kind is found."""

@@ -1,0 +1,301 @@
+"""Effect: a named piece of physics with holes, read from its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from language.expressions.name_rules import check_name
+from language.expressions.parser import parse_balance, parse_expression
+from language.expressions.syntax_tree import Name, SyntaxTree, names
+from language.expressions.units import Dimension
+from language.overlays.check_effect import (
+    check_functions,
+    check_holes,
+    check_parameters,
+    report_unknown_hole,
+)
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
+from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
+
+EffectLookup = Callable[[str, Span], Document]
+"""From an effect's name (asked for at a place) to its document."""
+
+DESCRIPTION_KEYS = ("signature", "confused_with", "separated_by", "references")
+ADDED_SECTIONS = (
+    "parameters",
+    "states",
+    "equations",
+    "flow",
+    "terms",
+    "discrete",
+    "elements",
+    "regions",
+)
+EFFECT_KEYS = (
+    "language",
+    "effect",
+    "at",
+    "reads",
+    *ADDED_SECTIONS,
+    "redirect",
+    "move",
+    *DESCRIPTION_KEYS,
+)
+PLACE_PATTERN_KEYS = {
+    "balance": ("of", "unit", "has"),
+    "input": ("unit", "has"),
+    "output": ("unit", "has"),
+    "element": ("kind", "unit", "has"),
+}
+ELEMENT_PARTS = (
+    *("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
+    *("speed", "inertia"),
+)
+HOLES_BY_PLACE_KIND = {
+    "balance": ("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
+    "input": ("u", "unit", "unit_rate"),
+    "output": ("y", "unit", "unit_rate"),
+    "element": (
+        *("unit", "force", "angle", "far", "stretch", "gap_rate", *ELEMENT_PARTS),
+        *(f"{part}_unit" for part in ELEMENT_PARTS),
+    ),
+}
+"""Holes of each kind of place; those that a place declares in `places` are named in `has`."""
+
+
+@dataclass(frozen=True)
+class PlacePattern:
+    """One kind of place where an effect fits."""
+
+    kind: str
+    of: str
+    unit: Dimension | None
+    has: tuple[str, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A parametrised overlay: where it fits, what it does, and texts for a report."""
+
+    name: str
+    about: str
+    place_patterns: tuple[PlacePattern, ...]
+    body: MappingNode
+    signature: str
+    confused_with: tuple[str, ...]
+    separated_by: tuple[str, ...]
+    references: tuple[str, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class EffectApplication:
+    """An effect with the place where it is asked for: one entry of `effects`."""
+
+    effect: Effect
+    place: str
+    suffix: str
+    rename: Mapping[str, Entry]
+    values: Mapping[str, Entry]
+    span: Span
+
+    @property
+    def place_span(self) -> Span:
+        """Where the place is written, behind the `@`."""
+        return self.span.subspan(len(self.effect.name) + 1, len(self.place))
+
+    @property
+    def layer_name(self) -> str:
+        """The name of the layer."""
+        return f"effect {self.effect.name}@{self.place}"
+
+
+def read_effect(document: Document, problems: Problems) -> Effect:
+    """Read an effect; what is wrong with it on its own is reported. Raises SpecError."""
+    require_kind(document, "effect", problems)
+    return _EffectReader(problems).read(document)
+
+
+def read_effect_application(
+    entry: Entry, lookup: EffectLookup, problems: Problems
+) -> EffectApplication:
+    """Read one entry of `effects`: `name@place: {values: ..., as: ..., rename: ...}`."""
+    reader = Reader(problems)
+    name, sign, place = entry.key.partition("@")
+    if not (name and sign and place):
+        label = f"`{entry.key}` does not say where the effect is laid"
+        problems.error("effect", entry.span, label, "`coulomb_friction@w_em`: effect, place")
+        problems.raise_if_errors()
+    table = reader.read_mapping(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
+    ending = (
+        reader.read_string(table.get("as"), "as", entry.span) if "as" in table.entries else place
+    )
+    values = _read_scalar_entries(reader, table.get("values"), f"effects.{entry.key}.values")
+    rename = _read_scalar_entries(reader, table.get("rename"), f"effects.{entry.key}.rename")
+    effect = read_effect(lookup(name, entry.span.subspan(0, len(name))), problems)
+    problems.raise_if_errors()
+    return EffectApplication(effect, place, ending, rename, values, entry.span)
+
+
+def added_names(body: MappingNode) -> dict[str, Span]:
+    """Return the names that an effect adds and expressions may read."""
+    spans: dict[str, Span] = {}
+    for section in ("parameters", "states", "discrete", "equations"):
+        for entry in _entries(body.get(section)):
+            if not entry.key.startswith("$"):
+                spans.setdefault(entry.key, entry.span)
+    for entry in _region_equations(body.get("regions")):
+        spans.setdefault(entry.key, entry.span)
+    return spans
+
+
+def external_names(body: MappingNode) -> list[str]:
+    """Return the names that expressions of an effect read, neither holes nor its own."""
+    own, found = added_names(body), dict[str, None]()
+
+    def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        for name in (
+            name for part in _parse_formula(path, scalar, Problems()) for name in names(part)
+        ):
+            if not (name.path.startswith("$") or name.path in own or name.path == "base"):
+                found.setdefault(name.path)
+        return scalar
+
+    map_formulas(body, EFFECT_SITES, look)
+    return list(found)
+
+
+def _region_equations(node: YamlNode | None) -> Iterator[Entry]:
+    for owner in _entries(node):
+        if isinstance(owner.node, MappingNode):
+            yield from _entries(owner.node.get("equations"))
+            yield from _region_equations(owner.node.get("modes"))
+
+
+def _entries(node: YamlNode | None) -> Iterator[Entry]:
+    if isinstance(node, MappingNode):
+        yield from node
+
+
+def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> dict[str, Entry]:
+    found = {}
+    for entry in reader.read_mapping(node, what):
+        if reader.read_scalar(entry.node, entry.key, entry.span):
+            found[entry.key] = entry
+    return found
+
+
+class _EffectReader(Reader):
+    """The sections of an effect, one method each."""
+
+    def read(self, document: Document) -> Effect:
+        tree = self.read_mapping(document.root, f"effect {document.name}", EFFECT_KEYS)
+        check_name(document.name, document.name_span, self.problems)
+        fits = self._read_place_patterns(tree.get("at"), document.name_span)
+        self._check_sections(tree)
+        check_parameters(tree, self.problems)
+        self._check_names(tree, fits)
+        about = tree.get("about")
+        signature = tree.get("signature")
+        return Effect(
+            name=document.name,
+            about=about.text if isinstance(about, ScalarNode) else "",
+            place_patterns=fits,
+            body=tree,
+            signature=signature.text if isinstance(signature, ScalarNode) else "",
+            confused_with=self._read_texts(tree, "confused_with"),
+            separated_by=self._read_texts(tree, "separated_by"),
+            references=self._read_texts(tree, "references"),
+            span=document.name_span,
+        )
+
+    def _read_texts(self, tree: MappingNode, key: str) -> tuple[str, ...]:
+        return tuple(item.text for item in self.read_list(tree.get(key), key))
+
+    def _read_place_patterns(self, node: YamlNode | None, span: Span) -> tuple[PlacePattern, ...]:
+        table = self.read_mapping(node, "at", PLACE_PATTERN_KEYS)
+        if not table.entries:
+            self.problems.error("missing", span, "an effect says `at` what place it fits")
+        return tuple(
+            self._read_place_pattern(entry) for entry in table if entry.key in PLACE_PATTERN_KEYS
+        )
+
+    def _read_place_pattern(self, entry: Entry) -> PlacePattern:
+        what = f"at.{entry.key}"
+        table = self.read_mapping(entry.node, what, PLACE_PATTERN_KEYS[entry.key])
+        of = self.read_choice(table.get("of"), "of", ("rate",), "")
+        of = self.read_choice(table.get("kind"), "kind", ("elastic", "inertia"), of)
+        if entry.key == "element" and not of:
+            self.problems.error("missing", entry.span, f"`{what}.kind` is missing")
+        unit = self.read_unit(table.get("unit")).dimension if "unit" in table.entries else None
+        has = tuple(item.text for item in self.read_list(table.get("has"), "has"))
+        return PlacePattern(entry.key, of, unit, has, entry.span)
+
+    def _check_sections(self, tree: MappingNode) -> None:
+        """Names are names, and only what is named is changed."""
+        for section in ("parameters", "states", "discrete", "elements", "regions", "flow"):
+            for entry in self.read_mapping(tree.get(section), section):
+                check_name(entry.key, entry.span, self.problems)
+        for entry in self.read_mapping(tree.get("equations"), "equations"):
+            if not entry.key.startswith("$"):
+                check_name(entry.key, entry.span, self.problems)
+        for entry in self.read_mapping(tree.get("terms"), "terms"):
+            for _ in self.named_entries(entry.node, f"terms.{entry.key}"):
+                pass
+        for entry in self.read_mapping(tree.get("flow"), "flow"):
+            if entry.key not in {e.key for e in self.read_mapping(tree.get("states"), "states")}:
+                label = f"`{entry.key}` is not a state of the effect"
+                hint = "a summand of another balance is one of its `terms`"
+                self.problems.error("effect", entry.span, label, hint)
+        self.read_mapping(tree.get("redirect"), "redirect")
+        self.read_mapping(tree.get("move"), "move")
+
+    def _check_names(self, tree: MappingNode, fits: tuple[PlacePattern, ...]) -> None:
+        """Expressions read what the effect brings, holes, and what it `reads` of a model."""
+        own = added_names(tree)
+        reads = {item.text: item for item in self.read_list(tree.get("reads"), "reads")}
+        for name, item in reads.items():
+            check_name(name, item.span, self.problems)
+            if name in own:
+                label = f"`{name}` is the effect's own: it is not read of the model"
+                self.problems.error("effect", item.span, label)
+        known = {f"${hole}" for fit in fits for hole in (*HOLES_BY_PLACE_KIND[fit.kind], *fit.has)}
+        check_holes(tree, known, self.problems)
+
+        def check(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+            if path[:2] == ("redirect", "except"):
+                return scalar
+            allowed = {*known, *own, *reads}
+            if path[0] == "equations" and path[1].startswith("$"):
+                allowed.add("base")
+            for part in _parse_formula(path, scalar, self.problems):
+                check_functions(part, self.problems)
+                for name in names(part):
+                    self._check_name_is_known(name, allowed)
+            return scalar
+
+        map_formulas(tree, EFFECT_SITES, check)
+
+    def _check_name_is_known(self, name: Name, allowed: set[str]) -> None:
+        if name.path in allowed or "." in name.path:
+            return
+        if name.path.startswith("$"):
+            report_unknown_hole(name.path, name.span, allowed, self.problems)
+            return
+        label = f"`{name.path}` is neither a hole nor a name of this effect"
+        hint = suggest_name(name.path, allowed)
+        if not hint and name.path != "base":
+            hint = f"or `reads: [{name.path}]` says that it is one of the model"
+        self.problems.error("effect", name.span, label, hint)
+
+
+def _parse_formula(path: KeyPath, scalar: ScalarNode, problems: Problems) -> tuple[SyntaxTree, ...]:
+    with problems.collect_errors():
+        if path[0] == "flow" or path[-2:-1] == ("flow",):
+            return parse_balance(scalar)
+        return (parse_expression(scalar),)
+    return ()

@@ -1,0 +1,256 @@
+"""Project: a document with what it extends: variants, effects and calibrations laid over a base."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from language.overlays.apply_effect import apply_effect
+from language.overlays.calibration import (
+    Calibration,
+    apply_calibration,
+    read_calibration,
+    report_unknown_parameter,
+    set_instance_value,
+)
+from language.overlays.effect_reader import read_effect_application
+from language.reading.reader import Reader
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
+from language.text.node_edit import entries
+from language.text.overlay import apply_overlay, without_keys
+from language.text.project_files import Project, display_path, parse_document, read_document
+
+__all__ = [
+    "Project",
+    "add_calibrations",
+    "apply_variant",
+    "display_path",
+    "expand_document",
+    "lineage",
+    "parse_document",
+    "read_document",
+]
+
+OVERLAY_KEYS = ("effects", "calibrations")
+"""What a layer asks for beside its body: effects first, then calibrations."""
+MAX_OVERLAYS = 20
+"""Most variants laid over each other."""
+
+
+def expand_document(
+    document: Document, project: Project, problems: Problems | None = None
+) -> Document:
+    """Return a variant laid over its base, as a document of the base's kind.
+
+    Warnings are left in `problems`. Raises SpecError.
+    """
+    problems = problems or Problems()
+    *variants, base = _extension_chain(document, project)
+    made = _apply_effects_and_calibrations(base, base, project, problems)
+    for variant in reversed(variants):
+        made = _apply_variant_body(made, variant, project, problems)
+    return made
+
+
+def apply_variant(
+    base: Document, variant: Document, project: Project, problems: Problems
+) -> Document:
+    """Return `base` with the variant `variant` laid over it, under the name of the base.
+
+    The variant must extend the base or something that the base was made from.
+    """
+    assert variant.kind == "variant"
+    wanted = _base_name_of(variant)
+    if wanted.text not in lineage(base, project):
+        label = f"variant `{variant.name}` extends `{wanted.text}`, not `{base.name}`"
+        problems.error("variant", wanted.span, label)
+    problems.raise_if_errors()
+    made = _apply_variant_body(expand_document(base, project, problems), variant, project, problems)
+    head = Entry(made.kind, base.name_span, ScalarNode(base.name, base.name_span))
+    root = MappingNode({**made.root.entries, made.kind: head}, made.root.span)
+    return Document(made.kind, base.name, base.name_span, root, variant.source)
+
+
+def lineage(document: Document, project: Project) -> list[str]:
+    """Return the names of a document and of everything that it extends."""
+    return [layer.name for layer in _extension_chain(document, project)]
+
+
+def _extension_chain(document: Document, project: Project) -> list[Document]:
+    """Return a document and all that it extends, the base last. Raises SpecError for a circle."""
+    chain = [document]
+    while chain[-1].kind == "variant":
+        extends = _base_name_of(chain[-1])
+        base = project.read(project.path_of(extends.text, extends.span))
+        chain.append(base)
+        names = [layer.name for layer in chain]
+        problems = Problems()
+        if base.name in names[:-1]:
+            circle = " -> ".join(f"`{name}`" for name in names[names.index(base.name) :])
+            label = f"`{base.name}` extends itself: {circle}"
+            problems.error("variant", extends.span, label, "one of them extends a base")
+        elif len(chain) > MAX_OVERLAYS:
+            label = f"more than {MAX_OVERLAYS} layers lie over each other"
+            problems.error("variant", extends.span, label)
+        problems.raise_if_errors()
+    return chain
+
+
+def _apply_variant_body(
+    base: Document, variant: Document, project: Project, problems: Problems
+) -> Document:
+    """Return a variant with its effects laid over its expanded base, with the variant's name."""
+    body = without_keys(variant.root, "language", "variant", "extends", *OVERLAY_KEYS)
+    root = apply_overlay(base.root, body, problems)
+    problems.raise_if_errors()
+    name = ScalarNode(variant.name, variant.name_span)
+    named = {**root.entries, base.kind: Entry(base.kind, variant.name_span, name)}
+    tree = MappingNode(named, variant.root.span)
+    made = Document(base.kind, variant.name, variant.name_span, tree, variant.source)
+    return _apply_effects_and_calibrations(made, variant, project, problems)
+
+
+def add_calibrations(document: Document, names: Sequence[str], option: str) -> Document:
+    """Return a document that is calibrated further, as an option of a command asks for it."""
+    node = document.root.get("calibrations")
+    own = node.nodes if isinstance(node, SequenceNode) else ()
+    span = Span(Source(option, (" ".join(names),)), 1, 1)
+    more = tuple(ScalarNode(name, span) for name in names)
+    if not more:
+        return document
+    entry = Entry("calibrations", span, SequenceNode((*own, *more), span))
+    root = MappingNode({**document.root.entries, "calibrations": entry}, document.root.span)
+    return dataclasses.replace(document, root=root)
+
+
+def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]:
+    """Return the parameters of an automaton's tree, those of its model too."""
+    result: dict[str, MappingNode] = {}
+    model = tree.get("model")
+    if isinstance(model, ScalarNode):
+        base = expand_document(project.read(project.path_of(model.text, model.span)), project)
+        result = parameters_of(without_keys(base.root, "model"), project)
+    for entry in entries(tree.get("parameters")):
+        if isinstance(entry.node, MappingNode):
+            result[entry.key] = entry.node
+    return result
+
+
+def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tuple[str, str]]:
+    """Return instance and parameter of the instances in an automaton's tree, by `k1_t_close`."""
+    result: dict[str, tuple[str, str]] = {}
+    for entry in entries(tree.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
+        if isinstance(of, ScalarNode):
+            root = expand_document(project.read(project.path_of(of.text, of.span)), project).root
+            names = parameters_of(root, project)
+            result.update({f"{entry.key}_{name}": (entry.key, name) for name in names})
+    return result
+
+
+def _apply_effects_and_calibrations(
+    merged: Document, layer: Document, project: Project, problems: Problems
+) -> Document:
+    """Return a document with the effects, then the calibrations, of one of its layers."""
+    merged = _apply_effects(merged, layer, project, problems)
+    node = layer.root.get("calibrations")
+    if node is None:
+        return merged
+    root = without_keys(merged.root, "calibrations")
+    names = Reader(problems).read_list(node, "calibrations")
+    for name in names:
+        document = project.read(project.path_of(name.text, name.span))
+        calibration = read_calibration(document, problems)
+        known = [*lineage(layer, project), merged.name, *_model_names(root, project)]
+        if merged.kind == "automaton" and calibration.of.text in known:
+            own, inner = parameters_of(root, project), instance_parameters_of(root, project)
+            root = apply_calibration(root, calibration, own, inner, problems)
+        elif merged.kind == "system":
+            root = _calibrate_system(root, calibration, known, project, problems)
+        else:
+            _report_wrong_target(calibration, merged.name, name.span, problems)
+    problems.raise_if_errors()
+    return dataclasses.replace(merged, root=root)
+
+
+def _model_names(tree: MappingNode, project: Project) -> list[str]:
+    """Return the names of the model of a sampled automaton's tree and of what that extends."""
+    model = tree.get("model")
+    if not isinstance(model, ScalarNode):
+        return []
+    return lineage(project.read(project.path_of(model.text, model.span)), project)
+
+
+def _calibrate_system(
+    root: MappingNode,
+    calibration: Calibration,
+    names: list[str],
+    project: Project,
+    problems: Problems,
+) -> MappingNode:
+    """Give the values to the instances of what the calibration is of; or by `instance.name`."""
+    found: dict[str, tuple[str, str]] = {}
+    is_applicable = calibration.of.text in names
+    for entry in entries(root.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
+        if not isinstance(of, ScalarNode):
+            continue
+        document = project.read(project.path_of(of.text, of.span))
+        mine = calibration.of.text in lineage(document, project)
+        is_applicable = is_applicable or mine
+        tree = expand_document(document, project).root
+        for name in (*parameters_of(tree, project), *instance_parameters_of(tree, project)):
+            found[name if mine else f"{entry.key}.{name}"] = (entry.key, name)
+            if mine and name in calibration.values:
+                root = set_instance_value(root, (entry.key, name), calibration.values[name].value)
+    if not is_applicable:
+        _report_wrong_target(calibration, names[0], calibration.of.span, problems)
+        return root
+    for key, given in calibration.values.items():
+        if key not in found:
+            report_unknown_parameter(calibration, given, found, problems)
+        elif "." in key:
+            root = set_instance_value(root, found[key], given.value)
+    return root
+
+
+def _report_wrong_target(
+    calibration: Calibration, name: str, span: Span, problems: Problems
+) -> None:
+    label = f"calibration `{calibration.name}` is of `{calibration.of.text}`, not of `{name}`"
+    problems.error("values", span, label)
+
+
+def _apply_effects(
+    merged: Document, layer: Document, project: Project, problems: Problems
+) -> Document:
+    """Return a document with the effects of one of its layers laid in their order."""
+    node = layer.root.get("effects")
+    if node is None:
+        return merged
+    if merged.kind != "automaton" or not isinstance(node, MappingNode):
+        label = f"`effects` are laid over an automaton; `{merged.name}` is a {merged.kind}"
+        if not isinstance(node, MappingNode):
+            label = "`effects` is a mapping"
+        problems.error("form", layer.root.entries["effects"].span, label)
+        problems.raise_if_errors()
+    root = without_keys(merged.root, "effects")
+    for entry in entries(node):
+        found = Problems()
+        with found.collect_errors():
+            root = apply_effect(
+                root, read_effect_application(entry, project.read_effect_document, found), found
+            )
+        problems.reported.extend(found.reported)
+    problems.raise_if_errors()
+    return dataclasses.replace(merged, root=root)
+
+
+def _base_name_of(document: Document) -> ScalarNode:
+    node = document.root.get("extends")
+    if isinstance(node, ScalarNode):
+        return node
+    problems = Problems()
+    problems.error("form", document.name_span, "a variant says what it `extends`")
+    raise SpecError(problems.reported)

@@ -1,0 +1,139 @@
+"""Written: a value in SI as the shortest text of the language that has the same bits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from decimal import Context, Decimal
+from fractions import Fraction
+
+from language.expressions.number_literal import MAX_EXPONENT
+from language.expressions.units import Unit
+from language.ir.number_type import NumberType, round_to_type
+from language.model.declaration import Parameter, Range
+from language.text.diagnostic import Span
+from language.text.document import Entry, MappingNode, ScalarNode
+from language.typecheck.lookup_table import Axis
+
+MAX_DIGITS = 60
+"""Most digits that are tried; a unit with an offset may need many near its zero."""
+PLAIN_EXPONENTS = range(-5, 16)
+"""Decimal exponents of values that are written without one."""
+
+
+def format_value_in_unit(parameter: Parameter, value: float, number_type: NumberType) -> str:
+    """Return a value [SI] of a number type as a literal in the unit of a parameter.
+
+    Where no literal in that unit is near enough it is in SI. Read again it is the same value.
+    """
+    if parameter.type == "bool":
+        return "true" if value else "false"
+    if parameter.type == "enum":
+        return parameter.values[int(value)]
+    if parameter.type == "int":
+        return str(int(value))
+    found, unit = _shortest_in_any_unit(parameter, value, number_type)
+    return _format_decimal(found) if unit.text == "1" else f"{_format_decimal(found)} {unit.text}"
+
+
+def table_points(
+    parameter: Parameter, values: Sequence[float], number_type: NumberType, span: Span
+) -> MappingNode:
+    """Return values [SI] of a table as `{points: {...}}`, in the order that a page has them.
+
+    The last axis varies fastest. Values are as `value_in_unit` writes them, points as the spec.
+    """
+    assert parameter.table
+    texts = iter([format_value_in_unit(parameter, value, number_type) for value in values])
+
+    def rows(axes: Sequence[Axis]) -> MappingNode:
+        axis, *inner = axes
+        found = {}
+        for key in axis.point_texts:
+            node = rows(inner) if inner else ScalarNode(next(texts), span)
+            found[key] = Entry(key, span, node)
+        return MappingNode(found, span)
+
+    return MappingNode({"points": Entry("points", span, rows(parameter.table.axes))}, span)
+
+
+def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
+    """Tell whether the exact value of a real is that of the literal which it would be written as.
+
+    Another one has more digits than its type: `0.06000000001` in float32.
+    """
+    assert parameter.value is not None
+    found, unit = _shortest_in_any_unit(
+        parameter, round_to_type(parameter.value, number_type), number_type
+    )
+    return Fraction(found) * unit.factor + unit.offset == parameter.value
+
+
+def format_calibration(
+    name: str, of: str, origin: str, date: str, values: Mapping[str, str]
+) -> str:
+    """Return a calibration file; `values` are literals by parameter, empty texts are left out."""
+    lines = ["language: 1", f"calibration: {name}", f"of: {of}"]
+    lines += [f"from: {json.dumps(origin, ensure_ascii=False)}"] if origin else []
+    lines += [f"date: {date}"] if date else []
+    lines += ["parameters:"] if values else ["parameters: {}"]
+    lines += [f"  {parameter}: {text}" for parameter, text in values.items()]
+    return "\n".join(lines) + "\n"
+
+
+def format_exact(number: Fraction) -> str:
+    """Return a number that has a finite decimal of `MOST_DIGITS` as the language writes it."""
+    return _format_decimal(_round_to_digits(number, MAX_DIGITS))
+
+
+def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
+    """Return a value [SI] exactly, in a unit, or in SI where it has no decimal there."""
+    number = (value - unit.offset) / unit.factor
+    if Fraction(_round_to_digits(number, MAX_DIGITS)) == number:
+        return f"{format_exact(number)} {unit.text}"
+    return f"{format_exact(value)} {unit.dimension}"
+
+
+def _shortest_in_any_unit(
+    parameter: Parameter, value: float, number_type: NumberType
+) -> tuple[Decimal, Unit]:
+    """Return the shortest decimal of a value, and the unit that it is in."""
+    own, limits = parameter.unit, parameter.range
+    for unit in (own, Unit(str(own.dimension), Fraction(1), own.dimension)):
+        found = _shortest_decimal(value, unit, number_type, limits)
+        if found is not None:
+            return found, unit
+    raise ValueError(f"{value!r} of `{parameter.name}` has no literal in {own.text}")
+
+
+def _shortest_decimal(
+    value: float, unit: Unit, number_type: NumberType, limits: Range | None
+) -> Decimal | None:
+    """Return the decimal with fewest digits that is the value again, inside of the limits."""
+    target = Fraction(value)
+    if limits:
+        target = min(max(target, limits[0]), limits[1])
+    exact = (target - unit.offset) / unit.factor
+    for digits in range(1, MAX_DIGITS):
+        found = _round_to_digits(exact, digits)
+        again = Fraction(found) * unit.factor + unit.offset
+        is_inside = limits is None or limits[0] <= again <= limits[1]
+        if is_inside and round_to_type(again, number_type) == value:
+            return found if abs(found.adjusted()) < MAX_EXPONENT else None
+    return None
+
+
+def _round_to_digits(exact: Fraction, digits: int) -> Decimal:
+    """Return a number rounded to so many significant digits."""
+    context = Context(prec=digits)
+    return context.divide(Decimal(exact.numerator), Decimal(exact.denominator)).normalize(context)
+
+
+def _format_decimal(number: Decimal) -> str:
+    """Return a decimal as the language writes it: `0.05`, `1.0e-7`."""
+    exponent = number.adjusted() if number else 0
+    if exponent in PLAIN_EXPONENTS:
+        return f"{number:f}"
+    sign, figures, _ = number.as_tuple()
+    first, *rest = map(str, figures)
+    return f"{'-' if sign else ''}{first}.{''.join(rest) or '0'}e{exponent}"

@@ -1,0 +1,150 @@
+"""Points: other values at the points of a table, as calibrations and commands give them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from language.expressions.units import NO_UNIT
+from language.ir.number_type import round_to_type
+from language.reading.reader import Quantity, Reader
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.node_edit import put_node
+
+
+def override_points(
+    parameter: MappingNode, overrides: MappingNode, problems: Problems
+) -> MappingNode:
+    """Return a parameter with other values at some points of its table; none is new.
+
+    A point may be written in another unit than the table's, `500 ms` for `0.5 s`; where it has no
+    unit there it has none here.
+    """
+    reader = Reader(problems)
+    points = reader.read_mapping(overrides, "a table's values", ("points",)).get("points")
+    table = parameter.get("table")
+    own = table.get("points") if isinstance(table, MappingNode) else None
+    if not isinstance(own, MappingNode):
+        problems.error(
+            "form", overrides.span, "this parameter has no table", "it is a single value"
+        )
+    elif not isinstance(points, MappingNode) or not points.entries:
+        label = "the values of a table are `{points: {...}}`"
+        problems.error("form", overrides.span, label)
+    else:
+        found = _merge_points(own, points, reader)
+        return put_node(parameter, ("table", "points"), found)
+    return parameter
+
+
+def _merge_points(own: MappingNode, overrides: MappingNode, reader: Reader) -> MappingNode:
+    entries = dict(own.entries)
+    first: dict[str, Entry] = {}
+    for entry in overrides:
+        key = _find_point_key(own, entry, reader)
+        if key is None:
+            known = ", ".join(f"`{name}`" for name in own.entries)
+            label = f"the table has no point `{entry.key}`"
+            reader.problems.error(
+                "table", entry.span, label, _unknown_point_hint(entry.key, own, known)
+            )
+            continue
+        if key in first:
+            label = f"`{entry.key}` is the point `{first[key].key}` again"
+            reader.problems.error("duplicate", entry.span, label)
+        first.setdefault(key, entry)
+        entries[key] = Entry(key, entry.span, _override_value(entries[key].node, entry, reader))
+    return MappingNode(entries, own.span)
+
+
+def _override_value(own: YamlNode, entry: Entry, reader: Reader) -> YamlNode:
+    """Return what stands at a point: a value, or a row of them."""
+    if isinstance(own, MappingNode) and isinstance(entry.node, MappingNode):
+        return _merge_points(own, entry.node, reader)
+    if isinstance(own, MappingNode) or not isinstance(entry.node, ScalarNode):
+        what = "a row of values" if isinstance(own, MappingNode) else "a value"
+        reader.problems.error("form", entry.span, f"at `{entry.key}` the table has {what}")
+        return own
+    return entry.node
+
+
+def _unknown_point_hint(key: str, own: MappingNode, known: str) -> str:
+    return suggest_name(key, own.entries) or f"its points are {known}: change them in a variant"
+
+
+def _find_point_key(own: MappingNode, entry: Entry, reader: Reader) -> str | None:
+    """Return the key of the point that an entry is at."""
+    if entry.key in own.entries:
+        return entry.key
+    given = reader.read_quantity(ScalarNode(entry.key, entry.span), entry.key, entry.span, None)
+    quiet = Reader(Problems())
+    keys: Iterable[tuple[str, Quantity]] = (
+        (
+            known.key,
+            quiet.read_quantity(ScalarNode(known.key, known.span), known.key, known.span, None),
+        )
+        for known in own
+    )
+    return next((key for key, point in keys if _is_same_point(given, point)), None)
+
+
+def _is_same_point(given: Quantity, point: Quantity) -> bool:
+    (value, unit), (other, known) = given, point
+    if (unit is NO_UNIT) != (known is NO_UNIT) or unit.dimension != known.dimension:
+        return False
+    return round_to_type(value) == round_to_type(other)
+
+
+def overlay_value(old: YamlNode | None, new: YamlNode) -> YamlNode:
+    """Return what is given for a parameter over what was before: of a table point by point."""
+    before = old.get("points") if isinstance(old, MappingNode) else None
+    after = new.get("points") if isinstance(new, MappingNode) else None
+    if not (
+        isinstance(old, MappingNode)
+        and isinstance(before, MappingNode)
+        and isinstance(after, MappingNode)
+    ):
+        return new
+    return put_node(old, ("points",), _overlay_points(before, after, Reader(Problems())))
+
+
+def _overlay_points(before: MappingNode, after: MappingNode, reader: Reader) -> MappingNode:
+    entries = dict(before.entries)
+    for entry in after:
+        key = _find_point_key(before, entry, reader) or entry.key
+        old = entries[key].node if key in entries else None
+        node = entry.node
+        if isinstance(old, MappingNode) and isinstance(node, MappingNode):
+            node = _overlay_points(old, node, reader)
+        entries[key] = Entry(key, entry.span, node)
+    return MappingNode(entries, before.span)
+
+
+def override_parameter(parameter: MappingNode, value: YamlNode, problems: Problems) -> MappingNode:
+    """Return a parameter with another value, or with values at points of its table."""
+    if isinstance(value, ScalarNode) and "table" in parameter.entries:
+        label = "this parameter is a table: its values are `{points: {...}}`"
+        problems.error("form", value.span, label)
+        return parameter
+    if isinstance(value, ScalarNode):
+        return set_parameter_value(parameter, value)
+    if isinstance(value, MappingNode):
+        return override_points(parameter, value, problems)
+    problems.error(
+        "form", value.span, "a value is a number with a unit, a word, or `{points: ...}`"
+    )
+    return parameter
+
+
+def set_parameter_value(parameter: MappingNode, value: ScalarNode) -> MappingNode:
+    """Return a parameter with another value; a bare real is in the unit of the old one."""
+    entries = dict(parameter.entries)
+    old, kind = parameter.get("value"), parameter.get("type")
+    is_real = not isinstance(kind, ScalarNode) or kind.text == "real"
+    if is_real and "unit" not in entries and isinstance(old, ScalarNode):
+        _, _, unit = old.text.strip().partition(" ")
+        span = entries["value"].span
+        entries["unit"] = Entry("unit", span, ScalarNode(unit or "1", old.span))
+    key = entries["value"].span if "value" in entries else parameter.span
+    entries["value"] = Entry("value", key, value)
+    return MappingNode(entries, parameter.span)

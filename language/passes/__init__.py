@@ -1,0 +1,1 @@
+"""Passes over a Program: constant folding, common subexpressions."""

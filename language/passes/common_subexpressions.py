@@ -1,0 +1,169 @@
+"""Common: a value that a block computes twice is computed once, and has a name.
+
+Value numbering (Cocke and Schwartz 1970): equal operations on equal numbers have equal numbers; a
+variable that is written has a new one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Hashable, Mapping
+
+from language.ir.formula_name import format_formula, formula_name
+from language.ir.ops import Assign, Binary, Block, Call, Expr, Item, Op, Ref, RunBlock, Store, Value
+from language.ir.program import Program, Variable
+from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands, operands
+from language.ir.traversal import block_writes, walk_ops
+from language.lowering.expressions import is_whole
+
+CHEAP_FUNCTIONS = ("real", "whole", "abs")
+"""Operations that cost no more than a name."""
+
+
+def eliminate_common_subexpressions(program: Program) -> Program:
+    """Return a Program whose blocks compute no real twice from the same values."""
+    writes = _transitive_writes(program)
+    taken = {name.partition(".")[2].lower() for name in _all_names(program)}
+    variables: dict[str, Variable] = {}
+    blocks = {
+        name: _ValueNumbering(block, writes, taken, variables).rewrite()
+        for name, block in program.blocks.items()
+    }
+    return dataclasses.replace(
+        program, blocks=blocks, variables=(*program.variables, *variables.values())
+    )
+
+
+class _ValueNumbering:
+    """The operations of one block, in order; those inside others are left as they are."""
+
+    def __init__(
+        self,
+        block: Block,
+        writes: Mapping[str, frozenset[str]],
+        used_names: set[str],
+        variables: dict[str, Variable],
+    ) -> None:
+        self.block = block
+        self.writes = writes
+        self.used_names = used_names
+        self.variables = variables
+        self.versions: Counter[str] = Counter()
+        self.use_counts: Counter[int] = Counter()
+        self.names_by_number: dict[int, str] = {}
+        self.numbers: dict[Hashable, int] = {}
+        self.number_cache: dict[int, int] = {}
+        self.rewritten_ops: list[Op] = []
+
+    def rewrite(self) -> Block:
+        """Return the block: its values are counted, then those that are read again are named."""
+        for op in self.block:
+            if isinstance(op, Assign | Store):
+                for expr in direct_expressions(op):
+                    self._count_uses(expr)
+            self._invalidate_written(op)
+        self.versions.clear()
+        for op in self.block:
+            if isinstance(op, Assign | Store):
+                (changed,) = map_expressions((op,), self._replace_repeated)
+                self.rewritten_ops.append(changed)
+            else:
+                self.rewritten_ops.append(op)
+            self._invalidate_written(op)
+        return tuple(self.rewritten_ops)
+
+    def _invalidate_written(self, op: Op) -> None:
+        """What an operation writes, in the blocks that it runs too, is another value from here."""
+        self.number_cache.clear()
+        self.versions.update(set(block_writes((op,))))
+        for inner in walk_ops((op,)):
+            if isinstance(inner, RunBlock):
+                self.versions.update(self.writes[inner.block])
+
+    def _value_number(self, expr: Expr) -> int:
+        """Return the number of a value; that of an expression holds for one operation."""
+        if id(expr) not in self.number_cache:
+            value = self._value_key(expr)
+            self.number_cache[id(expr)] = self.numbers.setdefault(value, len(self.numbers))
+        return self.number_cache[id(expr)]
+
+    def _value_key(self, expr: Expr) -> Hashable:
+        match expr:
+            case Value(value):
+                return repr(value)
+            case Ref(name):
+                return name, self.versions[name]
+            case Item(name, index):
+                return name, self.versions[name], self._value_number(index)
+            case Binary(operator, left, right):
+                return operator, self._value_number(left), self._value_number(right)
+            case Call(function, arguments):
+                return function, tuple(self._value_number(argument) for argument in arguments)
+            case _:
+                return id(expr)
+
+    def _count_uses(self, expr: Expr) -> None:
+        if _is_worth_naming(expr):
+            key = self._value_number(expr)
+            self.use_counts[key] += 1
+            if self.use_counts[key] > 1:
+                return  # what is inside is not computed again either
+        for part in operands(expr):
+            self._count_uses(part)
+
+    def _replace_repeated(self, expr: Expr) -> Expr:
+        key = self._value_number(expr) if _is_worth_naming(expr) else None
+        if key is None or self.use_counts[key] < 2:
+            return map_operands(expr, self._replace_repeated)
+        if key not in self.names_by_number:
+            value = map_operands(expr, self._replace_repeated)
+            self.names_by_number[key] = self._choose_name(expr)
+            self.rewritten_ops.append(
+                Assign(self.names_by_number[key], value, format_formula(expr))
+            )
+        return Ref(self.names_by_number[key])
+
+    def _choose_name(self, expr: Expr) -> str:
+        """Return a new name, or that of the same formula in another block."""
+        about, base = format_formula(expr), formula_name(expr)
+        name, number = base, 1
+        while name.lower() in self.used_names:
+            known = self.variables.get(f"work.{name}")
+            if known and known.about == about and known.name not in self.names_by_number.values():
+                return known.name
+            number += 1
+            name = f"{base}_{number}"
+        self.used_names.add(name.lower())
+        self.variables[f"work.{name}"] = Variable(f"work.{name}", "real", about=about)
+        return f"work.{name}"
+
+
+def _is_worth_naming(expr: Expr) -> bool:
+    if isinstance(expr, Binary):
+        return expr.operator in "+-*/" and not is_whole(expr)
+    return isinstance(expr, Call) and expr.function not in CHEAP_FUNCTIONS
+
+
+def _all_names(program: Program) -> list[str]:
+    found = [v.name for v in program.variables] + [c.name for c in program.constants]
+    return [*found, *(f"block.{name}" for name in program.blocks)]
+
+
+def _transitive_writes(program: Program) -> dict[str, frozenset[str]]:
+    """Return what each block writes, in the blocks that it runs too."""
+    found: dict[str, frozenset[str]] = {}
+
+    def visit(name: str) -> frozenset[str]:
+        if name not in found:
+            block = program.blocks[name]
+            own = set(block_writes(block))
+            for op in walk_ops(block):
+                if isinstance(op, RunBlock):
+                    own |= visit(op.block)
+            found[name] = frozenset(own)
+        return found[name]
+
+    for name in program.blocks:
+        visit(name)
+    return found

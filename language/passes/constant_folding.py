@@ -1,0 +1,251 @@
+"""Hoist: what does not change is computed once (decision 0001). Three passes, each a Program.
+
+    parameters  what reads parameters alone becomes a constant, or is derived where one is tunable;
+                a division by such a value becomes a multiplication by its reciprocal
+    inputs      what reads inputs that are frozen during the flow is computed where they are latched
+    common      what a block computes twice is computed once (language/passes/common_subexpressions.py)
+
+Both back ends run the result, so both have its bits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from language.ir.formula_name import format_formula, formula_name
+from language.ir.number_type import NumberType
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    Op,
+    Ref,
+    Unary,
+    Value,
+)
+from language.ir.printer import format_expr
+from language.ir.program import Constant, Program, Variable
+from language.ir.rewrite_ops import map_expressions, map_operands, operands
+from language.ir.traversal import block_names, block_writes, expr_names
+from language.lowering.expressions import is_whole
+from language.numerics.evaluate import Scalar, evaluate
+from language.passes.common_subexpressions import CHEAP_FUNCTIONS, eliminate_common_subexpressions
+
+SMALLEST_NORMAL: Mapping[NumberType, float] = {"float64": 2.0**-1022, "float32": 2.0**-126}
+"""A reciprocal below it has lost digits: then division stays division."""
+EXCLUDED_BLOCKS = ("derive", "init", "start", "compare_stamps", "latch")
+"""Blocks that run once, or where what is hoisted is computed."""
+CONSTANT_PREFIX = "constant."
+TUNABLE_PREFIXES = ("calibration.", "derived.")
+LATCHED_PREFIX = "before."
+LATCH_BLOCK = "latch"
+
+
+def run_passes(program: Program) -> Program:
+    """Return a Program that computes what does not change once."""
+    for run in PASSES.values():
+        program = run(program)
+    return program
+
+
+def hoist_inputs(program: Program) -> Program:
+    """Return a continuous Program that computes with its inputs where they are latched.
+
+    Nothing tunable is in it: a page turns between two latches.
+    """
+    if program.period is not None:
+        return program
+    latched = set(block_writes(program.blocks[LATCH_BLOCK]))
+    found = _HoistedValues(program)
+
+    def is_latched(name: str) -> bool | None:
+        return name in latched or (None if name.startswith(CONSTANT_PREFIX) else False)
+
+    def change(expr: Expr) -> Expr:
+        return found.ref_to(LATCHED_PREFIX, expr)
+
+    blocks = _replace_hoistable(program, is_latched, change)
+    ops = [Assign(name, expr, format_formula(expr)) for name, expr in found.expressions.items()]
+    looks, once = _recompute_if_changed(program, ops)
+    blocks[LATCH_BLOCK] = (*looks, *blocks[LATCH_BLOCK], *once)
+    variables = [Variable(op.target, "real", about=op.key) for op in ops]
+    variables += [Variable(op.target, "truth") for op in looks]
+    return _replace(program, blocks=blocks, variables=(*program.variables, *variables))
+
+
+def _recompute_if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list[Op]]:
+    """Return what looks whether inputs changed, before they are latched, and what follows from it.
+
+    A function of inputs is computed anew if one of them is another number than before.
+    """
+    whole = {
+        v.name: v.type == "whole" for v in program.variables if v.name.startswith(LATCHED_PREFIX)
+    }
+    looks: dict[str, Assign] = {}
+    found: list[Op] = []
+    for op in ops:
+        read = dict.fromkeys(expr_names(op.value))
+        if not any(name.startswith("call ") and name[5:] not in CHEAP_FUNCTIONS for name in read):
+            found.append(op)
+            continue
+        is_due: Expr = Unary("not", Ref("memory.started"))
+        for before in (name for name in read if name in whole):
+            name = before.removeprefix(LATCHED_PREFIX)
+            now = Ref(f"input.{name}", whole[before])
+            is_other = Compare("!=", now, Ref(before, whole[before]))
+            looks[name] = Assign(f"work.changed_{name}", is_other)
+            is_due = Binary("or", is_due, Ref(f"work.changed_{name}"))
+        found.append(Branch(is_due, (op,)))
+    return list(looks.values()), found
+
+
+def fold_parameters(program: Program) -> Program:
+    """Return a Program in which what follows from parameters is a constant or derived."""
+    number = program.number_type
+    values: dict[str, Scalar] = {c.name: c.value for c in program.constants if not c.items}
+    real = {c.name for c in program.constants if c.type == "real" and not c.items}
+    found = _HoistedValues(program)
+
+    def is_parameter(name: str) -> bool | None:
+        return name in real and name.startswith((CONSTANT_PREFIX, *TUNABLE_PREFIXES))
+
+    def change(expr: Expr) -> Expr:
+        value = float(evaluate(expr, values, number))
+        if not math.isfinite(value):
+            return expr
+        is_fixed = all(name.startswith((CONSTANT_PREFIX, "call ")) for name in expr_names(expr))
+        ref = found.ref_to(CONSTANT_PREFIX if is_fixed else "derived.", expr)
+        values[ref.name] = value
+        return ref
+
+    def reciprocal(divisor: Expr) -> Expr | None:
+        inverse = Binary("/", Value(1.0), divisor)
+        size = abs(float(evaluate(inverse, values, number)))
+        is_normal = SMALLEST_NORMAL[number] <= size < math.inf
+        return change(inverse) if is_normal else None
+
+    blocks = _replace_hoistable(program, is_parameter, change, reciprocal)
+    constants, derived = [], []
+    for name, expr in found.expressions.items():
+        is_fixed, text = name.startswith(CONSTANT_PREFIX), format_formula(expr)
+        kind: Literal["fixed", "derived"] = "fixed" if is_fixed else "derived"
+        constants.append(Constant(name, kind, float(values[name]), unit="", about=text))
+        if not is_fixed:
+            derived.append(Assign(name, expr, text))
+    if derived:
+        blocks["derive"] = (*blocks.get("derive", ()), *derived)
+    return _replace(program, blocks=blocks, constants=(*program.constants, *constants))
+
+
+def eliminate_redundancy(program: Program) -> Program:
+    """Return a Program whose blocks compute nothing twice, without constants that nothing reads."""
+    return _remove_unused_constants(eliminate_common_subexpressions(program))
+
+
+def _remove_unused_constants(program: Program) -> Program:
+    """Leave out the fixed parameters that are read no more: the comment of a value has them."""
+    used = {name for block in program.blocks.values() for name in block_names(block)}
+    kept = tuple(
+        c for c in program.constants if c.name in used or not c.name.startswith(CONSTANT_PREFIX)
+    )
+    return _replace(program, constants=kept)
+
+
+class _HoistedValues:
+    """What was hoisted: the expression of each new name."""
+
+    def __init__(self, program: Program) -> None:
+        names = [v.name for v in program.variables] + [c.name for c in program.constants]
+        names += [f"block.{name}" for name in program.blocks]
+        self._used_names = {name.partition(".")[2].lower() for name in names}
+        self._names: dict[str, str] = {}
+        self.expressions: dict[str, Expr] = {}
+
+    def ref_to(self, group: str, expr: Expr) -> Ref:
+        """Return what reads the value of an expression, by a name that no other has."""
+        text = format_expr(expr)
+        if text not in self._names:
+            base = formula_name(expr)
+            name, number = base, 1
+            while name.lower() in self._used_names:
+                number += 1
+                name = f"{base}_{number}"
+            self._used_names.add(name.lower())
+            self._names[text] = group + name
+            self.expressions[group + name] = expr
+        return Ref(self._names[text])
+
+
+def _replace_hoistable(
+    program: Program,
+    is_hoistable_name: Callable[[str], bool | None],
+    hoist: Callable[[Expr], Expr],
+    reciprocal: Callable[[Expr], Expr | None] = lambda divisor: None,
+) -> dict[str, Block]:
+    """Return the blocks of a Program with the largest hoistable expressions changed.
+
+    `is_hoistable_name` tells of a name whether a value that reads it can be hoisted, None if that alone is no
+    reason to; `reciprocal` gives the inverse of a divisor that can be.
+    """
+
+    def visit(expr: Expr) -> tuple[Expr, bool | None]:
+        """Return an expression with its parts changed, and whether it can be hoisted itself."""
+        match expr:
+            case Value():
+                return expr, None
+            case Ref(name):
+                return expr, is_hoistable_name(name)
+            case Unary("-") | Binary() | Call():
+                inner = [visit(part) for part in operands(expr)]
+                kinds = [kind for _, kind in inner]
+                if False not in kinds:
+                    return expr, True if True in kinds else None
+                return _with_changed(expr, inner), False
+            case _:
+                return map_operands(expr, lambda part: settled(*visit(part))), False
+
+    def settled(expr: Expr, kind: bool | None) -> Expr:
+        return hoist(expr) if kind and _is_real_operation(expr) else expr
+
+    def _with_changed(expr: Expr, inner: list[tuple[Expr, bool | None]]) -> Expr:
+        if isinstance(expr, Binary) and expr.operator == "/" and inner[1][1]:
+            inverse = reciprocal(inner[1][0])
+            if inverse is not None:
+                return Binary("*", settled(*inner[0]), inverse)
+        pending = iter(inner)
+        return map_operands(expr, lambda _: settled(*next(pending)))
+
+    return {
+        name: block
+        if name in EXCLUDED_BLOCKS
+        else map_expressions(block, lambda e: settled(*visit(e)))
+        for name, block in program.blocks.items()
+    }
+
+
+def _is_real_operation(expr: Expr) -> bool:
+    """Tell whether an expression computes a real: more than a sign."""
+    if isinstance(expr, Unary):
+        return expr.operator == "-" and _is_real_operation(expr.operand)
+    if isinstance(expr, Binary):
+        return expr.operator in "+-*/" and not is_whole(expr)
+    return isinstance(expr, Call) and expr.function != "whole"
+
+
+def _replace(program: Program, **changes: object) -> Program:
+    return dataclasses.replace(program, **changes)  # type: ignore[arg-type]
+
+
+PASSES: Mapping[str, Callable[[Program], Program]] = {
+    "parameters": fold_parameters,
+    "inputs": hoist_inputs,
+    "program": eliminate_redundancy,
+}
+"""The passes in their order, as `modewright explain --pass` names them."""

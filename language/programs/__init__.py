@@ -1,0 +1,1 @@
+"""Assembly of whole Programs: sampled and continuous automata, systems."""

@@ -1,0 +1,287 @@
+"""Continuous: a continuous automaton as a Program that an engine moves from event to event.
+
+Entries: `step` is one major step (language/programs/major_step.py) and what the C has, after `init`. An engine
+runs its parts: `start` (start values from the inputs), `equations` (the values of now), `watch`
+(what each guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none),
+`flow` (states over `work.h`, up to the first change of a guard, after `work.elapsed`); and `dense`,
+`peek`: with the states as they were at its start, what they were `work.s` after it, on the method's
+own polynomial (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
+
+The inputs that hold are `before.u`: `latch` takes those of now, at the end of a step.
+An input that varies inside a step is `before.u + s (work.rise_u + s work.bend_u)` at the time s of
+the step: a parabola through its values at the ends and the middle, the times of RK4's stages.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping
+
+from language.integration.crossing_location import (
+    FLOW_BISECTIONS,
+    IntegrationMethod,
+    continuous_step_blocks,
+    continuous_step_variables,
+)
+from language.integration.method_selection import build_method
+from language.integration.vector_field import (
+    VectorField,
+    field_blocks,
+    field_variables,
+    lower_single_region_step,
+)
+from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
+from language.ir.program import Program, StabilityLimit, TransitionInfo, Variable, fired_variable
+from language.lowering.action_stages import discrete_variables
+from language.lowering.constants import constant_values, parameter_constants
+from language.lowering.continuous_delay import (
+    RECORD_AGE,
+    ContinuousDelay,
+    alarm_bindings,
+    alarms_of,
+    continuous_delay_variables,
+    continuous_delays_of,
+    delayed_value_bindings,
+)
+from language.lowering.continuous_edges import edge_bindings, level_variables, reset_levels
+from language.lowering.expressions import NameBindings, lower_equations, variable_bindings
+from language.lowering.guard_slots import mode_bindings
+from language.lowering.invariants import INVARIANTS, invariant_blocks, invariant_variables
+from language.lowering.linearisation import LinearisationPoint
+from language.lowering.parameter_bindings import constant_bindings
+from language.lowering.program_builder import (
+    assemble_program,
+    finalise_program,
+    input_variables,
+    region_variables,
+    state_variables,
+)
+from language.lowering.transition_infos import infos_of_mode, transition_infos
+from language.model.automaton import Automaton, Mode, Transition
+from language.programs.engine_blocks import engine_blocks
+from language.programs.major_step import (
+    LIVELOCK,
+    STEP_INTERFACE,
+    ZENO,
+    WaitTimers,
+    begin_blocks,
+    block_of_mode,
+    end_blocks,
+    is_wait_over,
+    major_step_block,
+    major_step_blocks,
+    major_step_variables,
+    wait_timers_of,
+)
+from language.programs.parallel_regions import (
+    TransitionSelection,
+    lower_parallel_step,
+    parallel_blocks,
+)
+from language.text.diagnostic import Problems
+
+ENTRY_BLOCKS = ("init", "derive", "step")
+ENGINE_BLOCKS = (
+    "latch",
+    "start",
+    "equations",
+    "watch",
+    "jump",
+    "limit",
+    "flow",
+    "elapse",
+    "dense",
+    "peek",
+    "record",
+    INVARIANTS,
+)
+"""What an engine runs one by one; of a Program with inputs that vary there is no `step`."""
+
+
+def lower_continuous_automaton(
+    automaton: Automaton, problems: Problems, varying_inputs: Collection[str] = ()
+) -> Program:
+    """Return the Program of a checked continuous automaton. Raises SpecError.
+
+    `varying_inputs` names the inputs that change inside a step.
+    """
+    parameters = parameter_constants(automaton, problems)
+    transitions = transition_infos(automaton, problems)
+    histories, alarms = continuous_delays_of(automaton), alarms_of(automaton)
+    known = _base_bindings(automaton, histories)
+    field = _vector_field(automaton, known, varying_inputs, bool(histories))
+    flows = field_blocks(field)
+    point = LinearisationPoint(automaton, constant_values(parameters), {})
+    method, info = build_method(
+        automaton.method, field, flows, point, automaton.step, automaton.span, problems
+    )
+    waits = wait_timers_of(transitions, alarms)
+    blocks = {
+        **flows,
+        **_continuous_step(field, method, flows),
+        **major_step_blocks(field, waits, (RECORD_AGE.name,) if histories else ()),
+        **_mode_blocks(field, known, transitions, _selection(automaton, transitions, waits)),
+        **invariant_blocks(automaton, known),
+        **engine_blocks(field, known, waits, histories),
+    }
+    blocks["step"] = major_step_block(field, bool(histories), blocks)
+    problems.raise_if_errors()
+    variables = [*_variables(automaton, field), *major_step_variables(field, waits)]
+    variables += continuous_step_variables(field, method)
+    variables += [Variable(name, "real") for name in _parabola_variables(varying_inputs)]
+    variables += continuous_delay_variables(histories)
+    variables += [Variable(alarm.variable, "truth") for alarm in alarms]
+    constants = (*parameters.values(), *method.constants)
+    program = assemble_program(automaton, blocks, constants, variables, transitions)
+    program = dataclasses.replace(program, integration=info, faults=(ZENO, LIVELOCK))
+    entries = (*(ENTRY_BLOCKS if not varying_inputs else ENTRY_BLOCKS[:2]), *ENGINE_BLOCKS)
+    return finalise_program(
+        program, entries, keep=(*STEP_INTERFACE, *_parabola_variables(varying_inputs))
+    )
+
+
+def stable_step_limits(automaton: Automaton) -> tuple[StabilityLimit, ...]:
+    """Return the largest stable step of each mode that has one, whatever the step is."""
+    problems = Problems()
+    histories = continuous_delays_of(automaton)
+    field = _vector_field(automaton, _base_bindings(automaton, histories), (), bool(histories))
+    point = LinearisationPoint(
+        automaton, constant_values(parameter_constants(automaton, problems)), {}
+    )
+    place = (automaton.step, automaton.span, problems)
+    return build_method(automaton.method, field, field_blocks(field), point, *place)[
+        1
+    ].stability_limits
+
+
+def _base_bindings(automaton: Automaton, delays: tuple[ContinuousDelay, ...]) -> NameBindings:
+    return {
+        **constant_bindings(automaton),
+        **variable_bindings(automaton, "before"),
+        **mode_bindings(automaton, "memory.mode"),
+        **delayed_value_bindings(automaton, delays),
+    }
+
+
+def _vector_field(
+    automaton: Automaton, known: NameBindings, varying_inputs: Collection[str], has_history: bool
+) -> VectorField:
+    held = {name: known[name] for name in automaton.inputs}
+    return VectorField(
+        automaton,
+        known,
+        {**held, **{name: _input_parabola(name) for name in varying_inputs}},
+        "memory.mode",
+        f"{automaton.name} ",
+        bool(varying_inputs or has_history),
+        _guard_memory(automaton),
+    )
+
+
+def _continuous_step(
+    field: VectorField, method: IntegrationMethod, flows: Mapping[str, Block]
+) -> dict[str, Block]:
+    """The flow of each mode up to the first change of a guard, by the method's steps."""
+    armed = {slot: f"memory.armed_{slot}" for slot in field.guard_slots}
+    halvings = FLOW_BISECTIONS[field.automaton.numbers]
+    merge, is_wait = Ref("work.merge"), Ref("work.is_wait")
+    moves = continuous_step_blocks(
+        field, method, flows, merge, halvings, lambda mode: armed, is_wait
+    )
+    return {**method.blocks, **moves}
+
+
+def _mode_blocks(
+    field: VectorField,
+    known: NameBindings,
+    infos: tuple[TransitionInfo, ...],
+    selection: TransitionSelection,
+) -> dict[str, Block]:
+    """What each mode evaluates, and where it goes."""
+    blocks: dict[str, Block] = {}
+    for mode in field.automaton.modes.values():
+        ops = lower_equations(mode, dict(known), "equation.", field.key_prefix)
+        blocks[f"equations_{mode.name}"] = tuple(ops)
+        blocks[f"jump_{mode.name}"] = _jump_block(field, mode, infos, selection)
+    if field.automaton.regions:
+        blocks.update(parallel_blocks(field, selection))
+    return blocks
+
+
+def _input_parabola(name: str) -> Expr:
+    s, bend = Ref("work.s"), Ref(f"work.bend_{name}")
+    inner = add(Ref(f"work.rise_{name}"), multiply(s, bend))
+    return add(Ref(f"before.{name}"), multiply(s, inner))
+
+
+def _parabola_variables(varying_inputs: Collection[str]) -> list[str]:
+    return [f"work.{part}_{name}" for name in varying_inputs for part in ("rise", "bend")]
+
+
+def _variables(automaton: Automaton, field: VectorField) -> list[Variable]:
+    return [
+        *input_variables(automaton, "input"),
+        *state_variables(automaton),
+        *input_variables(automaton, "before"),
+        *region_variables(automaton, "micro-step"),
+        *(Variable(f"memory.armed_{slot}", "truth") for slot in field.guard_slots),
+        *discrete_variables(automaton),
+        *invariant_variables(automaton),
+        *field_variables(field),
+        *level_variables(automaton),
+        Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
+    ]
+
+
+def _selection(
+    automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: WaitTimers
+) -> TransitionSelection:
+    by_key = {info.key: info for info in infos}
+    begins, ends = begin_blocks(waits), end_blocks(waits)
+
+    def info_of(transition: Transition) -> TransitionInfo:
+        return by_key[f"{automaton.name} {transition.key}"]
+
+    def enabled(transition: Transition, slot: str) -> Expr:
+        guard, info = Ref(f"work.guard_{slot}"), info_of(transition)
+        return Binary("and", guard, is_wait_over(info)) if info.timer else guard
+
+    return TransitionSelection(
+        block_prefix="jump",
+        selected_variable=fired_variable,
+        number_of=lambda transition: info_of(transition).number,
+        enabled_condition=enabled,
+        after_switch=lambda t: (
+            *block_of_mode(ends, automaton.source_mode(t)),
+            *reset_levels(automaton, automaton.source_mode(t)),
+            *block_of_mode(begins, automaton.target_mode(t)),
+        ),
+    )
+
+
+def _jump_block(
+    field: VectorField,
+    mode: Mode,
+    infos: tuple[TransitionInfo, ...],
+    selection: TransitionSelection,
+) -> Block:
+    guards = RunBlock(f"guards_{mode.name}")
+    if mode.parallel_regions:
+        return (guards, *lower_parallel_step(field, mode, selection))
+    enabled: dict[int, Expr] = {}
+    fired: dict[int, Block] = {}
+    for k, (transition, info) in enumerate(
+        zip(mode.transitions, infos_of_mode(field.automaton, mode, infos), strict=True)
+    ):
+        enabled[k] = selection.enabled_condition(transition, info.slot)
+        fired[k] = (
+            Assign("memory.fired", integer(info.number), info.key),
+            *selection.after_switch(transition),
+        )
+    return (guards, *lower_single_region_step(field, mode, enabled, fired))
+
+
+def _guard_memory(automaton: Automaton) -> dict[str, NameBindings]:
+    """Return, by the key of a mode, what `after` and edges in its guards are."""
+    alarms, edges = alarm_bindings(automaton), edge_bindings(automaton)
+    return {mode.key: {**alarms[mode.key], **edges[mode.key]} for mode in automaton.all_modes}

@@ -1,0 +1,295 @@
+"""Stepping: a continuous automaton over one major step, from event to event (rules 1, 4, 7-12).
+
+`step` is what X_Step is in C: the flow of the step under the inputs of the step before, then the
+inputs of now (`latch`) and what they make jump. An engine runs the same blocks one by one, so that
+it sees each event, and has the same bits:
+
+    limit   the next segment: `work.h` is the rest of the step, or less where a wait ends before
+    flow    (continuous.py) over `work.h`, or up to the first change of a guard
+    elapse  time passes: `work.left` and the waits become shorter; `work.event` if something is due
+    settle  micro-steps until no transition is enabled
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from language.integration.crossing_location import merge_time
+from language.integration.vector_field import VectorField, run_block_by_mode
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    FaultBit,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    Unary,
+    Value,
+    add,
+    multiply,
+    real,
+    subtract,
+)
+from language.ir.program import Alarm, TransitionInfo, Variable
+from language.ir.traversal import names_used, reachable_blocks
+from language.lowering.expressions import WHOLE_TYPES
+from language.lowering.program_builder import any_fired_condition, clear_fired
+from language.model.automaton import Mode
+
+MAX_EVENTS_PER_STEP = 100
+"""More located events than this within one major step are Zeno behaviour (rule 12)."""
+ZENO = "zeno"
+LIVELOCK = "livelock"
+STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
+"""What an engine sets before these blocks and reads after them."""
+
+
+@dataclass(frozen=True)
+class WaitTimer:
+    """Something that is due a time after it began, while a mode of a region is active.
+
+    That of a transition begins when its guard turns true; `after` and `every` begin on entry.
+    """
+
+    timer: str
+    duration: Fraction
+    region: str
+    mode: int
+    is_running: Expr
+    on_end: Block
+    on_begin: Block
+    is_restarted: bool
+
+    @property
+    def restart(self) -> Assign:
+        """What puts the timer at its start."""
+        return Assign(self.timer, real(self.duration))
+
+
+WaitTimers = tuple[WaitTimer, ...]
+
+
+def wait_timers_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> WaitTimers:
+    """Return the waits of transitions, and those of `after`."""
+    found = []
+    for info in infos:
+        if info.timer:
+            armed = Ref(f"memory.armed_{info.slot}")
+            place = (info.timer, info.wait, info.region, info.source)
+            found.append(WaitTimer(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
+    for number, alarm in enumerate(alarms, start=1):
+        rings, silent = Assign(alarm.variable, Value(True)), Assign(alarm.variable, Value(False))
+        timer = f"timer.after_{number}"
+        end: Block = (rings,)
+        if alarm.repeats:
+            end = (rings, Assign(timer, add(Ref(timer), real(alarm.time))))
+        place = (timer, alarm.time, alarm.region, alarm.mode)
+        found.append(WaitTimer(*place, Unary("not", Ref(alarm.variable)), end, (silent,), False))
+    return tuple(found)
+
+
+BlocksByMode = Mapping[tuple[str, int], Block]
+"""Blocks by the region and the number of the mode."""
+
+
+def begin_blocks(waits: WaitTimers) -> BlocksByMode:
+    """Return what begins when a mode is entered; waits of transitions are at their start."""
+    found: dict[tuple[str, int], list[Op]] = {}
+    for wait in waits:
+        found.setdefault((wait.region, wait.mode), []).extend((*wait.on_begin, wait.restart))
+    return {place: tuple(ops) for place, ops in found.items()}
+
+
+def end_blocks(waits: WaitTimers) -> BlocksByMode:
+    """Return what puts the waits of a mode that is left back to their start (rule 4)."""
+    found: dict[tuple[str, int], list[Op]] = {}
+    for wait in waits:
+        if wait.is_restarted:
+            found.setdefault((wait.region, wait.mode), []).append(wait.restart)
+    return {place: tuple(ops) for place, ops in found.items()}
+
+
+def block_of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
+    """Return the block of a mode, empty where it has none."""
+    return blocks.get((mode.region, mode.number), ())
+
+
+def major_step_blocks(
+    field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]
+) -> dict[str, Block]:
+    """Return the blocks of the module's text; `age_variables` [s] are times since a major step's record."""
+    inputs = field.automaton.inputs
+    return {
+        "latch": tuple(Assign(f"before.{name}", Ref(f"input.{name}")) for name in inputs),
+        "limit": _limit_block(field, waits),
+        "elapse": _elapse_block(field, waits, age_variables),
+        "load": _for_each_wait(field, tuple(w for w in waits if w.is_restarted), _restart_if_idle),
+        "settle": _settle_block(field),
+        "segment": _segment_block(field),
+    }
+
+
+def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable]:
+    """Return the variables of these blocks."""
+    return [
+        *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),
+        Variable("memory.started", "truth", about="the first step is done"),
+        Variable("memory.time", "real", "s", about="time since the start: for tolerances only"),
+        Variable("memory.faults", "whole", about="latched fault bits"),
+        Variable("work.left", "real", "s", about="rest of the major step"),
+        Variable("work.is_wait", "truth", about="a wait ends with the segment"),
+        Variable("work.event", "truth", about="a guard changed or a wait ended"),
+        Variable("work.is_settling", "truth"),
+        Variable("work.micro_step", "whole"),
+        Variable("work.piece", "whole"),
+    ]
+
+
+def is_wait_over(info: TransitionInfo) -> Expr:
+    """Whether the wait of a transition is over."""
+    assert info.timer
+    return Compare("<=", Ref(info.timer), real(0.0))
+
+
+def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
+    h = Ref("work.h")
+
+    def shorter(wait: WaitTimer) -> Block:
+        timer = Ref(wait.timer)
+        near = Compare("<=", timer, add(h, Ref("work.merge")))
+        ends = Binary("and", wait.is_running, near)
+        nearer = Assign(h.name, Call("min", (timer, h)))
+        return (Branch(ends, (nearer, Assign("work.is_wait", Value(True)))),)
+
+    return (
+        Assign(h.name, Ref("work.left")),
+        Assign("work.merge", _merge_window(field)),
+        Assign("work.is_wait", Value(False)),
+        *_for_each_wait(field, waits, shorter),
+    )
+
+
+def _merge_window(field: VectorField) -> Expr:
+    """What is one instant (language/integration/crossing_location.py): of a float32 it is a part of the step."""
+    step, numbers = field.automaton.step, field.automaton.numbers
+    if numbers == "float32":
+        return real(merge_time(numbers, step))
+    end = add(Ref("memory.time"), Ref("work.h"))
+    per_second = real(merge_time(numbers, Fraction(1)))
+    return multiply(per_second, Call("max", (end, real(step))))
+
+
+def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]) -> Block:
+    """Time passes; what is nearer than `work.merge` is at the same instant (rule 10)."""
+    elapsed, left = Ref("work.elapsed"), Ref("work.left")
+    h, merge = Ref("work.h"), Ref("work.merge")
+    near = Binary("and", Ref("work.crossed"), Compare("<=", subtract(h, elapsed), merge))
+
+    def passes(wait: WaitTimer) -> Block:
+        timer = Ref(wait.timer)
+        over = Branch(
+            Compare("<=", timer, merge), (*wait.on_end, Assign("work.event", Value(True)))
+        )
+        return (Branch(wait.is_running, (Assign(timer.name, subtract(timer, elapsed)), over)),)
+
+    return (
+        Branch(near, (Assign("work.elapsed", h),)),
+        Assign("work.event", Ref("work.crossed")),
+        Assign(left.name, subtract(left, elapsed)),
+        Branch(Compare("<=", left, merge), (Assign(left.name, real(0.0)),)),
+        Assign("memory.time", add(Ref("memory.time"), elapsed)),
+        *(Assign(name, add(Ref(name), elapsed)) for name in age_variables),
+        *_for_each_wait(field, waits, passes),
+    )
+
+
+def _restart_if_idle(wait: WaitTimer) -> Block:
+    """A wait is at its start while its guard is false (rule 4)."""
+    return (Branch(wait.is_running, (), (wait.restart,)),)
+
+
+def _settle_block(field: VectorField) -> Block:
+    regions = field.automaton.all_regions
+    bound = sum(len(region.modes) for region in regions)
+    going = Ref("work.is_settling")
+    fired = any_fired_condition(field.automaton)
+    micro_step: Block = (Branch(going, (RunBlock("jump"), Assign(going.name, fired))),)
+    return (
+        Assign(going.name, Value(True)),
+        Loop(bound + 1, "work.micro_step", micro_step),
+        Branch(going, (FaultBit(LIVELOCK), *clear_fired(field.automaton))),
+        RunBlock("watch"),
+    )
+
+
+def _segment_block(field: VectorField) -> Block:
+    inside = Binary("and", Ref("work.event"), Compare(">", Ref("work.left"), real(0.0)))
+    return (
+        RunBlock("limit"),
+        run_block_by_mode(field, "move"),
+        RunBlock("elapse"),
+        Branch(inside, (RunBlock("settle"),)),
+    )
+
+
+def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, Block]) -> Block:
+    """Return the block of one major step; `blocks` are those that it runs."""
+    left, event = Ref("work.left"), Ref("work.event")
+    is_left = Compare(">", left, real(0.0))
+    segments = Loop(
+        MAX_EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (RunBlock("segment"),)),)
+    )
+    flow: Block = (
+        *((RunBlock("record"),) if has_record else ()),
+        Assign(left.name, real(field.automaton.step)),
+        Assign(event.name, Value(False)),
+        segments,
+        Branch(is_left, (FaultBit(ZENO),)),
+        *_detect_input_change(field, event, blocks),
+        RunBlock("latch"),
+    )
+    enter: Block = (RunBlock("latch"), RunBlock("start"), Assign(event.name, Value(True)))
+    return (
+        Branch(Ref("memory.started"), flow, enter),
+        Branch(event, (RunBlock("settle"),)),
+        RunBlock("equations"),
+    )
+
+
+def _detect_input_change(field: VectorField, event: Ref, blocks: Mapping[str, Block]) -> Block:
+    """Guards are read again if something happened at the end of the step, or if an input that is
+    read there is another one.
+    """
+    due: Expr = event
+    read = names_used(blocks[name] for name in reachable_blocks("settle", blocks))
+    for name, thing in field.automaton.inputs.items():
+        if f"before.{name}" not in read:
+            continue
+        is_whole = thing.type in WHOLE_TYPES
+        now, before = Ref(f"input.{name}", is_whole), Ref(f"before.{name}", is_whole)
+        due = Binary("or", due, Compare("!=", now, before))
+    return () if due == event else (Assign(event.name, due),)
+
+
+def _for_each_wait(
+    field: VectorField, waits: WaitTimers, block_of: Callable[[WaitTimer], Block]
+) -> tuple[Switch, ...]:
+    """Return a block for each wait of the active modes: one choice for each region that waits."""
+    found = []
+    for region in field.automaton.all_regions:
+        cases: dict[int, Block] = {}
+        for wait in waits:
+            if wait.region == region.name:
+                cases[wait.mode] = (*cases.get(wait.mode, ()), *block_of(wait))
+        if cases:
+            found.append(Switch(field.mode_variable_of(region.name), tuple(cases.items())))
+    return tuple(found)

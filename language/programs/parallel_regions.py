@@ -1,0 +1,133 @@
+"""Parallel: a micro-step of regions side by side - all choose on one snapshot, then all act.
+
+Semantics, rules 3 and 14. An automaton whose chart is its only region does without (`switch` in
+language/integration/vector_field.py): it resets and enters at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from language.integration.vector_field import (
+    VectorField,
+    all_bindings_at_point,
+    bindings_at_point,
+    set_point_to_state,
+    set_target_mode,
+)
+from language.ir.ops import Assign, Block, Branch, Expr, Op, RunBlock, Switch, integer
+from language.lowering.action_stages import lower_stage_of_regions
+from language.lowering.expressions import choose_by_mode, lower_equations, names_read
+from language.lowering.guard_slots import guard_slot
+from language.model.automaton import Mode, Transition
+from language.model.declaration import Formula
+from language.model.region_queries import transitions_by_priority
+
+
+@dataclass(frozen=True)
+class TransitionSelection:
+    """How a micro-step names what it takes: the variable of a region, and each transition's number.
+
+    `enabled` is whether a transition may fire, given the ending of its guard's variables; `moved`
+    is what else happens when it has fired.
+    """
+
+    block_prefix: str
+    selected_variable: Callable[[str], str]
+    number_of: Callable[[Transition], int]
+    enabled_condition: Callable[[Transition, str], Expr]
+    after_switch: Callable[[Transition], Block]
+
+
+def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
+    """Return `<verb>_<region>_<mode>` of the regions beside the chart, and `commit_<verb>`.
+
+    `verb` keeps those of a run apart from those of the automaton that runs.
+    """
+    blocks: dict[str, Block] = {}
+    for region in field.automaton.regions:
+        for mode in region.modes.values():
+            blocks[f"{selection.block_prefix}_{mode.label}"] = _select_transition(
+                mode, selection, field.key_prefix
+            )
+    blocks[f"commit_{selection.block_prefix}"] = _commit_block(field, selection)
+    return blocks
+
+
+def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
+    """Return one micro-step of all regions while a mode of the chart is active."""
+    regions = field.automaton.all_regions
+    ops: list[Op] = [
+        Assign(selection.selected_variable(region.name), integer(0)) for region in regions
+    ]
+    ops += _select_transition(mode, selection, field.key_prefix)
+    for region in mode.parallel_regions:
+        others = region.modes.values()
+        cases: dict[str, Block] = {
+            other.name: (RunBlock(f"{selection.block_prefix}_{other.label}"),) for other in others
+        }
+        ops.append(choose_by_mode(region, bindings_at_point(field), cases))
+    return (*ops, RunBlock(f"commit_{selection.block_prefix}"))
+
+
+def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) -> Block:
+    """The enabled transition with the smallest priority."""
+    ops: Block = ()
+    for k, transition in reversed(transitions_by_priority(mode)):
+        number = integer(selection.number_of(transition))
+        taken = Assign(selection.selected_variable(mode.region), number, prefix + transition.key)
+        ops = (
+            Branch(
+                selection.enabled_condition(transition, guard_slot(mode.region, k)), (taken,), ops
+            ),
+        )
+    return ops
+
+
+def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
+    """What the regions have chosen, stage by stage; `in(...)` is of the source up to the entry."""
+    automaton = field.automaton
+    before = _lower_stage(field, selection, lambda way: automaton.source_mode(way).exit)
+    resets = _lower_stage(field, selection, lambda way: way.reset)
+    if before and resets:
+        before = (*before, *set_point_to_state(field))
+    moved = []
+    for region in automaton.all_regions:
+        ways = [way for mode in region.modes.values() for way in mode.transitions]
+        cases = [
+            (selection.number_of(w), (set_target_mode(field, w), *selection.after_switch(w)))
+            for w in ways
+        ]
+        moved.append(Switch(selection.selected_variable(region.name), tuple(cases)))
+    after = _lower_stage(field, selection, lambda way: automaton.target_mode(way).entry)
+    if after:
+        after = (*set_point_to_state(field), *_entry_equations(field), *after)
+    return (*before, *resets, *moved, *after)
+
+
+def _lower_stage(
+    field: VectorField,
+    selection: TransitionSelection,
+    assignments_of: Callable[[Transition], Mapping[str, Formula]],
+) -> Block:
+    known, number = all_bindings_at_point(field), selection.number_of
+    return lower_stage_of_regions(
+        field.automaton, selection.selected_variable, number, assignments_of, known
+    )
+
+
+def _entry_equations(field: VectorField) -> Block:
+    """The equations that entries read, of the new modes and after the reset."""
+    automaton = field.automaton
+    entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
+    wanted = names_read(formula.tree for formula in entries)
+    cases = []
+    for mode in automaton.modes.values():
+        ops = lower_equations(mode, bindings_at_point(field), "work.at_", field.key_prefix, wanted)
+        cases.append((mode.number, tuple(ops)))
+    return (
+        (Switch(field.mode_variable_name, tuple(cases)),)
+        if any(block for _, block in cases)
+        else ()
+    )

@@ -1,0 +1,187 @@
+"""Transition: numbers, waits and timers of transitions, and the jump of a sampled automaton."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Callable, Mapping
+
+from language.ir.ops import (
+    Assign,
+    Block,
+    Branch,
+    Compare,
+    Count,
+    Expr,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    integer,
+)
+from language.ir.program import TransitionInfo, fired_variable, mode_variable
+from language.lowering.action_stages import lower_entry, lower_stage, lower_stage_of_regions
+from language.lowering.edge_detection import detect_edges, guard_memory_bindings, reset_activation
+from language.lowering.expressions import equation_bindings, lower_expression, names_read
+from language.lowering.tick_history import Rollback
+from language.lowering.transition_infos import infos_of_mode, start_run, wait_ticks
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.declaration import Formula
+from language.model.region_queries import transitions_by_priority
+from language.programs.rewind import (
+    advance_from_crossing,
+    rollback_bindings,
+    rollback_equation_bindings,
+)
+
+
+def lower_sampled_jump(
+    automaton: Automaton,
+    mode: Mode,
+    infos: tuple[TransitionInfo, ...],
+    now: Mapping[str, Expr],
+) -> Block:
+    """Return the jump of a tick: wait counters, then one transition (rules 3 and 4).
+
+    The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
+    run in parallel, it only chooses: what that does is left to `sampled_commit` (rule 14).
+    """
+    everywhere = {**now, **equation_bindings(automaton, "equation.")}
+    edges = detect_edges(automaton, mode, everywhere)
+    known = ChainMap(guard_memory_bindings(automaton, mode), everywhere)
+    own = infos_of_mode(automaton, mode, infos)
+    counters: list[Op] = []
+    chain: Block = ()
+    for k, transition in reversed(transitions_by_priority(mode)):
+        info = own[k]
+        enabled = lower_expression(transition.when.tree, known)
+        if info.timer:
+            key = f"{automaton.name} {transition.when.key}"
+            counters.insert(0, Count(info.timer, enabled, info.timer_limit, key))
+            enabled = Compare(">", Ref(info.timer), wait_ticks(info))
+        fire: list[Op] = [Assign(fired_variable(mode.region), integer(info.number), info.key)]
+        if not automaton.regions:
+            fire = _lower_transition(automaton, transition, infos, (now, known), fire)
+        chain = (Branch(enabled, tuple(fire), chain),)
+    return (*edges, *counters, *chain)
+
+
+def _lower_transition(
+    automaton: Automaton,
+    transition: Transition,
+    infos: tuple[TransitionInfo, ...],
+    bindings: tuple[Mapping[str, Expr], Mapping[str, Expr]],
+    fired_ops: list[Op],
+) -> list[Op]:
+    """Return what a transition does that nothing else fires beside; it may go back for that.
+
+    `bindings` are those of now, without equations and with them.
+    """
+    source, target = automaton.source_mode(transition), automaton.target_mode(transition)
+    now, known = bindings
+    back: list[Op] = []
+    on: Block = ()
+    if transition.rewind:
+        rewinding = Rollback(automaton, source, transition, transition.rewind)
+        now = rollback_bindings(automaton, now)
+        known = {**now, **rollback_equation_bindings(rewinding)}
+        back, on = [RunBlock(f"back_{rewinding.block_suffix}")], advance_from_crossing(rewinding)
+    return [
+        *back,
+        *_lower_exit_and_reset(automaton, source, transition, known),
+        *_switch_mode(automaton, transition, infos),
+        *fired_ops,
+        *start_run(automaton, target),
+        *lower_entry(automaton, target, target.entry, now),
+        *on,
+    ]
+
+
+def lower_sampled_commit(
+    automaton: Automaton,
+    infos: tuple[TransitionInfo, ...],
+    now: Mapping[str, Expr],
+    evaluate_equations: Op,
+) -> Block:
+    """Return what the transitions do that the regions have chosen, stage by stage (rule 6).
+
+    Each stage of all regions reads one snapshot; `evaluate_equations` evaluates the equations of the new modes.
+    """
+    numbers = {info.key: info.number for info in infos}
+
+    def number(way: Transition) -> int:
+        return numbers[f"{automaton.name} {way.key}"]
+
+    def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
+        return lower_stage_of_regions(automaton, fired_variable, number, written, known)
+
+    known = {**now, **equation_bindings(automaton, "equation.")}
+    before = stage_of(lambda way: automaton.source_mode(way).exit)
+    before = (*before, *stage_of(lambda way: way.reset))
+    moved = []
+    for region in automaton.all_regions:
+        ways = [way for mode in region.modes.values() for way in mode.transitions]
+        cases = tuple((number(way), _enter_target(automaton, way, infos)) for way in ways)
+        moved.append(Switch(fired_variable(region.name), cases))
+    after = stage_of(lambda way: automaton.target_mode(way).entry)
+    return (
+        *before,
+        *moved,
+        *((evaluate_equations,) if _do_entries_read_equations(automaton) else ()),
+        *after,
+    )
+
+
+def _enter_target(
+    automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
+) -> Block:
+    return (
+        *_switch_mode(automaton, transition, infos),
+        *start_run(automaton, automaton.target_mode(transition)),
+    )
+
+
+def _do_entries_read_equations(automaton: Automaton) -> bool:
+    named = equation_bindings(automaton, "equation.")
+    entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
+    return any(name in named for name in names_read(formula.tree for formula in entries))
+
+
+def _lower_exit_and_reset(
+    automaton: Automaton, mode: Mode, transition: Transition, known: Mapping[str, Expr]
+) -> list[Op]:
+    """Exit, then reset (rule 6), each committed before the next reads."""
+    return [
+        *lower_stage(automaton, mode.exit, known),
+        *lower_stage(automaton, transition.reset, known),
+    ]
+
+
+def _switch_mode(
+    automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
+) -> list[Op]:
+    """The counters of the source end; the target is entered.
+
+    Those of a mode that some transition enters with `memory: continue` outlive it, and end where
+    another one enters it (rule 4).
+    """
+    source, target = automaton.source_mode(transition), automaton.target_mode(transition)
+    ending = [] if _keeps_timers(automaton, source) else [*infos_of_mode(automaton, source, infos)]
+    if transition.memory == "reset" and _keeps_timers(automaton, target):
+        ending += infos_of_mode(automaton, target, infos)
+    ops: list[Op] = [Assign(info.timer, integer(0)) for info in ending if info.timer]
+    ops += reset_activation(automaton, source, target)
+    mode = mode_variable("memory.mode", transition.region)
+    ops.append(Assign(mode, integer(automaton.target_mode(transition).number)))
+    return ops
+
+
+def _keeps_timers(automaton: Automaton, mode: Mode) -> bool:
+    """Tell whether some transition enters a mode with its counters as they were."""
+    return (mode.region, mode.name) in _timer_keeping_targets(automaton)
+
+
+@cache_on_owner
+def _timer_keeping_targets(automaton: Automaton) -> frozenset[tuple[str, str]]:
+    ways = [way for mode in automaton.all_modes for way in mode.transitions]
+    return frozenset((way.region, way.target) for way in ways if way.memory == "continue")

@@ -1,0 +1,82 @@
+"""Numbers text: what was solved or bounded for a Program - its method, its limits, its gains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.integration.crossing_location import RUN_BISECTIONS
+from language.ir.operation_count import max_operations
+from language.ir.program import IntegrationInfo, ObserverInfo, Program
+
+MATRIX_COLUMNS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
+"""Matrices of an observer that are shown, and what their columns are."""
+
+
+def format_solved_numbers(program: Program) -> str:
+    """Return the method of a run or flow with K, |A h|, limits, work; matrices of observers."""
+    lines = [f"program {program.name}"]
+    if program.integration:
+        lines += format_method_lines(program.integration)
+        lines += _format_work_lines(program, program.integration)
+        lines += _format_rewind_lines(program)
+    if program.period is not None:
+        most = max_operations(program.blocks, "step")
+        what = "operations (arithmetic, comparisons, stores)"
+        lines.append(f"longest tick: at most {most} {what}, every loop to its end")
+    for observer in program.observers:
+        lines += _format_observer_lines(program, observer)
+    return "\n".join(lines) + "\n"
+
+
+def format_method_lines(motion: IntegrationInfo) -> Iterator[str]:
+    """Yield the method, |A h| of each mode and the largest stable step of each mode."""
+    yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.series_terms}"
+    for mode, norm in motion.norms.items():
+        yield f"  mode {mode}: |A h| = {norm:.4g}, at most 4"
+    for limit in motion.stability_limits:
+        value = limit.eigenvalue
+        turning = f" +- {abs(value.imag):.6g} i" if value.imag else ""
+        yield (
+            f"  mode {limit.mode}: largest stable step {limit.step:.6g} s, eigenvalue "
+            f"{value.real:.6g}{turning} 1/s of `{limit.term}` in the rate of {limit.state}"
+        )
+
+
+def _format_work_lines(program: Program, motion: IntegrationInfo) -> Iterator[str]:
+    """K products by A, then halvings that evaluate the polynomials: once for each event."""
+    if program.period is None or not motion.max_events:
+        return
+    n = motion.state_count
+    once = motion.series_terms * n * n + RUN_BISECTIONS * motion.series_terms * n
+    yield (
+        f"  work: at most {motion.max_events} events per substep, {motion.max_events * once} products and "
+        f"{motion.max_events * RUN_BISECTIONS} looks at the guards"
+    )
+
+
+def _format_rewind_lines(program: Program) -> Iterator[str]:
+    """What a transition that goes back does at most in its tick."""
+    for info in program.transitions:
+        if info.rewind_ticks:
+            way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
+            looks = info.rewind_ticks + RUN_BISECTIONS + 2
+            yield (
+                f"  rewind {way}: at most {looks} looks at `until` and {info.rewind_ticks} runs, "
+                f"one of them over a part of a period"
+            )
+
+
+def _format_observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:
+    yield f"observer of mode {observer.mode}: gain {observer.gain}"
+    values = {constant.name: constant.value for constant in program.constants}
+    for letter, what in MATRIX_COLUMNS.items():
+        columns = getattr(observer, what)
+        rows = []
+        for row in observer.states:
+            names = [f"solved.{observer.mode}_{letter}.{row}.{column}" for column in columns]
+            rows.append([values.get(name, 0.0) for name in names])
+        if not columns or not any(any(row) for row in rows):
+            continue
+        yield f"  {letter} ({', '.join(observer.states)} by {', '.join(columns)})"
+        for numbers in rows:
+            yield "    " + " ".join(f"{number:>23.16g}" for number in numbers)

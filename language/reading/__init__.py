@@ -1,0 +1,1 @@
+"""Readers of the parts of a document: parameters, variables, modes, transitions, observers."""

@@ -1,0 +1,98 @@
+"""Chart initial: the nodes of a chart while they are read, and at which of them each is entered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from language.model.automaton import Mode
+from language.model.chart_paths import find_descendant
+from language.model.statechart import ROOT, NodeKind
+from language.reading.reader import Reader
+from language.text.diagnostic import Span, suggest_name
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+
+
+@dataclass
+class RawNode:
+    """A node while it is read; indices are places in the list of all."""
+
+    name: str
+    path: str
+    kind: NodeKind
+    parent: int
+    region: str
+    is_region: bool
+    span: Span
+    table: MappingNode
+    mode: Mode | None = None
+    children: list[int] = field(default_factory=list)
+    number: int | None = None
+    last: int = 0
+    initial: tuple[int, ...] = ()
+
+
+def resolve_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
+    """Find what `initial` names; a history without one has that of the mode around it."""
+    for index, node in enumerate(nodes):
+        if index != ROOT:
+            node.initial = _resolve_initial(nodes, index, reader)
+    for node in nodes:
+        if node.kind == "history" and not node.initial:
+            node.initial = nodes[node.parent].initial
+        if node.kind == "history" and any(nodes[n].kind == "history" for n in node.initial):
+            label = f"`{node.name}` goes to a history where nothing was left before"
+            hint = "`initial` of a history names modes"
+            reader.problems.error("target", node.span, label, hint)
+
+
+def _resolve_initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int, ...]:
+    raw = nodes[index]
+    node = raw.table.get("initial")
+    if raw.kind == "history":
+        return _resolve_names(
+            nodes, raw.parent, _read_initial_names(node, raw, reader) if node else [], reader
+        )
+    if raw.kind != "compound":
+        if node is not None:
+            label = f"`{raw.name}` has no modes inside: there is no `initial`"
+            reader.problems.error("form", node.span, label)
+        return ()
+    own = [child for child in raw.children if nodes[child].kind != "history"]
+    if not own:
+        reader.problems.error("missing", raw.span, f"`{raw.name}` has no mode inside")
+        return ()
+    if node is None and len(own) == 1:
+        return (own[0],)
+    if node is None:
+        told = f"like `initial: {nodes[own[0]].name}`"
+        reader.problems.error("missing", raw.span, "`initial` is missing", told)
+        return ()
+    return _resolve_names(nodes, index, _read_initial_names(node, raw, reader), reader)
+
+
+def _resolve_names(
+    nodes: Sequence[RawNode], owner: int, words: Sequence[ScalarNode], reader: Reader
+) -> tuple[int, ...]:
+    """Return the nodes that some words name inside another; those that are not there are told."""
+    indices = []
+    for word in words:
+        hit = find_descendant(nodes, owner, word.text)
+        if hit is None:
+            label = f"there is no mode `{word.text}` in `{nodes[owner].name}`"
+            names = [nodes[child].name for child in nodes[owner].children]
+            reader.problems.error("name", word.span, label, suggest_name(word.text, names))
+        else:
+            indices.append(hit)
+    return tuple(indices)
+
+
+def _read_initial_names(node: YamlNode | None, raw: RawNode, reader: Reader) -> list[ScalarNode]:
+    """Return the names that stand in a list, or the only one."""
+    if isinstance(node, SequenceNode) and node.nodes:
+        return reader.read_list(node, "initial")
+    if isinstance(node, SequenceNode):
+        reader.problems.error("missing", node.span, f"`initial` of `{raw.name}` names no mode")
+        return []
+    word = reader.read_scalar(node, "initial", raw.span)
+    return [word] if word else []

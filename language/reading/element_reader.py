@@ -1,0 +1,95 @@
+"""Element reader: what effects are laid on - elements, places, and what the outputs read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, cast
+
+from language.model.automaton import Element
+from language.model.declaration import Formula
+from language.reading.reader import TEXT_KEYS, Reader
+from language.text.diagnostic import Problems, Span
+from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.overlay import without_keys
+
+ELEMENT_KEYS = {
+    "elastic": ("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
+    "inertia": ("speed", "inertia", "far"),
+}
+"""Keys of an element by its kind; the first ones of each have to be there."""
+REQUIRED_KEYS = {
+    "elastic": ("twist", "rate", "torque", "stiffness"),
+    "inertia": ("speed", "inertia"),
+}
+PLACE_KEYS = ("weight", "load", "brake", "angle_rate")
+"""What a balance, input or output may say about itself for effects."""
+
+
+@dataclass(frozen=True)
+class OutputDeclarations:
+    """The outputs by name: where each stands, and what it reads."""
+
+    spans: Mapping[str, Span]
+    sources: Mapping[str, str]
+
+
+class ElementReader(Reader):
+    """Reads the sections that have no influence on the dynamics."""
+
+    def __init__(self, problems: Problems) -> None:
+        """Report into `problems`."""
+        super().__init__(problems)
+
+    def read_elements(self, node: YamlNode | None) -> dict[str, Element]:
+        """Return the elements by name."""
+        found = {}
+        for entry in self.named_entries(node, "elements"):
+            key = f"elements.{entry.key}"
+            table = self.read_mapping(entry.node, key)
+            kind = self.read_choice(table.get("kind"), "kind", ELEMENT_KEYS, "")
+            if not kind:
+                if "kind" not in table.entries:
+                    self.problems.error("missing", entry.span, f"`{key}.kind` is missing")
+                continue
+            table = self.read_mapping(table, key, ("kind", *ELEMENT_KEYS[kind]))
+            for part in REQUIRED_KEYS[kind]:
+                if part not in table.entries:
+                    self.problems.error("missing", entry.span, f"`{key}.{part}` is missing")
+            far = {item.text: item.span for item in self.read_list(table.get("far"), f"{key}.far")}
+            parts = self.read_formulas(without_keys(table, "kind", "far", *TEXT_KEYS), key)
+            element = cast(Literal["elastic", "inertia"], kind)
+            found[entry.key] = Element(entry.key, element, parts, far, key, entry.span)
+        return found
+
+    def read_places(self, node: YamlNode | None) -> dict[str, Mapping[str, Formula]]:
+        """Return what places say about themselves, by the name of a state, input or output."""
+        found: dict[str, Mapping[str, Formula]] = {}
+        for entry in self.named_entries(node, "places"):
+            key = f"places.{entry.key}"
+            table = self.read_mapping(entry.node, key, PLACE_KEYS)
+            found[entry.key] = self.read_formulas(without_keys(table, *TEXT_KEYS), key)
+        return found
+
+    def read_outputs(self, node: YamlNode | None) -> OutputDeclarations:
+        """Return the outputs: a list of names, or a mapping from names to what they read."""
+        if not isinstance(node, MappingNode):
+            items = self.read_list(node, "outputs")
+            return OutputDeclarations(
+                {i.text: i.span for i in items}, {i.text: i.text for i in items}
+            )
+        spans: dict[str, Span] = {}
+        sources: dict[str, str] = {}
+        for entry in self.named_entries(node, "outputs"):
+            spans[entry.key] = entry.node.span
+            sources[entry.key] = self.read_string(entry.node, f"outputs.{entry.key}", entry.span)
+        return OutputDeclarations(spans, sources)
+
+
+def outputs_as_mapping(node: YamlNode) -> MappingNode:
+    """Return the outputs of a tree as a mapping, whether they are a list or one already."""
+    if isinstance(node, MappingNode):
+        return node
+    nodes = node.nodes if isinstance(node, SequenceNode) else ()
+    items = [item for item in nodes if isinstance(item, ScalarNode)]
+    return MappingNode({item.text: Entry(item.text, item.span, item) for item in items}, node.span)

@@ -1,0 +1,124 @@
+"""Table reader: a parameter with values over one or two axes, read by `lookup`."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from language.expressions.units import NO_UNIT, Unit, UnitError, are_compatible, parse_unit
+from language.model.declaration import Range
+from language.reading.reader import Reader
+from language.text.diagnostic import Span
+from language.text.document import Entry, MappingNode, ScalarNode
+from language.typecheck.lookup_table import Axis, LookupTable
+
+TableRow = dict[Fraction, Fraction]
+
+
+class LookupTableReader(Reader):
+    """Reads the `table` of a parameter; `declared` is what its axes may be named after."""
+
+    axis_sections: tuple[MappingNode, ...] = ()
+
+    def read_lookup_table(
+        self, table: MappingNode, key: str, value_range: Range | None
+    ) -> LookupTable | None:
+        """Return `{over: x, unit: u, points: {...}}`, or None with the problem reported."""
+        unit = self.read_unit(table.get("unit"))
+        names = self._read_axis_names(table)
+        points = table.get("points")
+        if not names or not isinstance(points, MappingNode):
+            label = "a table is `{over: x, unit: ..., points: {...}}`, or over `[x, y]`"
+            self.problems.error("form", table.span, label)
+            return None
+        if len(names) == 1:
+            row, axis = self._read_row(points, names[0], unit, key, value_range)
+            axes: tuple[Axis, ...] = (axis,)
+            values = tuple(row.values())
+        else:
+            axes, values = self._read_rows(points, names, unit, key, value_range)
+        if any(len(axis.points) < 2 for axis in axes):
+            self.problems.error("table", points.span, "a table has two points at least")
+        return LookupTable(axes, unit, values)
+
+    def _read_axis_names(self, table: MappingNode) -> list[ScalarNode]:
+        node = table.get("over")
+        if isinstance(node, ScalarNode):
+            return [node]
+        return self.read_list(node, "over")[:2] if node is not None else []
+
+    def _read_rows(
+        self,
+        points: MappingNode,
+        names: list[ScalarNode],
+        unit: Unit,
+        key: str,
+        value_range: Range | None,
+    ) -> tuple[tuple[Axis, ...], tuple[Fraction, ...]]:
+        """Return both axes and the values, one row for each point of the first axis."""
+        outer = self._find_axis_unit(names[0])
+        first: dict[Fraction, TableRow] = {}
+        second: Axis | None = None
+        for entry in points:
+            outer, at = self._read_point(entry, outer, key, list(first))
+            row, axis = self._read_row(
+                self.read_mapping(entry.node, f"{key}.{entry.key}"),
+                names[1],
+                unit,
+                key,
+                value_range,
+            )
+            if second is not None and axis.points != second.points:
+                label = f"this row has other points of `{names[1].text}` than the first one"
+                self.problems.error("table", entry.span, label)
+            second = second or axis
+            first[at] = row
+        rows = tuple(value for row in first.values() for value in row.values())
+        axis = Axis(names[0].text, outer or NO_UNIT, tuple(first), tuple(points.entries))
+        return (axis, second or Axis(names[1].text, NO_UNIT, ())), rows
+
+    def _read_row(
+        self, points: MappingNode, name: ScalarNode, unit: Unit, key: str, value_range: Range | None
+    ) -> tuple[TableRow, Axis]:
+        axis_unit = self._find_axis_unit(name)
+        found: TableRow = {}
+        for entry in points:
+            axis_unit, at = self._read_point(entry, axis_unit, key, list(found))
+            value, _ = self.read_quantity(entry.node, f"{key}.{entry.key}", entry.span, unit)
+            if value_range and not value_range[0] <= value <= value_range[1]:
+                self.problems.error("range", entry.node.span, "this value is outside the range")
+            found[at] = value
+        axis = Axis(name.text, axis_unit or NO_UNIT, tuple(found), tuple(points.entries))
+        return found, axis
+
+    def _read_point(
+        self, entry: Entry, unit: Unit | None, key: str, previous_points: list[Fraction]
+    ) -> tuple[Unit, Fraction]:
+        """Return the axis's unit and a point of it; a bare number is in the axis's unit."""
+        scalar = ScalarNode(entry.key, entry.span)
+        value, own = self.read_quantity(scalar, f"{key}.{entry.key}", entry.span, unit)
+        if (
+            previous_points
+            and are_compatible(own.dimension, (unit or own).dimension)
+            and value <= previous_points[-1]
+        ):
+            label = f"`{entry.key}` is not above the point before it"
+            self.problems.error("table", entry.span, label, "the points of an axis ascend")
+        return unit or own, value
+
+    def _find_axis_unit(self, name: ScalarNode) -> Unit | None:
+        """Return the unit of the input or state that an axis is named after, if it is one."""
+        for section in self.axis_sections:
+            thing = section.get(name.text)
+            unit = thing.get("unit") if isinstance(thing, MappingNode) else None
+            if isinstance(unit, ScalarNode):
+                try:
+                    return parse_unit(unit.text)
+                except UnitError:
+                    return None
+        return None
+
+
+def section_of(tree: MappingNode, name: str) -> MappingNode:
+    """Return a section of an automaton, an empty one where it is absent."""
+    node = tree.get(name)
+    return node if isinstance(node, MappingNode) else MappingNode({}, Span(tree.span.source, 0, 0))

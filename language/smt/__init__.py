@@ -1,0 +1,1 @@
+"""Satisfiability of guards over the reals: queries, elimination, sampling, z3."""

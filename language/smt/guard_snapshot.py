@@ -1,0 +1,318 @@
+"""Moment: what names are at one instant in one mode, and after transitions of that instant.
+
+Every expression is lowered as for a Program; what it needs of equations becomes steps before it.
+Of parallel regions each equation is chosen by the region's own mode, which is a variable here. What
+functions with memory give is any value: an edge only where its condition is as it says.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from language.expressions.syntax_tree import (
+    EDGE_FUNCTIONS,
+    MEMORY_FUNCTIONS,
+    FunctionCall,
+    SyntaxTree,
+    memory_key,
+    walk,
+)
+from language.ir.number_type import round_to_type
+from language.ir.ops import Binary, Compare, Expr, Ref, Select, Unary, Value, integer
+from language.ir.program import mode_variable
+from language.lowering.action_stages import storage_of
+from language.lowering.chart_activity import is_active, is_complete
+from language.lowering.constants import evaluate_exactly
+from language.lowering.delay_buffers import evaluate_ticks, expression_type
+from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value, lower_expression
+from language.lowering.parameter_bindings import constant_bindings
+from language.model.analysis_cache import cache_on_owner
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.chart_paths import mode_paths
+from language.model.declaration import Formula
+from language.model.graphs import post_order
+from language.model.statechart import Chart, ChartNode
+from language.model.transition_precedence import node_of
+from language.smt.query import SymbolicAssignment, VariableDomain
+
+TIME_IN_MODE = "memory.elapsed"
+"""The time since the entry of the mode: in ticks of a sampled automaton, else in seconds."""
+
+
+@dataclass
+class SymbolicPath:
+    """What is computed at an instant, in order, and what is known of it besides."""
+
+    assignments: list[SymbolicAssignment] = field(default_factory=list)
+    assumptions: list[Expr] = field(default_factory=list)
+    domains: dict[str, VariableDomain] = field(default_factory=dict)
+    snapshot_count: int = 0
+
+
+class GuardSnapshot:
+    """A mode of one region at an instant; `after` a transition comes the next one."""
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        mode: Mode,
+        path: SymbolicPath | None = None,
+        values: Mapping[str, Expr] | None = None,
+    ) -> None:
+        """Begin an instant, or go on with the values that a transition left."""
+        self.automaton = automaton
+        self.mode = mode
+        self.path = path or SymbolicPath()
+        self.suffix = f" {self.path.snapshot_count}" if self.path.snapshot_count else ""
+        self.time_in_mode = TIME_IN_MODE
+        self.path.snapshot_count += 1
+        self.bindings: dict[str, Expr] = dict(constant_bindings(automaton))
+        for name, thing in automaton.inputs.items():
+            self.bindings[name] = Ref(f"input.{name}", thing.type in WHOLE_TYPES)
+        for name, variable in automaton.state_variables.items():
+            self.bindings[name] = Ref(storage_of(automaton, name), variable.type in WHOLE_TYPES)
+        self.bindings.update(values or {})
+        self.bindings.update(self._mode_bindings())
+
+    def lower_expression(self, tree: SyntaxTree) -> Expr:
+        """Return an expression of this moment. Raises KeyError where a name is not known here."""
+        self._define_equations([tree])
+        return lower_expression(tree, self.bindings)
+
+    def lower_guard(self, transition: Transition) -> Expr:
+        """Return when a transition is enabled, events aside: where it completes, by the modes."""
+        chart = self.automaton.statechart
+        node = node_of(self.automaton, self.automaton.source_mode(transition))
+        if transition.is_completion and chart and node:
+            return is_complete(chart, node, "mode")
+        return self.lower_expression(transition.when.tree)
+
+    def in_enclosing_mode(self, outer: Mode) -> GuardSnapshot:
+        """Return this moment as a mode around ours has it: it is active for as long, or longer."""
+        seen = copy.copy(self)
+        seen.bindings = {key: value for key, value in self.bindings.items() if key[:6] != "after "}
+        seen.time_in_mode = f"{TIME_IN_MODE} {outer.key}"
+        ages = Ref(seen.time_in_mode, True), Ref(TIME_IN_MODE, True)
+        self.path.domains.update(
+            (age.name, VariableDomain("whole", low=Fraction(0))) for age in ages
+        )
+        self.path.assumptions.append(Compare(">=", *ages))
+        return seen
+
+    def apply_transition(self, transition: Transition) -> GuardSnapshot:
+        """Return the moment after a transition: exit, reset and entry, each read as a whole."""
+        target = self.automaton.target_mode(transition)
+        carried = self._apply_stage(self.mode.exit, {})
+        carried = self._apply_stage(transition.reset, carried)
+        there = GuardSnapshot(
+            self.automaton, target, self.path, {**self._carried_values(), **carried}
+        )
+        if target.entry:
+            entered = there._apply_stage(target.entry, {})
+            there = GuardSnapshot(
+                self.automaton, target, self.path, {**there._carried_values(), **entered}
+            )
+        return there
+
+    def _carried_values(self) -> dict[str, Expr]:
+        return {name: self.bindings[name] for name in self.automaton.state_variables}
+
+    def _apply_stage(
+        self, formulas: Mapping[str, Formula], values: dict[str, Expr]
+    ) -> dict[str, Expr]:
+        """Return what is carried after a stage; its equations are those of this moment."""
+        self._define_equations(formula.tree for formula in formulas.values())
+        known = {**self.bindings, **values}
+        found = dict(values)
+        for name, formula in formulas.items():
+            is_whole = self.automaton.state_variables[name].type in WHOLE_TYPES
+            target = f"{storage_of(self.automaton, name)} {len(self.path.assignments)}"
+            value = lower_assigned_value(formula.tree, known, is_whole)
+            self.path.assignments.append((target, value))
+            found[name] = Ref(target, is_whole)
+        return found
+
+    def _mode_bindings(self) -> dict[str, Expr]:
+        """Return what `in(...)` is: of our own region it is certain, of others any mode."""
+        model = self.automaton.model
+        found = _run_mode_bindings(model, self.path.domains) if model else {}
+        if self.automaton.statechart:
+            return {**found, **self._chart_mode_bindings(self.automaton.statechart)}
+        for region in self.automaton.all_regions:
+            own = region.name == self.mode.region
+            selector = Ref(f"mode.{region.name}", True)
+            if not own:
+                self.path.domains[selector.name] = _mode_domain(region.modes.values())
+            for name, mode in region.modes.items():
+                is_in: Expr = Compare("==", selector, integer(mode.number))
+                found[f"in {region.name}.{name}"] = Value(name == self.mode.name) if own else is_in
+        return found
+
+    def _chart_mode_bindings(self, chart: Chart) -> dict[str, Expr]:
+        """Return what `in(...)` is inside a chart: around our own mode only what holds it."""
+        own = next(node for node in chart.nodes if node.mode_key == self.mode.key)
+        for region in self.automaton.all_regions:
+            leaves = chart.leaves(region.name)
+            around = chart.region_node(region.name).contains(own.index)
+            here = [leaf for leaf in leaves if leaf.contains(own.index) or own.contains(leaf.index)]
+            numbers = [
+                leaf.number for leaf in (here if around else leaves) if leaf.number is not None
+            ]
+            if not around and region.inactive is not None:
+                numbers.append(region.inactive)
+            name = mode_variable("mode", region.name)
+            self.path.domains[name] = VariableDomain("whole", numbers=tuple(numbers))
+        found: dict[str, Expr] = {}
+        for path, (node, active) in _mode_activity(chart).items():
+            found[f"in {path}"] = Value(True) if node.contains(own.index) else active
+        return found
+
+    def _define_equations(self, trees: Iterable[SyntaxTree]) -> None:
+        """Make the equations known that some expressions need, each after those that it reads."""
+        trees = list(trees)
+        needed: dict[str, list[tuple[int | None, str, Formula]]] = {}
+        stack = [name for tree in trees for name in _names_read(tree)]
+        while stack:
+            name = stack.pop()
+            if name in needed or name in self.bindings:
+                continue
+            needed[name] = list(self._alternatives(name))
+            stack += [read for _, _, formula in needed[name] for read in formula.reads]
+        reads = {n: [r for _, _, f in found for r in f.reads] for n, found in needed.items()}
+        for name in post_order(reads):
+            if needed[name]:
+                self._define_equation(name, needed[name])
+        for tree in trees:
+            self.define_memory(tree)
+
+    def _alternatives(self, name: str) -> Iterator[tuple[int | None, str, Formula]]:
+        """Yield the formulas that an equation can have: our mode's, else by another region's."""
+        if name in self.mode.equations:
+            yield None, self.mode.region, self.mode.equations[name]
+            return
+        for region in self.automaton.all_regions:
+            for mode in region.modes.values() if region.name != self.mode.region else ():
+                if name in mode.equations:
+                    yield mode.number, region.name, mode.equations[name]
+
+    def _define_equation(
+        self, name: str, alternatives: list[tuple[int | None, str, Formula]]
+    ) -> None:
+        is_whole = alternatives[0][2].is_integer
+        value: Expr | None = None
+        for number, region, formula in reversed(alternatives):
+            self.define_memory(formula.tree)
+            own = lower_assigned_value(formula.tree, self.bindings, formula.is_integer)
+            if value is None or number is None:
+                value = own
+            else:
+                is_in = Compare("==", Ref(f"mode.{region}", True), integer(number))
+                value = Select(is_in, own, value)
+        assert value is not None
+        target = f"equation.{name}{self.suffix}"
+        self.path.assignments.append((target, value))
+        self.bindings[name] = Ref(target, is_whole)
+
+    def define_memory(self, tree: SyntaxTree) -> None:
+        """Make the functions with memory known; what is inside of one comes first."""
+        for part in reversed(walk(tree)):
+            if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
+                key = memory_key(part)
+                if key not in self.bindings:
+                    self.bindings[key] = self._memory_value(part)
+
+    def _memory_value(self, call: FunctionCall) -> Expr:
+        automaton = self.automaton
+        if self.suffix and call.function in (*EDGE_FUNCTIONS, "every"):
+            return Value(False)  # nothing was seen before in this activation
+        if call.function == "after":
+            if self.suffix:
+                return Value(_after_seconds(automaton, call) <= 0)
+            if automaton.is_sampled:
+                return self._is_in_mode_for(call)
+            self.path.domains[TIME_IN_MODE] = VariableDomain(low=Fraction(0))
+            time = lower_expression(call.arguments[0], constant_bindings(automaton))
+            return Compare(">=", Ref(TIME_IN_MODE), time)
+        if call.function in ("rising", "falling"):
+            level = lower_expression(call.arguments[0], self.bindings)
+            now = level if call.function == "rising" else Unary("not", level)
+            return Binary("and", self._changed_value(call), now)
+        name = f"memory.{call.function}_{len(self.path.domains)}{self.suffix}"
+        if call.function in ("changed", "every"):
+            self.path.domains[name] = VariableDomain("truth")
+            if call.function == "every" and automaton.is_sampled:
+                aged = self._is_in_mode_for(call)
+                if evaluate_ticks(automaton, call.arguments[0]) == 1:
+                    return aged  # each tick after the first
+                self.path.assumptions.append(Binary("or", Unary("not", Ref(name)), aged))
+            return Ref(name)
+        kind = expression_type(automaton, call.arguments[0])
+        self.path.domains[name] = replace(self._domain_of(call.arguments[0]), type=kind)
+        return Ref(name, kind == "whole")
+
+    def _changed_value(self, call: FunctionCall) -> Expr:
+        """Return whether a condition changed, which is what a rise and a fall of it share."""
+        change = FunctionCall("changed", call.arguments, call.span)
+        key = memory_key(change)
+        if key not in self.bindings:
+            self.bindings[key] = self._memory_value(change)
+        return self.bindings[key]
+
+    def _is_in_mode_for(self, call: FunctionCall) -> Expr:
+        """Return that a mode has been active for the whole ticks of a time."""
+        self.path.domains[self.time_in_mode] = VariableDomain("whole", low=Fraction(0))
+        ticks = integer(evaluate_ticks(self.automaton, call.arguments[0]))
+        return Compare(">=", Ref(self.time_in_mode, True), ticks)
+
+    def _domain_of(self, tree: SyntaxTree) -> VariableDomain:
+        """Return the bounds of a name that is delayed."""
+        path = getattr(tree, "path", "")
+        thing = self.automaton.inputs.get(path) or self.automaton.state_variables.get(path)
+        if thing is None or thing.range is None:
+            return VariableDomain()
+        low, high = (
+            Fraction(round_to_type(bound, self.automaton.numbers)) for bound in thing.range
+        )
+        return VariableDomain(low=low, high=high)
+
+
+@cache_on_owner
+def _mode_activity(chart: Chart) -> dict[str, tuple[ChartNode, Expr]]:
+    """Return the modes of a chart by their paths, with whether each is active."""
+    paths = mode_paths(chart).items()
+    return {path: (node, is_active(chart, node, "mode")) for path, node in paths}
+
+
+def _after_seconds(automaton: Automaton, call: FunctionCall) -> Fraction:
+    """Return the time of `after` exactly [s]."""
+    return evaluate_exactly(Formula(call.arguments[0], ""), automaton)
+
+
+def _names_read(tree: SyntaxTree) -> list[str]:
+    return list(Formula(tree, "").reads)
+
+
+def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> dict[str, Expr]:
+    """Return what `in(model.mode)` is: a run may be in any mode of the model."""
+    found: dict[str, Expr] = {}
+    for region in model.all_regions:
+        selector = Ref(f"run.{region.name}", True)
+        domains[selector.name] = _mode_domain(region.modes.values())
+        for name, mode in region.modes.items():
+            is_in = Compare("==", selector, integer(mode.number))
+            found[f"in {model.name}.{region.name}.{name}"] = is_in
+            if region.name == model.root_region.name:
+                found[f"in {model.name}.{name}"] = is_in
+    return found
+
+
+def _mode_domain(modes: Iterable[Mode]) -> VariableDomain:
+    """Return the numbers of some modes, with the names that a witness shows."""
+    by_number = {mode.number: mode.name for mode in modes}
+    names: tuple[str, ...] = ()
+    if min(by_number) >= 0:
+        names = tuple(by_number.get(number, "") for number in range(max(by_number) + 1))
+    return VariableDomain("whole", numbers=tuple(by_number), names=names)

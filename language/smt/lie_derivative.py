@@ -1,0 +1,161 @@
+"""Along: how expressions change along the flow of a mode (Lie derivatives), inputs held.
+
+At a corner of `abs`, `min`, `max`, `clip` or `if` it is the branch taken there. What delays or
+looks up has none. Rules: Griewank and Walther, Evaluating Derivatives (2nd ed. 2008), table 2.3.
+"""
+
+from __future__ import annotations
+
+from language.expressions.syntax_tree import names
+from language.ir.ops import (
+    Binary,
+    Call,
+    Compare,
+    Expr,
+    Ref,
+    Select,
+    Unary,
+    Value,
+    add,
+    divide,
+    multiply,
+    real,
+    subtract,
+)
+from language.lowering.expressions import lower_rate
+from language.smt.guard_snapshot import GuardSnapshot
+
+ZERO = real(0.0)
+
+
+class UnknownRateError(Exception):
+    """An expression whose change along the flow is not known."""
+
+
+class LieDerivative:
+    """The flow of a moment's mode; what is needed of it becomes steps of the story."""
+
+    def __init__(self, snapshot: GuardSnapshot) -> None:
+        """Make the rates of all states known. Raises NoRate where a region gives one."""
+        self.snapshot = snapshot
+        self.assignments = snapshot.path.assignments
+        self.rates: dict[str, Expr] = {}
+        mode = snapshot.mode
+        for state in snapshot.automaton.states:
+            if state not in mode.flow:
+                raise UnknownRateError(state)
+            balance = mode.flow[state]
+            for side in (balance.left, balance.right):
+                for read in names(side):
+                    if read.path != state:
+                        snapshot.lower_expression(read)
+            known = snapshot.bindings[state]
+            assert isinstance(known, Ref)
+            target = f"rate.{state}{snapshot.suffix}"
+            snapshot.define_memory(balance.right)
+            self.assignments.append((target, lower_rate(balance, snapshot.bindings)))
+            self.rates[known.name] = Ref(target)
+
+    def differentiate(self, expr: Expr) -> Expr:
+        """Return the derivative of an expression with respect to time. Raises NoRate."""
+        match expr:
+            case Value():
+                return ZERO
+            case Ref(name):
+                return self._rate_of_name(name)
+            case Unary("-", operand):
+                return _negate(self.differentiate(operand))
+            case Binary("+", left, right):
+                return _add_rates(self.differentiate(left), self.differentiate(right))
+            case Binary("-", left, right):
+                return _add_rates(self.differentiate(left), _negate(self.differentiate(right)))
+            case Binary("*", left, right):
+                return _add_rates(
+                    _multiply_rate(self.differentiate(left), right),
+                    _multiply_rate(left, self.differentiate(right)),
+                )
+            case Binary("/", left, right):
+                first, second = self.differentiate(left), self.differentiate(right)
+                if second == ZERO:
+                    return first if first == ZERO else divide(first, right)
+                return divide(subtract(first, multiply(expr, second)), right)
+            case Select(condition, then, other):
+                return _select_rate(condition, self.differentiate(then), self.differentiate(other))
+            case Call(function, arguments):
+                return self._rate_of_call(function, arguments, expr)
+        raise UnknownRateError
+
+    def _rate_of_name(self, name: str) -> Expr:
+        if name in self.rates:
+            return self.rates[name]
+        found = next((value for target, value in self.assignments if target == name), None)
+        if found is None:
+            if name.startswith("memory."):
+                raise UnknownRateError(name)
+            return ZERO  # an input, a parameter or a discrete variable
+        change = self.differentiate(found)
+        if change != ZERO:
+            target = f"rate of {name}"
+            self.assignments.append((target, change))
+            change = Ref(target)
+        self.rates[name] = change
+        return change
+
+    def _rate_of_call(self, function: str, arguments: tuple[Expr, ...], expr: Expr) -> Expr:
+        changes = [self.differentiate(argument) for argument in arguments]
+        if all(change == ZERO for change in changes):
+            return ZERO
+        first, change = arguments[0], changes[0]
+        match function:
+            case "abs":
+                return _select_rate(Compare(">=", first, ZERO), change, _negate(change))
+            case "min" | "max":
+                is_second = Compare("<" if function == "min" else ">", arguments[1], first)
+                return _select_rate(is_second, changes[1], change)
+            case "clip":
+                inside = _select_rate(Compare("<", first, arguments[2]), change, changes[2])
+                return _select_rate(Compare(">", first, arguments[1]), inside, changes[1])
+            case "sign" | "floor":
+                return ZERO
+            case "sqrt":
+                return divide(change, multiply(real(2.0), expr))
+            case "log":
+                return divide(change, first)
+            case "pow":
+                base = _multiply_rate(
+                    multiply(arguments[1], _reduce_power(first, arguments[1])), change
+                )
+                return _add_rates(
+                    base, _multiply_rate(multiply(expr, Call("log", (first,))), changes[1])
+                )
+            case "sin":
+                return _multiply_rate(Call("cos", (first,)), change)
+            case "cos":
+                return _negate(_multiply_rate(Call("sin", (first,)), change))
+            case "exp":
+                return _multiply_rate(expr, change)
+            case "tanh":
+                return _multiply_rate(subtract(real(1.0), multiply(expr, expr)), change)
+        raise UnknownRateError(function)
+
+
+def _reduce_power(base: Expr, degree: Expr) -> Expr:
+    return Call("pow", (base, subtract(degree, real(1.0))))
+
+
+def _negate(expr: Expr) -> Expr:
+    return expr if expr == ZERO else Unary("-", expr)
+
+
+def _add_rates(left: Expr, right: Expr) -> Expr:
+    if left == ZERO:
+        return right
+    return left if right == ZERO else add(left, right)
+
+
+def _multiply_rate(left: Expr, right: Expr) -> Expr:
+    return ZERO if ZERO in (left, right) else multiply(left, right)
+
+
+def _select_rate(condition: Expr, then: Expr, other: Expr) -> Expr:
+    return then if then == other else Select(condition, then, other)

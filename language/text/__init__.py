@@ -1,0 +1,1 @@
+"""Text of a project: files, YAML nodes with places, diagnostics, provenance."""

@@ -1,0 +1,75 @@
+"""Tree: looking into a document's tree and changing one place of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+from language.text.diagnostic import Source, Span
+from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+
+
+def entries(node: YamlNode | None) -> Iterator[Entry]:
+    """Iterate over the entries of a mapping; over nothing where there is none."""
+    if isinstance(node, MappingNode):
+        yield from node
+
+
+def scalars_of(node: YamlNode | None) -> tuple[ScalarNode, ...]:
+    """Return the scalars of a list; of a single one, itself."""
+    if isinstance(node, SequenceNode):
+        return tuple(item for item in node.nodes if isinstance(item, ScalarNode))
+    return (node,) if isinstance(node, ScalarNode) else ()
+
+
+def find_node(tree: MappingNode, path: Sequence[str]) -> YamlNode | None:
+    """Return what stands under a path of keys, or None."""
+    node: YamlNode | None = tree
+    for key in path:
+        node = node.get(key) if isinstance(node, MappingNode) else None
+    return node
+
+
+def put_node(tree: MappingNode, path: Sequence[str], node: YamlNode) -> MappingNode:
+    """Return a tree with a node under a path of keys; what is absent on the way is made."""
+    key, *rest = path
+    if rest:
+        below = tree.get(key)
+        table = below if isinstance(below, MappingNode) else MappingNode({}, node.span)
+        node = put_node(table, rest, node)
+    present = tree.entries.get(key)
+    entry = Entry(key, present.span if present else node.span, node)
+    return MappingNode({**tree.entries, key: entry}, tree.span)
+
+
+def replace_source(node: YamlNode, source: Source) -> YamlNode:
+    """Return a tree whose places are in another source."""
+    span = _replace_span_source(node.span, source)
+    match node:
+        case ScalarNode():
+            return dataclasses.replace(node, span=span)
+        case SequenceNode():
+            return SequenceNode(tuple(replace_source(part, source) for part in node.nodes), span)
+        case MappingNode():
+            new_entries = {
+                entry.key: Entry(
+                    entry.key,
+                    _replace_span_source(entry.span, source),
+                    replace_source(entry.node, source),
+                )
+                for entry in node
+            }
+            return MappingNode(new_entries, span)
+
+
+def _replace_span_source(span: Span, source: Source) -> Span:
+    return dataclasses.replace(span, source=source)
+
+
+def format_inline(node: YamlNode) -> str:
+    """Return a node as YAML in one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`."""
+    if isinstance(node, MappingNode):
+        return f"{{{', '.join(f'{entry.key}: {format_inline(entry.node)}' for entry in node)}}}"
+    if isinstance(node, SequenceNode):
+        return f"[{', '.join(format_inline(item) for item in node.nodes)}]"
+    return node.text

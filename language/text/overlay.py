@@ -1,0 +1,81 @@
+"""Overlay: lay a partial tree over another one (variants, templates), by name."""
+
+from __future__ import annotations
+
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
+
+
+def apply_overlay(
+    base: MappingNode, overlay: MappingNode, problems: Problems, *, template: bool = False
+) -> MappingNode:
+    """Return `base` with `overlay` laid over it (docs/language.md, "Variants, effects, calibrations").
+
+    Mappings merge by name, to any depth; a scalar or a list replaces; `{remove: true}` removes.
+    A removal of what is absent is a problem; an override by an equal value is a warning,
+    unless `base` is a template.
+    """
+    entries = dict(base.entries)
+    for entry in overlay:
+        present = base.entries.get(entry.key)
+        if _is_removal(entry.node):
+            if present is None:
+                label = f"`{entry.key}` cannot be removed: it is not there"
+                problems.error("overlay", entry.span, label, suggest_name(entry.key, base.entries))
+            entries.pop(entry.key, None)
+        elif present is None:
+            entries[entry.key] = _reject_removals(entry, base, problems)
+        else:
+            node = _merge_entry(present, entry, problems, template)
+            entries[entry.key] = Entry(entry.key, present.span, node)
+    return MappingNode(entries, base.span)
+
+
+def without_keys(table: MappingNode, *keys: str) -> MappingNode:
+    """Return the table without some of its keys."""
+    kept = {key: entry for key, entry in table.entries.items() if key not in keys}
+    return MappingNode(kept, table.span)
+
+
+def _is_removal(node: YamlNode) -> bool:
+    if not isinstance(node, MappingNode) or set(node.entries) != {"remove"}:
+        return False
+    value = node.get("remove")
+    return isinstance(value, ScalarNode) and value.text == "true"
+
+
+def _reject_removals(entry: Entry, base: MappingNode, problems: Problems) -> Entry:
+    """Nothing can be removed inside what is new."""
+    if not isinstance(entry.node, MappingNode):
+        return entry
+    nested_problems = Problems()
+    made = apply_overlay(MappingNode({}, entry.node.span), entry.node, nested_problems)
+    near = suggest_name(entry.key, base.entries)
+    for problem in nested_problems.reported:
+        hint = problem.help or (f"`{entry.key}` is new: {near}" if near else "")
+        problems.error("overlay", problem.span, problem.label, hint)
+    return Entry(entry.key, entry.span, made)
+
+
+def _merge_entry(base: Entry, overlay: Entry, problems: Problems, template: bool) -> YamlNode:
+    if isinstance(base.node, MappingNode) and isinstance(overlay.node, MappingNode):
+        return apply_overlay(base.node, overlay.node, problems, template=template)
+    if (
+        not template
+        and not isinstance(base.node, MappingNode)
+        and _plain_content(base.node) == _plain_content(overlay.node)
+    ):
+        label = f"`{overlay.key}` is overridden by the value that it has"
+        problems.warning("overlay", overlay.span, label, f"it is given at {base.span}")
+    return overlay.node
+
+
+def _plain_content(node: YamlNode) -> object:
+    """What a tree says, without its places."""
+    match node:
+        case ScalarNode():
+            return node.text
+        case SequenceNode():
+            return tuple(_plain_content(item) for item in node.nodes)
+        case MappingNode():
+            return {entry.key: _plain_content(entry.node) for entry in node}

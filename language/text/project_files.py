@@ -1,0 +1,241 @@
+"""Finding: where specs are found by name, and how a file and its head are read."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from importlib import resources
+from pathlib import Path
+
+from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_name
+from language.text.document import Document, MappingNode, ScalarNode, lines_of, read_text
+from language.text.yaml_parser import parse_yaml
+
+ALLOW_OUTSIDE_ENV = "MODEWRIGHT_ALLOW_OUTSIDE"
+"""Environment variable that lets specs name any file; `--allow-outside` sets it."""
+
+RECORDINGS_ENV = "MODEWRIGHT_RECORDINGS"
+"""Environment variable that names the folder of recordings, wherever it is."""
+
+
+def path_exists(path: Path) -> bool:
+    """Tell whether there is something at a path; no path is too long or too odd to be asked for."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def project_root_of(file: Path) -> Path:
+    """Return the nearest folder above a file that has a `spec/`, else the file's own folder."""
+    parents = file.resolve().parents
+    return next((parent for parent in parents if (parent / "spec").is_dir()), parents[0])
+
+
+def require_inside_project(path: Path, span: Span, root: Path) -> None:
+    """Raise SpecError for a file that a spec names outside of its project; links are followed."""
+    named_in = Path(span.source.name)
+    if os.environ.get(ALLOW_OUTSIDE_ENV) or not path_exists(path) or not path_exists(named_in):
+        return
+    from importlib import resources  # not for the help of the command line
+
+    roots = [root, project_root_of(named_in), Path(str(resources.files("spec")))]
+    if os.environ.get(RECORDINGS_ENV):
+        roots.append(Path(os.environ[RECORDINGS_ENV]))
+    resolved = path.resolve()
+    if any(resolved.is_relative_to(allowed.resolve()) for allowed in roots):
+        return
+    problems = Problems()
+    label = "this file is outside of the project"
+    hint = f"its root is {project_root_of(named_in)}; `modewright --allow-outside ...` reads it nevertheless"
+    problems.error("outside", span, label, hint)
+    raise SpecError(problems.reported)
+
+
+DOCUMENT_KINDS = (
+    "automaton",
+    "system",
+    "scenario",
+    "map",
+    "variant",
+    "effect",
+    "calibration",
+    "study",
+    "test",
+)
+
+HEAD_PATTERN = re.compile(rf"^({'|'.join(DOCUMENT_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+
+NON_HEAD_KEYS = {"test": ("scenario",)}
+"""Kinds that are keys, too, of a file of another kind."""
+
+LANGUAGE_VERSION = "1"
+
+DocumentHead = tuple[Path, str, str]
+"""A file, the kind of what it holds, and its name."""
+
+
+@dataclass(frozen=True)
+class Project:
+    """A folder whose `spec/` is searched first, before the specs that are shipped.
+
+    `texts` are those of an editor, by resolved path: they stand for what is on the disk.
+    """
+
+    root: Path
+    texts: Mapping[Path, str] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def index(self) -> dict[str, list[Path]]:
+        """Files by the name of what they hold, those of the project first.
+
+        An effect is called like physics; what else has its name goes before it.
+        """
+        return {**self.effect_index, **self._index_by_name(lambda kind: kind != "effect")}
+
+    @cached_property
+    def effect_index(self) -> dict[str, list[Path]]:
+        """Files of effects by name, those of the project first."""
+        return self._index_by_name(lambda kind: kind == "effect")
+
+    def _index_by_name(self, is_wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
+        own: dict[str, list[Path]] = {}
+        for path, kind, name in self._heads:
+            if is_wanted(kind):
+                own.setdefault(name, []).append(path)
+        shipped = Path(str(resources.files("spec")))
+        if shipped.resolve() != (self.root / "spec").resolve():
+            for path, kind, name in _shipped_heads(shipped):
+                if is_wanted(kind):
+                    own.setdefault(name, [path])
+        return own
+
+    @cached_property
+    def _heads(self) -> tuple[DocumentHead, ...]:
+        return tuple(_heads_below(self.root / "spec", self.texts))
+
+    def read(self, path: Path) -> Document:
+        """Return the document of a file, in an editor's text where it is open. Raises SpecError."""
+        text = self.texts.get(path.resolve()) if self.texts else None
+        return read_document(path) if text is None else parse_document(source_of(path, text), text)
+
+    def read_effect_document(self, name: str, span: Span) -> Document:
+        """Return the document of an effect. Raises SpecError."""
+        return self.read(self._unique_path(self.effect_index, name, span, "effect"))
+
+    def path_of(self, reference: str, span: Span | None = None) -> Path:
+        """Return the file of a name or path. Raises SpecError for none or several."""
+        if reference.endswith((".yaml", ".yml")) or os.sep in reference:
+            base = Path(span.source.name).parent if span else Path()
+            beside = base / reference
+            found = beside if path_exists(beside) else Path(reference)
+            if span:
+                require_inside_project(found, span, self.root)
+            return found
+        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
+        return self._unique_path(self.index, reference, place, "spec")
+
+    def _unique_path(
+        self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
+    ) -> Path:
+        found = index.get(reference, [])
+        if len(found) == 1:
+            return found[0]
+        problems = Problems()
+        if found:
+            files = ", ".join(display_path(path) for path in found)
+            problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
+        else:
+            hint = suggest_name(reference, index)
+            if what == "spec":
+                hint = suggest_name(reference, index) or "a name of a spec below spec/, or a path"
+            problems.error("name", place, f"there is no {what} named `{reference}`", hint)
+        raise SpecError(problems.reported)
+
+
+def display_path(path: Path) -> str:
+    """Return a path as it is shown: relative to the working directory where that is shorter."""
+    try:
+        relative = os.path.relpath(path)
+    except ValueError:
+        return str(path)
+    return relative if not relative.startswith("..") else str(path)
+
+
+def read_document(path: Path) -> Document:
+    """Read one file and its head. Raises SpecError."""
+    source, text = read_text(path, display_path(path))
+    return parse_document(source, text)
+
+
+def source_of(path: Path, text: str) -> Source:
+    """Return the source of a text that an editor shows of a file."""
+    return Source(display_path(path), lines_of(text))
+
+
+def parse_document(source: Source, text: str) -> Document:
+    """Return the document of a text: `language: 1`, then one kind and its name."""
+    root = parse_yaml(source, text)
+    problems = Problems()
+    _check_version(root, problems)
+    inside = [key for kind, keys in NON_HEAD_KEYS.items() if kind in root.entries for key in keys]
+    heads = [entry for entry in root if entry.key in DOCUMENT_KINDS and entry.key not in inside]
+    if not heads:
+        first = next(iter(root), None)
+        span = first.span if first else root.span
+        label = "the file does not say what it holds"
+        problems.error(
+            "form", span, label, f"one of the keys {', '.join(DOCUMENT_KINDS)} with a name"
+        )
+    elif len(heads) > 1:
+        label = f"one file holds one thing: `{heads[0].key}` is given too"
+        problems.error("form", heads[1].span, label)
+    elif not isinstance(heads[0].node, ScalarNode):
+        problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
+    problems.raise_if_errors()
+    head = heads[0]
+    assert isinstance(head.node, ScalarNode)
+    return Document(head.key, head.node.text, head.node.text_span, root, source)
+
+
+def _check_version(root: MappingNode, problems: Problems) -> None:
+    first = next(iter(root), None)
+    node = root.get("language")
+    if node is None:
+        span = first.span if first else root.span
+        problems.error(
+            "version", span, "`language: 1` is missing", "it is the first line of a spec"
+        )
+    elif not isinstance(node, ScalarNode) or node.text != LANGUAGE_VERSION:
+        problems.error("version", node.span, "this version of the language is not known: use 1")
+
+
+def _heads_below(folder: Path, texts: Mapping[Path, str]) -> Iterator[DocumentHead]:
+    for path in _yaml_files(folder):
+        yield from ((path, kind, name) for kind, name in _heads_in(path, texts))
+
+
+@cache
+def _shipped_heads(folder: Path) -> tuple[DocumentHead, ...]:
+    """The heads of what is shipped, which nobody changes: they are read once in a process."""
+    return tuple(_heads_below(folder, {}))
+
+
+def _yaml_files(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        yield from sorted(path for path in folder.rglob("*.yaml") if path.is_file())
+
+
+def _heads_in(path: Path, texts: Mapping[Path, str]) -> list[tuple[str, str]]:
+    text = texts.get(path.resolve()) if texts else None
+    try:
+        text = path.read_text("utf-8", errors="replace") if text is None else text
+    except OSError:
+        return []
+    heads = HEAD_PATTERN.finditer(text[:65536])
+    found = [(match.group(1), match.group(2).strip("'\"")) for match in heads]
+    inside = [key for kind, _ in found for key in NON_HEAD_KEYS.get(kind, ())]
+    return [(kind, name) for kind, name in found if kind not in inside]

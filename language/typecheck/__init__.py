@@ -1,0 +1,1 @@
+"""Types, dimensions and ranges of expressions."""

@@ -1,0 +1,295 @@
+"""Dimension check: the dimension of every expression, and what does not fit (rule 20)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from language.expressions.syntax_tree import (
+    Arithmetic,
+    BoolLiteral,
+    Conditional,
+    ErrorNode,
+    FunctionCall,
+    Logic,
+    Name,
+    Negation,
+    Not,
+    NumberLiteral,
+    Power,
+    Relation,
+    SyntaxTree,
+    integer_literal,
+    is_bare_zero,
+)
+from language.expressions.units import (
+    NO_UNIT,
+    Dimension,
+    angle_hint,
+    are_compatible,
+    common_dimension,
+    dimension_power,
+    dimension_product,
+    matching_units_hint,
+)
+from language.text.diagnostic import Problems, Span, suggest_name
+from language.typecheck.environment import NameEnvironment
+from language.typecheck.function_calls import infer_function_call
+from language.typecheck.types import (
+    MAX_INT,
+    BoolType,
+    EnumType,
+    ExprType,
+    IntType,
+    as_real_type,
+    comparison_hint,
+    condition_hint,
+    describe_type,
+    int_operand_types,
+    int_type_of,
+)
+
+MAX_HINTS = 200
+"""Problems after which no nearest name is looked for: all names are compared with it."""
+
+
+class TypeChecker:
+    """Infers dimensions bottom up; reports each mistake once and goes on."""
+
+    def __init__(self, environment: NameEnvironment, problems: Problems) -> None:
+        """Check against `environment`, report into `problems`."""
+        self.environment = environment
+        self.problems = problems
+
+    def inside_memory_function(self, *functions: str) -> TypeChecker:
+        """Return the check of what stands inside a function with memory."""
+        memory = self.environment.memory_functions & {*functions}
+        return TypeChecker(
+            dataclasses.replace(self.environment, memory_functions=memory), self.problems
+        )
+
+    def check_quantity(self, tree: SyntaxTree, expected: Dimension, what: str) -> None:
+        """Check that an expression is a quantity that fits `expected`."""
+        kind = as_real_type(self.infer_type(tree))
+        if isinstance(kind, str | EnumType):
+            label = f"`{what}` is a quantity, this is {describe_type(kind)}"
+            self.report("type", tree.span, label)
+        elif (
+            isinstance(kind, Dimension)
+            and not is_bare_zero(tree)
+            and not are_compatible(kind, expected)
+        ):
+            label = f"this is in `{kind.display_name}`, `{what}` is in `{expected.display_name}`"
+            hint = angle_hint(kind, expected)
+            if isinstance(tree, NumberLiteral | Negation):
+                hint = hint or matching_units_hint(expected)
+            self.report("dimension", tree.span, label, hint)
+
+    def check_assignment(self, tree: SyntaxTree, expected: ExprType, what: str) -> None:
+        """Check that an expression may be assigned to something of a kind."""
+        if isinstance(expected, Dimension):
+            self.check_quantity(tree, expected, what)
+        elif expected == "truth":
+            self._check_same_type(tree, "truth", what)
+        elif isinstance(expected, EnumType):
+            self._check_same_type(tree, expected, what)
+        elif integer_literal(tree) is None:
+            kind = self.infer_type(tree)
+            is_floor = isinstance(tree, FunctionCall) and tree.function == "floor"
+            if kind is not None and not isinstance(kind, IntType) and not is_floor:
+                hint = "`floor(...)` makes a whole number of a real"
+                label = f"`{what}` is a whole number, this is {describe_type(kind)}"
+                self.report("type", tree.span, label, hint if isinstance(kind, Dimension) else "")
+
+    def _check_same_type(self, tree: SyntaxTree, expected: ExprType, what: str) -> None:
+        kind = self.infer_type(tree)
+        if kind is not None and kind != expected:
+            label = f"`{what}` is {describe_type(expected)}, this is {describe_type(kind)}"
+            hint = condition_hint(tree) if expected == "truth" else ""
+            self.report("type", tree.span, label, hint)
+
+    def check_condition(self, tree: SyntaxTree, what: str) -> None:
+        """Check that an expression is true or false."""
+        kind = self.infer_type(tree)
+        if kind is not None and kind != "truth":
+            hint = condition_hint(tree)
+            label = f"`{what}` is a condition, this is {describe_type(kind)}"
+            self.report("type", tree.span, label, hint)
+
+    def infer_type(self, tree: SyntaxTree) -> ExprType | None:
+        """Return what the expression is, None where a problem was reported inside it."""
+        match tree:
+            case Name():
+                return self._infer_name(tree)
+            case NumberLiteral(_, unit, _):
+                return unit.dimension
+            case Arithmetic():
+                return self._infer_arithmetic(tree)
+            case FunctionCall():
+                return infer_function_call(self, tree)
+            case BoolLiteral():
+                return "truth"
+            case Negation(operand, _):
+                kind = self.infer_type(operand)
+                if isinstance(kind, IntType):
+                    return IntType(-kind.high, -kind.low)
+                return self.require_real(kind, operand)
+            case Not(operand, _):
+                self.check_condition(operand, "not")
+                return "truth"
+            case Logic(operator, left, right, _):
+                self.check_condition(left, operator)
+                self.check_condition(right, operator)
+                return "truth"
+            case Relation():
+                return self._infer_relation(tree)
+            case Power(base, exponent, _):
+                kind = self.infer_real(base)
+                return None if kind is None else dimension_power(kind, exponent)
+            case Conditional():
+                return self._infer_conditional(tree)
+            case ErrorNode():
+                return None
+
+    def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
+        """Report a problem."""
+        self.problems.error(kind, span, label, help)
+
+    def infer_real(self, tree: SyntaxTree) -> Dimension | None:
+        """Return the dimension of a quantity; reports what is none."""
+        return self.require_real(self.infer_type(tree), tree)
+
+    def require_real(self, kind: ExprType | None, tree: SyntaxTree) -> Dimension | None:
+        """What a whole number is in arithmetic of reals: a number without a unit."""
+        kind = as_real_type(kind)
+        if isinstance(kind, Dimension):
+            return kind
+        if kind is not None:
+            self.report("type", tree.span, f"this is {describe_type(kind)}, a quantity is needed")
+        return None
+
+    def _infer_name(self, tree: Name) -> ExprType | None:
+        if tree.path in self.environment.tables:
+            hint = f"read it with `lookup({tree.path}, ...)`"
+            self.report("table", tree.span, f"`{tree.path}` is a table, not a value", hint)
+            return None
+        if tree.path in self.environment.types:
+            return self.environment.types[tree.path]
+        few = len(self.problems.reported) < MAX_HINTS
+        hint = suggest_name(tree.path, self.environment.types) if few else ""
+        owner = self.environment.equation_owners.get(tree.path, self.environment.mode)
+        if owner != self.environment.mode:
+            hint = f"mode `{owner}` has an equation of it, mode `{self.environment.mode}` has none"
+        if tree.path in self.environment.events:
+            hint = f"it is an event: write `event: {tree.path}` on a transition"
+        self.report(
+            "name", tree.span, f"`{tree.path}` is not known {self.environment.location}", hint
+        )
+        return None
+
+    def _infer_arithmetic(self, tree: Arithmetic) -> Dimension | IntType | None:
+        first, second = self.infer_type(tree.left), self.infer_type(tree.right)
+        wholes = int_operand_types(tree.left, first, tree.right, second)
+        if wholes and tree.operator != "/":
+            return self._check_int32(int_type_of(tree.operator, *wholes), tree)
+        left, right = self.require_real(first, tree.left), self.require_real(second, tree.right)
+        if left is None or right is None:
+            return None
+        if tree.operator in "*/":
+            return dimension_product(left, right, 1 if tree.operator == "*" else -1)
+        for part in (tree.left, tree.right):
+            if isinstance(part, NumberLiteral) and part.unit.offset:
+                label = "a temperature in degC is not added or subtracted"
+                self.report("dimension", part.span, label, "write a difference in K")
+        self._check_angle_units(tree)
+        return self.unify_dimensions(tree.left, left, tree.right, right, tree.span, tree.operator)
+
+    def _check_angle_units(self, tree: Arithmetic) -> None:
+        """Two declared numbers in `deg` and `rad` are not added: rule 20, nothing is converted."""
+        known = self.environment.angle_units
+        first, second = (
+            known.get(part.path) if isinstance(part, Name) else None
+            for part in (tree.left, tree.right)
+        )
+        if first and second and first.factor != second.factor:
+            label = f"`{tree.operator}` joins `{first.text}` and `{second.text}`"
+            self.report("dimension", tree.span, label, "declare both in one unit of angle")
+
+    def _check_int32(self, kind: IntType, tree: Arithmetic) -> IntType:
+        """Whole numbers are held in 32 bits: what may not fit is a problem."""
+        if kind.fits_int32:
+            return kind
+        label = f"this may lie from {kind.low} to {kind.high}: past {MAX_INT}"
+        hint = "give the whole numbers in it a narrower `range`"
+        self.report("overflow", tree.span, label, hint)
+        return IntType()
+
+    def unify_dimensions(
+        self,
+        a: SyntaxTree,
+        left: Dimension,
+        b: SyntaxTree,
+        right: Dimension,
+        span: Span,
+        operator: str,
+    ) -> Dimension | None:
+        """Return the dimension of what joins `a` and `b`; reports where they do not fit."""
+        if is_bare_zero(a):
+            return right
+        if is_bare_zero(b):
+            return left
+        if are_compatible(left, right):
+            return common_dimension(left, right)
+        label = f"`{operator}` joins `{left.display_name}` and `{right.display_name}`"
+        hint = angle_hint(left, right)
+        for tree, other in ((a, right), (b, left)):
+            if isinstance(tree, NumberLiteral) and tree.unit is NO_UNIT:
+                hint = hint or matching_units_hint(other)
+        self.report("dimension", span, label, hint)
+        return None
+
+    def _infer_relation(self, tree: Relation) -> BoolType:
+        first, second = self.infer_type(tree.left), self.infer_type(tree.right)
+        equality = tree.operator in ("==", "!=")
+        if int_operand_types(tree.left, first, tree.right, second):
+            return "truth"
+        named = [kind for kind in (first, second) if isinstance(kind, str | EnumType)]
+        if equality and (first is None or second is None):
+            return "truth"
+        if equality and len(named) == 2:
+            if first != second:
+                label = f"`{tree.operator}` compares {describe_type(named[0])} and {describe_type(named[1])}"
+                self.report("type", tree.span, label)
+            return "truth"
+        if equality and "truth" in (first, second):
+            condition = tree.left if first == "truth" else tree.right
+            label = "this is true or false, a quantity is needed"
+            self.report("type", condition.span, label, comparison_hint(tree, condition))
+            return "truth"
+        left, right = self.require_real(first, tree.left), self.require_real(second, tree.right)
+        if left is None or right is None:
+            return "truth"
+        if equality:
+            label = f"`{tree.operator}` is not for real numbers"
+            self.report("type", tree.span, label, "use `<=` or `>=`")
+        else:
+            self.unify_dimensions(tree.left, left, tree.right, right, tree.span, tree.operator)
+        return "truth"
+
+    def _infer_conditional(self, tree: Conditional) -> ExprType | None:
+        self.check_condition(tree.condition, "if")
+        first, second = self.infer_type(tree.then), self.infer_type(tree.other)
+        if first is None or second is None:
+            return None
+        wholes = int_operand_types(tree.then, first, tree.other, second)
+        if wholes:
+            return wholes[0].hull(wholes[1])
+        left, right = as_real_type(first), as_real_type(second)
+        if isinstance(left, Dimension) and isinstance(right, Dimension):
+            return self.unify_dimensions(tree.then, left, tree.other, right, tree.span, "if")
+        if left != right:
+            label = f"one arm is {describe_type(first)}, the other {describe_type(second)}"
+            if "truth" in (left, right) and Dimension in (type(left), type(right)):
+                label = "one arm is a condition, the other a quantity"
+            self.report("type", tree.span, label)
+            return None
+        return left

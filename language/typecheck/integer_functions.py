@@ -1,0 +1,42 @@
+"""Whole: `abs`, `min`, `max` and `clip` of whole numbers - their ranges and their expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from language.ir.ops import Compare, Expr, Select, Unary, Value
+from language.typecheck.types import IntType
+
+
+def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
+    """Return where the value of a function lies whose arguments lie in some ranges."""
+    first = ranges[0]
+    match function:
+        case "abs":
+            low = max(first.low, -first.high, 0)
+            return IntType(low, max(abs(first.low), abs(first.high)))
+        case "min":
+            return IntType(min(r.low for r in ranges), min(r.high for r in ranges))
+        case "max":
+            return IntType(max(r.low for r in ranges), max(r.high for r in ranges))
+        case _:
+            _, bottom, top = ranges
+            low = min(max(first.low, bottom.low), top.low)
+            return IntType(low, max(bottom.high, min(first.high, top.high)))
+
+
+def lower_integer_call(function: str, parts: Sequence[Expr]) -> Expr:
+    """Return `abs`, `min`, `max` or `clip` of whole numbers; the order is that of the reals."""
+    first = parts[0]
+    match function:
+        case "abs":
+            return Select(Compare("<", first, Value(0)), Unary("-", first), first)
+        case "min":
+            return Select(Compare("<", parts[1], first), parts[1], first)
+        case "max":
+            return Select(Compare(">", parts[1], first), parts[1], first)
+        case _:
+            _, low, high = parts
+            return Select(
+                Compare(">", first, low), Select(Compare("<", first, high), first, high), low
+            )

@@ -1,0 +1,259 @@
+"""Ranging: what values an expression can have, from the ranges that are declared.
+
+An interval is known where every name in it has a declared range. What is not known never gives a
+problem: bounds are then only used where a function or an `if` gives them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from language.expressions.syntax_tree import (
+    TIME_FUNCTIONS,
+    Arithmetic,
+    Conditional,
+    FunctionCall,
+    Logic,
+    Name,
+    Negation,
+    Not,
+    NumberLiteral,
+    Power,
+    Relation,
+    SyntaxTree,
+    TreeNumbering,
+    children,
+    is_same_expression,
+)
+from language.typecheck.interval import (
+    UNBOUNDED,
+    Interval,
+    even_power,
+    function_image,
+    image_of_corners,
+    power_or_inf,
+)
+
+NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+Constraints = Mapping[int, Interval]
+"""What enclosing conditions say of expressions, by the number of what is written alike."""
+NO_CONSTRAINTS: Constraints = {}
+IntervalLookup = Callable[[str], Interval]
+DomainReport = Callable[[str, SyntaxTree, Interval], None]
+
+
+class RangeAnalysis:
+    """Finds intervals; `look` gives those of names, `report` takes divisors and roots.
+
+    A quiet one has no `report`: what conditions say is not looked into, only what they exclude.
+    While it reports, `path` holds the conditions around a place and whether they hold there.
+    """
+
+    def __init__(
+        self,
+        name_interval: IntervalLookup,
+        table_interval: IntervalLookup,
+        numbering: TreeNumbering,
+        report: DomainReport | None = None,
+    ) -> None:
+        """Know the names; `numbering` numbers the expressions that limits are about."""
+        self.name_interval = name_interval
+        self.table_interval = table_interval
+        self.numbering = numbering
+        self.report = report
+        self.unreported = (
+            RangeAnalysis(name_interval, table_interval, numbering) if report else self
+        )
+        self.bound_cache: dict[tuple[int, int], tuple[Constraints, Interval]] = {}
+        self.branch_path: list[tuple[SyntaxTree, bool]] = []
+
+    def analyse(self, tree: SyntaxTree) -> Interval:
+        """Return the interval of an expression, reporting what is outside a domain inside it."""
+        self.unreported.bound_cache.clear()
+        before, self.branch_path = self.branch_path, []
+        interval = self.interval_of(tree, NO_CONSTRAINTS)
+        self.branch_path = before
+        return interval
+
+    def interval_of(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
+        """Return the interval of a part of an expression within the limits that hold there."""
+        if isinstance(tree, Relation | Logic | Not):
+            if self.report:
+                for part in children(tree):
+                    self.interval_of(part, constraints)
+            return UNBOUNDED
+        interval = self._compute_interval(tree, constraints)
+        held = constraints.get(self.numbering.number_of(tree)) if constraints else None
+        return interval.intersect(held) if held else interval
+
+    def _compute_interval(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
+        match tree:
+            case NumberLiteral(value, _, _):
+                return Interval(float(value), float(value), True)
+            case Name(path, _):
+                return self.name_interval(path)
+            case Negation(operand, _):
+                inner = self.interval_of(operand, constraints)
+                return Interval(-inner.high, -inner.low, inner.is_certain, inner.excludes_zero)
+            case Arithmetic():
+                return self._arithmetic(tree, constraints)
+            case Power(base, exponent, _):
+                return self._power(tree, self.interval_of(base, constraints), exponent)
+            case Conditional(condition, then, other, _):
+                if self.report:
+                    self.interval_of(condition, constraints)
+                held = self._branch_interval(condition, True, then, constraints)
+                return held.hull(self._branch_interval(condition, False, other, constraints))
+            case FunctionCall():
+                return self._call(tree, constraints)
+        return UNBOUNDED
+
+    def _branch_interval(
+        self, condition: SyntaxTree, holds: bool, tree: SyntaxTree, constraints: Constraints
+    ) -> Interval:
+        """Return the interval of an alternative of a choice."""
+        self.branch_path.append((condition, holds))
+        interval = self.interval_of(tree, self._assume(condition, holds, constraints))
+        self.branch_path.pop()
+        return interval
+
+    def _arithmetic(self, tree: Arithmetic, constraints: Constraints) -> Interval:
+        left, right = (
+            self.interval_of(tree.left, constraints),
+            self.interval_of(tree.right, constraints),
+        )
+        known = left.is_certain and right.is_certain
+        match tree.operator:
+            case "+":
+                return Interval(left.low + right.low, left.high + right.high, known)
+            case "-":
+                return Interval(left.low - right.high, left.high - right.low, known)
+            case "*":
+                if is_same_expression(tree.left, tree.right):
+                    return even_power(left, 2)
+                return image_of_corners(left, right, lambda a, b: a * b)
+        if right.contains_zero and self.report:
+            self.report("divisor", tree.right, right)
+        if right.low <= 0.0 <= right.high:
+            return UNBOUNDED
+        return image_of_corners(left, right, lambda a, b: a / b)
+
+    def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
+        if exponent < 0 and base.contains_zero and self.report:
+            self.report("divisor", tree.base, base)
+        if exponent < 0 and base.low <= 0.0 <= base.high:
+            return UNBOUNDED
+        if exponent < 0:
+            whole = self._power(tree, base, -exponent)
+            return image_of_corners(Interval(1.0, 1.0, True), whole, lambda a, b: a / b)
+        if exponent % 2 == 0:
+            return even_power(base, exponent)
+        return Interval(
+            power_or_inf(base.low, exponent), power_or_inf(base.high, exponent), base.is_certain
+        )
+
+    def _call(self, tree: FunctionCall, constraints: Constraints) -> Interval:
+        name = tree.function
+        if name == "lookup":
+            for part in tree.arguments[1:] if self.report else ():
+                self.interval_of(part, constraints)
+            first = tree.arguments[0]
+            return self.table_interval(first.path) if isinstance(first, Name) else UNBOUNDED
+        if name in ("in", *TIME_FUNCTIONS):
+            return UNBOUNDED
+        parts = [self.interval_of(part, constraints) for part in tree.arguments]
+        if self.report and name == "sqrt" and parts[0].low < 0.0:
+            self.report("root", tree.arguments[0], parts[0])
+        if self.report and name == "log" and parts[0].low <= 0.0:
+            self.report("log", tree.arguments[0], parts[0])
+        if self.report and name == "pow":
+            may_divide = parts[1].low < 0.0
+            if parts[0].low < 0.0 or (may_divide and parts[0].low == 0.0):
+                kind = "inverse power" if may_divide else "power"
+                self.report(kind, tree.arguments[0], parts[0])
+        return function_image(name, parts)
+
+    def _assume(self, condition: SyntaxTree, holds: bool, constraints: Constraints) -> Constraints:
+        """Return the limits where a condition holds, or does not."""
+        match condition:
+            case Not(operand, _):
+                return self._assume(operand, not holds, constraints)
+            case Logic(operator, left, right, _) if (operator == "and") == holds:
+                return self._assume(right, holds, self._assume(left, holds, constraints))
+            case Logic(_, left, right, _):
+                either = self._assume(left, holds, constraints)
+                other = self._assume(right, holds, self._assume(left, not holds, constraints))
+                return {key: either[key].hull(other[key]) for key in either if key in other}
+            case Relation(operator, left, right, _) if operator in NEGATED_RELATION:
+                operator = operator if holds else NEGATED_RELATION[operator]
+                first, second = (
+                    self.unreported.bound_of(left, constraints),
+                    self.unreported.bound_of(right, constraints),
+                )
+                constraints = self._constrain_by_relation(left, operator, second, constraints)
+                return self._constrain_by_relation(
+                    right, FLIPPED_RELATION[operator], first, constraints
+                )
+            case Relation(operator, left, right, _) if operator in ("==", "!="):
+                sides = (
+                    self.unreported.bound_of(left, constraints),
+                    self.unreported.bound_of(right, constraints),
+                )
+                bounded = (
+                    self._constrain_equal
+                    if (operator == "==") == holds
+                    else self._constrain_unequal
+                )
+                return bounded(right, sides[0], bounded(left, sides[1], constraints))
+        return constraints
+
+    def bound_of(self, side: SyntaxTree, constraints: Constraints) -> Interval:
+        """Return the interval of a side of a condition, found once for both its outcomes."""
+        key = id(side), id(constraints)
+        if key not in self.bound_cache:
+            self.bound_cache[key] = constraints, self.interval_of(side, constraints)
+        return self.bound_cache[key][1]
+
+    def _constrain_by_relation(
+        self, side: SyntaxTree, operator: str, bound: Interval, constraints: Constraints
+    ) -> Constraints:
+        low, high = -math.inf, math.inf
+        if operator == ">":
+            low = math.nextafter(bound.low, math.inf)
+        elif operator == ">=":
+            low = bound.low
+        elif operator == "<":
+            high = math.nextafter(bound.high, -math.inf)
+        else:
+            high = bound.high
+        made = self._constrain(side, Interval(low, high), constraints)
+        if isinstance(side, FunctionCall) and side.function == "abs" and low > 0.0:
+            return self._constrain(side.arguments[0], Interval(excludes_zero=True), made)
+        return made
+
+    def _constrain_equal(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
+        """Return the limits where a side is equal to what has a bound."""
+        return self._constrain(
+            side, Interval(bound.low, bound.high, excludes_zero=bound.excludes_zero), constraints
+        )
+
+    def _constrain_unequal(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
+        """Return the limits where a side is not equal to what has a bound: here only 0 counts."""
+        is_zero = bound.low == bound.high == 0.0
+        return (
+            self._constrain(side, Interval(excludes_zero=True), constraints)
+            if is_zero
+            else constraints
+        )
+
+    def _constrain(
+        self, side: SyntaxTree, bound: Interval, constraints: Constraints
+    ) -> Constraints:
+        number = self.numbering.number_of(side)
+        return {**constraints, number: constraints.get(number, UNBOUNDED).intersect(bound)}
