@@ -122,7 +122,7 @@ class SimulatorLibrary:
     def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return what carries variants out, from a first to one behind the last.
 
-        `plan` is an engine's (engine/plan.py), `variants` are the members of `Variants` in C: whole
+        `plan` is an engine's (engine/batch/run_plan.py), `variants` are the members of `Variants` in C: whole
         numbers, arrays, lists of arrays; all arrays contiguous.
         """
         struct, kept = self._pack_plan(plan)

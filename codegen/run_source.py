@@ -1,7 +1,7 @@
 """Run source: a whole system as C that carries out a planned run in one call, for this machine.
 
 The blocks are those of the Programs, printed as everywhere; around them stands what the engine does
-between them (engine/simulate.py, engine/continuous.py), so that both have the same bits.
+between them (engine/simulation/simulate.py, engine/execution/event_loop.py), so that both have the same bits.
 """
 
 from __future__ import annotations

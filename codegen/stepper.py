@@ -1,6 +1,6 @@
 """Stepper: a Program compiled for this machine, run block by block through ctypes.
 
-It has the methods that the engine asks of what runs a Program (engine/interpreter.py), and its
+It has the methods that the engine asks of what runs a Program (engine/interpreter/interpreter.py), and its
 bits. For whole runs in one call see codegen/library.py.
 """
 

@@ -13,7 +13,7 @@ from diagnosis.disagreement import CLOCK_TOLERANCE, OFFSET_WARNING, SHARED_FRACT
 from diagnosis.excitation import is_speed
 from diagnosis.finding import Finding, Severity
 from diagnosis.free_run import OutputComparison
-from engine.recording import Channel, Recording, split_by_windows
+from engine.recordings.recording import Channel, Recording, split_by_windows
 
 MIN_CORRELATION = 0.9
 """Correlation of the rates of change from which two speeds are taken for one motion."""

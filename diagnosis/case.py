@@ -14,7 +14,7 @@ from diagnosis.recipe import node_text
 from diagnosis.series import SampledRecording, sample_windows
 from diagnosis.shelf import FitCache, hash_of
 from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
-from engine.recording import Recording, read_recording
+from engine.recordings.recording import Recording, read_recording
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 from language.overlays.effect_reader import Effect

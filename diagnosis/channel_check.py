@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.finding import Finding
-from engine.recording import Channel, Recording
+from engine.recordings.recording import Channel, Recording
 
 Reals = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from diagnosis.free_run import OutputComparison
 from diagnosis.reference import ReferenceModel
-from engine.recording import Channel, Recording, crop, split_by_windows
+from engine.recordings.recording import Channel, Recording, crop, split_by_windows
 
 Reals = NDArray[np.float64]
 

@@ -37,7 +37,7 @@ from diagnosis.starting import average_initial_inputs, choose_initial_inputs
 from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.verdict import DecisionOutcome, Misfit, NamedEffect, RankedCandidate, Verdict
 from diagnosis.ways import recalibrate_by_hold
-from engine.recorded_part import file_of, overlap
+from engine.recordings.recording_window import file_of, overlap
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.text.diagnostic import SpecError

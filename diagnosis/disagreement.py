@@ -9,7 +9,7 @@ from statistics import median
 
 from diagnosis.consistency import OutputAgreement
 from diagnosis.finding import Finding, Severity
-from engine.recording import Recording
+from engine.recordings.recording import Recording
 from language.expressions.units import Dimension, are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton

@@ -14,7 +14,7 @@ from diagnosis.diagnose import Diagnosis
 from diagnosis.finding import Finding, format_findings
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict
-from engine.recorded_part import file_of
+from engine.recordings.recording_window import file_of
 from language.model.automaton import Automaton
 
 

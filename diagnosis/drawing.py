@@ -23,7 +23,7 @@ from diagnosis.shuffle_picture import draw_oscillation
 from diagnosis.whiteness_picture import draw_whiteness
 from diagnosis.window_picture import draw_window
 from diagnosis.worst_window import WorstWindow
-from engine.plot import Picture
+from engine.results.plot import Picture
 from language.overlays.tree_types import format_si_unit
 
 SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.channel_check import ChannelCheck, check_channel
 from diagnosis.needs import EFFECT_NEEDS, NEED_DESCRIPTIONS
 from diagnosis.spectrum import spectrum
-from engine.recording import Channel, Recording, split_by_windows
+from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import PURE_NUMBER, are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 

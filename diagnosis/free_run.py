@@ -11,11 +11,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.recording import Channel, Recording
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.stimulus import stimulus_of
-from engine.trajectory import Trajectory
+from engine.recordings.recording import Channel, Recording
+from engine.results.trajectory import Trajectory
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
+from engine.simulation.stimuli import stimulus_of
 from language.expressions.syntax_tree import Name
 from language.ir.program import Program
 from language.loading.system_reader import single_instance_system

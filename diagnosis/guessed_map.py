@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.channel_reader import file_unit
-from engine.recorded_file import RecordedFile
-from engine.recording import open_recording
+from engine.recordings.channel_reader import file_unit
+from engine.recordings.recording import open_recording
+from engine.recordings.recording_file import RecordedFile
 from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path

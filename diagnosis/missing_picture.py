@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from diagnosis.locus import SIGNIFICANT_STDS, DisturbanceEstimate, Location
 from diagnosis.series import SampledRecording
-from engine.band import PALETTE
-from engine.plot import Picture
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible
 
 _, RED, GREEN, _, _, PURPLE, GREY = PALETTE

@@ -30,7 +30,7 @@ from diagnosis.series import (
     resample,
     sample_windows,
 )
-from engine.recording import Recording
+from engine.recordings.recording import Recording
 from language.model.automaton import Automaton
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import Project

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.finding import Finding
 from diagnosis.noise import MAD_TO_STD
-from engine.recording import Channel, Recording, split_by_windows
+from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
 
 Reals = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from diagnosis.plan import ExperimentPlan
-from engine.band import PALETTE
-from engine.plot import Picture
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible
 
 

@@ -16,7 +16,7 @@ from diagnosis.free_run import RunFunction, run_interpreter
 from diagnosis.outlier import drop_huge_values, find_outliers, find_time_leaps
 from diagnosis.reference import cached_reference
 from diagnosis.remedy import find_corrections, find_millisecond_time, replace_corrected
-from engine.recording import Recording, split_by_windows
+from engine.recordings.recording import Recording, split_by_windows
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 

@@ -15,9 +15,9 @@ from diagnosis.excitation import Excitation, SignalExcitation
 from diagnosis.finding import format_findings
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.spectrum import spectrum
-from engine.band import PALETTE
-from engine.plot import Picture
-from engine.recording import Channel, Recording
+from engine.recordings.recording import Channel, Recording
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible, truncate
 
 Reals = NDArray[np.float64]

@@ -14,7 +14,7 @@ from diagnosis.free_run import (
     run_interpreter,
     simulate_free_run,
 )
-from engine.recording import Recording
+from engine.recordings.recording import Recording
 from language.loading.load import program_of
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap

@@ -21,7 +21,7 @@ from diagnosis.consistency import (
 from diagnosis.disagreement import SHARED_FRACTION, UNIT_FACTORS
 from diagnosis.finding import Finding
 from diagnosis.reference import ReferenceModel
-from engine.recording import Channel, Recording, split_by_windows
+from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton

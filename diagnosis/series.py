@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.noise import noise_of
-from engine.recording import Channel, Recording, split_by_windows
+from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
 from language.model.graphs import reachable
 from language.model.system import RecordingMap

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from diagnosis.shuffle import Oscillation
-from engine.band import PALETTE
-from engine.plot import Picture
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible
 
 BLUE, RED, *_ = PALETTE

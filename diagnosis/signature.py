@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from diagnosis.layers import PlacedEffect, automaton_with_effects as laid_automaton
 from diagnosis.naming import effect_names
 from diagnosis.uncertain import free_parameters_of
-from engine.band import PALETTE
-from engine.plot import Picture
-from engine.simulate import simulate
-from engine.trajectory import Trajectory
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
 from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton

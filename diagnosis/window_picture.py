@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from diagnosis.worst_window import WorstWindow
-from engine.band import PALETTE
-from engine.plot import Picture
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible
 
 BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE

@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from engine.firing import fired_transitions
-from engine.interpreter import Interpreter
-from engine.simulate import simulate
-from engine.starting import automata_of
-from engine.stimulus import resolve_recording
+from engine.execution.transition_events import fired_transitions
+from engine.interpreter.interpreter import Interpreter
+from engine.simulation.instance_programs import automata_of
+from engine.simulation.simulate import simulate
+from engine.simulation.stimuli import resolve_recording
 from expectation.decision import COVERED, ConditionCoverage, Decision, decision_of
 from expectation.expected import Test
 from expectation.probe import GUARD_READ_BLOCK, instrument, reached_array

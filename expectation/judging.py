@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from engine.trajectory import Trajectory
+from engine.results.trajectory import Trajectory
 from expectation.expected import Condition, Expectation, Test, TimeConstraint, Trigger
 from expectation.observed import (
     ObservedRun,

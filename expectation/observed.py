@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from engine.trajectory import Event, Trajectory
+from engine.results.trajectory import Event, Trajectory
 from expectation.expected import Condition, ModePredicate, RegionRef, RunningStatistic
 from expectation.places import (
     format_region,

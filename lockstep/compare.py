@@ -14,8 +14,8 @@ from codegen.build import FLAGS
 from codegen.harness import build_executable, compared_variables, tick_inputs, tunable_constants
 from codegen.instructions import InstructionCounts, count_instructions
 from codegen.machine import HOST, Machine
-from engine.firing import fired_transitions
-from engine.interpreter import Stepper
+from engine.execution.transition_events import fired_transitions
+from engine.interpreter.interpreter import Stepper
 from language.ir.number_type import NumberType, shortest_decimal
 from language.ir.program import Program, unqualified_name
 

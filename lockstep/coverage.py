@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from engine.starting import programs_of
-from engine.stimulus import resolve_recording
-from engine.trajectory import Trajectory
+from engine.results.trajectory import Trajectory
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.stimuli import resolve_recording
 from language.ir.program import Program
 from language.model.system import Scenario, System
 from lockstep.compare import Verdict, skipped_verdict

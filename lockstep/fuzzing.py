@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from codegen.fuzzing import Range, WordValues, decode_sequence, run_fuzzer, word_table
 from codegen.harness import tick_inputs
-from engine.interpreter import Interpreter
-from engine.simulate import CONVERTER_OF_TYPE
+from engine.interpreter.interpreter import Interpreter
+from engine.simulation.simulate import CONVERTER_OF_TYPE
 from language.ir.program import Program
 from lockstep.compare import Difference, TickLog, compare
 

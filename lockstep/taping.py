@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from engine.interpreter import Stepper
-from engine.simulate import simulate
-from engine.trajectory import Trajectory
+from engine.interpreter.interpreter import Stepper
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
 from language.ir.program import Program
 from language.model.system import Scenario, System
 from lockstep.compare import TickLog

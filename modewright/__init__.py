@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from diagnosis.dossier import DiagnosisReport
     from diagnosis.fit import Fit
-    from engine.difference import RunDifference
-    from engine.plot import Picture
-    from engine.trajectory import Event, Trajectory
+    from engine.results.plot import Picture
+    from engine.results.run_comparison import RunDifference
+    from engine.results.trajectory import Event, Trajectory
     from language.text.diagnostic import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
@@ -102,13 +102,13 @@ PLACES = {
     "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
     "DiagnosisReport": "diagnosis.dossier",
-    "Event": "engine.trajectory",
+    "Event": "engine.results.trajectory",
     "Fit": "diagnosis.fit",
-    "Picture": "engine.plot",
+    "Picture": "engine.results.plot",
     "Problem": "language.text.diagnostic",
-    "RunDifference": "engine.difference",
+    "RunDifference": "engine.results.run_comparison",
     "SpecError": "language.text.diagnostic",
-    "Trajectory": "engine.trajectory",
+    "Trajectory": "engine.results.trajectory",
     "Verdict": "lockstep.compare",
     "a2l": "modewright.code",
     "dbc": "modewright.code",

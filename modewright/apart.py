@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from engine.recorded_part import file_of, overlap
+from engine.recordings.recording_window import file_of, overlap
 
 
 def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:

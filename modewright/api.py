@@ -11,9 +11,9 @@ from typing import Any
 
 from codegen.build import flags_at_level
 from codegen.machine import CORTEX_M4F, HOST, MACHINES
-from engine.recording import Recording, read_recording
-from engine.replay import Replay, replay as replay_recording, used_columns
-from engine.trajectory import Trajectory
+from engine.recordings.recording import Recording, read_recording
+from engine.results.trajectory import Trajectory
+from engine.simulation.replay import Replay, replay as replay_recording, used_columns
 from language.ir.number_type import NumberType
 from language.ir.program import Program
 from language.loading.calibration_page_reader import parse_pages
@@ -98,7 +98,7 @@ def simulate(
         raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
     loaded = load(system, scenario, values, root, calibrations)
     if reference or method != "RK4":
-        from engine import reference as independent  # scipy only where asked for
+        from engine.reference import scipy_reference as independent  # scipy only where asked for
 
         run = independent.simulate_reference if reference else independent.simulate_with_scipy
         scipy_method: Any = "DOP853" if method == "RK4" else method

@@ -12,15 +12,15 @@ from functools import cache, partial
 from codegen.build import BuildError
 from codegen.library import load_library
 from codegen.stepper import CompiledStepper
-from engine.batch import Batch, BatchResult
-from engine.plan import planning_obstacle
-from engine.planned import CompiledRun
-from engine.planned_batch import CompiledBatchCache
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.stimulus import resolve_recording
-from engine.trajectory import Trajectory
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, BatchResult
+from engine.batch.compiled_batch import CompiledBatchCache
+from engine.batch.compiled_run import CompiledRun
+from engine.batch.interpreted_batch import run_interpreted_batch
+from engine.batch.run_plan import planning_obstacle
+from engine.results.trajectory import Trajectory
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
+from engine.simulation.stimuli import resolve_recording
 from language.ir.program import Program
 from language.model.system import Scenario, System
 from language.text.diagnostic import MissingToolError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from engine.band import ModeBand
-from engine.plot import Panel, PlotLine, draw_picture
+from engine.results.mode_band import ModeBand
+from engine.results.plot import Panel, PlotLine, draw_picture
 from modewright import api, show
 from modewright.files import write_files
 

@@ -21,8 +21,8 @@ from diagnosis.recording_check import used_columns
 from diagnosis.threshold import DEFAULT_THRESHOLDS, Thresholds, format_thresholds, read_thresholds
 from diagnosis.variant import format_variant, missing_effect_notes
 from diagnosis.wording import summary_lines
-from engine.recorded_part import file_of
-from engine.recording import read_recording
+from engine.recordings.recording import read_recording
+from engine.recordings.recording_window import file_of
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.overlays.effect_reader import Effect

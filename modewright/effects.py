@@ -15,7 +15,7 @@ from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_
 from language.text.document import Document
 
 if TYPE_CHECKING:
-    from engine.plot import Picture
+    from engine.results.plot import Picture
 
 DEFAULT_BASE = "blind_driveline"
 """The spec over which signatures are drawn where none is named."""

@@ -17,7 +17,7 @@ from diagnosis.finding import format_findings
 from diagnosis.guessed_map import guess_map
 from diagnosis.mistakes import find_clock_and_sign_errors
 from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
-from engine.recording import Recording, read_recording
+from engine.recordings.recording import Recording, read_recording
 from language.loading.load import automaton_of
 from language.loading.map_pairing import check_pairing
 from language.loading.recording_map_reader import read_map
@@ -28,7 +28,7 @@ from language.text.diagnostic import MissingToolError, Problems, SpecError
 from modewright.compiled import simulate_resolved
 
 if TYPE_CHECKING:
-    from engine.plot import Picture
+    from engine.results.plot import Picture
 
 
 MissingReasons = dict[str, str]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.band import ModeBand
-from engine.plot import Panel, PlotLine, axis_title, draw_picture
-from engine.trajectory import Trajectory
+from engine.results.mode_band import ModeBand
+from engine.results.plot import Panel, PlotLine, axis_title, draw_picture
+from engine.results.trajectory import Trajectory
 from modewright.api import Replayed
 
 

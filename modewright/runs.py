@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine.difference import RunDifference, compare_runs
-from engine.run_file import FORMATS, encode_run, read_run
-from engine.trajectory import Trajectory
+from engine.results.run_comparison import RunDifference, compare_runs
+from engine.results.run_file import FORMATS, encode_run, read_run
+from engine.results.trajectory import Trajectory
 from modewright import api
 from modewright.files import write_files
 
 if TYPE_CHECKING:
-    from engine.plot import Picture
+    from engine.results.plot import Picture
 
 Run = Trajectory | str | Path
 """A trajectory, the path of a run file, or `system:scenario` to simulate."""
@@ -54,7 +54,7 @@ def plot(
 
     `signals` are patterns such as `plant.*`; `span` is in seconds.
     """
-    from engine.plot import draw_overview
+    from engine.results.plot import draw_overview
 
     runs = [read(each) for each in (run, other) if each is not None]
     names = [

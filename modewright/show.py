@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from engine.difference import ModeSequence, RunDifference
-from engine.trajectory import Event, Trajectory
+from engine.results.run_comparison import ModeSequence, RunDifference
+from engine.results.trajectory import Event, Trajectory
 from lockstep.compare import Verdict
 from modewright.api import Replayed
 from modewright.doctor import HealthCheck

@@ -30,7 +30,7 @@ from sweep.study_run import Progress, StudyRun, Warn, run_study
 from sweep.summary import Summary, summary_of
 
 if TYPE_CHECKING:
-    from engine.plot import Picture
+    from engine.results.plot import Picture
     from sweep.sensitivity import Sensitivity
 
 WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.worker")

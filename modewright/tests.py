@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.simulate import simulate
-from engine.trajectory import Trajectory
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
 from expectation.expected import Test
 from expectation.judging import Outcome, evaluate_test
 from expectation.reader import read_test

@@ -11,7 +11,7 @@ from diagnosis.case import Case
 from diagnosis.dossier import recording_errors, usable_recordings
 from diagnosis.finding import format_findings
 from diagnosis.recording_check import RecordingCheck
-from engine.recording import Channel, Recording
+from engine.recordings.recording import Channel, Recording
 
 MIN_SAMPLES = 10
 """Samples of a channel from which on something can be said."""

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.batch import Batch, BatchResult, BatchRunner, InputTable
+from engine.batch.batch import Batch, BatchResult, BatchRunner, InputTable
 from language.model.system import Scenario, System
 from language.text.diagnostic import SpecError
 from sweep.case import VariantValues, variant_values_of

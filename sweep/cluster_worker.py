@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from engine.batch import BatchRunner
+from engine.batch.batch import BatchRunner
 from sweep.block import Block, compute_rows
 from sweep.fingerprint import describe_differences, fingerprint
 from sweep.manifest import Manifest, manifest_of

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from engine.batch import BatchRunner
+from engine.batch.batch import BatchRunner
 from sweep.block import Block, Row, compute_rows
 from sweep.study import Study
 

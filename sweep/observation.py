@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.batch import NO_EVENT, BatchResult, EventKind
+from engine.batch.batch import NO_EVENT, BatchResult, EventKind
 from language.loading.event_names import ModeEntryEvent
 
 Reals = NDArray[np.float64]

@@ -12,8 +12,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from engine.band import PALETTE
-from engine.plot import QUANTITIES, Picture
+from engine.results.mode_band import PALETTE
+from engine.results.plot import QUANTITIES, Picture
 from language.text.sanitise import escape_invisible
 from sweep.bins import histogram_bin_edges
 from sweep.measure import StoreColumn

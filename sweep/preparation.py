@@ -8,8 +8,8 @@ import json
 from collections.abc import Mapping
 from fractions import Fraction
 
-from engine.starting import programs_of
-from engine.stimulus import resolve_recording
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.stimuli import resolve_recording
 from language.ir.printer import digest as program_digest
 from language.model.system import Scenario
 from sweep.sampling_reader import MAX_POINTS, MAX_SEED

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Any, Literal
 
-from engine.arrow import import_pyarrow
+from engine.results.parquet import import_pyarrow
 from sweep.block import Block, Row
 from sweep.manifest import ARROW_TYPES, Manifest
 

@@ -17,7 +17,7 @@ import threading
 import traceback
 from typing import IO, Any
 
-from engine.batch import BatchRunner
+from engine.batch.batch import BatchRunner
 from sweep.block import Block, compute_rows
 from sweep.manifest import manifest_of
 from sweep.rows_file import encode_block

@@ -1,6 +1,6 @@
 """Assembly: the instances of a system with all that is between them, as one thing to compile.
 
-What is known before a run is not in it: instants, inputs, noise (engine/plan.py).
+What is known before a run is not in it: instants, inputs, noise (engine/batch/run_plan.py).
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def compare(
             slack=slack, signals=signals or (), span=span_of(start, end),
         )  # fmt: skip
     if plot:
-        from engine.difference_picture import draw_difference
+        from engine.results.comparison_plot import draw_difference
 
         names = (runs.run_label(a, "A"), runs.run_label(b, "B"))
         write_files({plot: draw_difference(first, second, found, names).data(form)})

@@ -15,7 +15,7 @@ from modewright.exits import PROBLEMS
 from modewright.files import OutputError, require_calibration_output
 
 if TYPE_CHECKING:
-    from engine.trajectory import Trajectory
+    from engine.results.trajectory import Trajectory
 
 GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
 

@@ -40,7 +40,7 @@ def replay(
     \b
     modewright replay estimator drive.csv --map leaf_can --variant leaf --plot drive.png
     """
-    from engine.run_file import encode_run
+    from engine.results.run_file import encode_run
     from modewright import api, show
 
     require_run_format(out)

@@ -25,7 +25,7 @@ from modewright.console import console, progress_spinner, report_written_files
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
-    from engine.trajectory import Trajectory
+    from engine.results.trajectory import Trajectory
 
 
 def simulate(
@@ -53,7 +53,7 @@ def simulate(
     modewright simulate ev_driveline -s tip_out --plot tip_out.png
     modewright simulate ev_driveline -s tip_out --set 'k_hs=6000 N*m/rad' --out run.csv
     """
-    from engine.run_file import encode_run
+    from engine.results.run_file import encode_run
     from modewright import api
 
     require_run_format(out)
@@ -88,6 +88,6 @@ def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> Non
 
 
 def _draw_plot(trajectory: Trajectory, title: str, plot: Path) -> bytes:
-    from engine.plot import draw_overview
+    from engine.results.plot import draw_overview
 
     return draw_overview([trajectory], title=title).data(picture_format(plot))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from codegen.build import FLAGS, find_compiler
 from codegen.source import emit_c_files
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType
 from language.ir.program import Program
 from modewright.api import program as program_of_spec

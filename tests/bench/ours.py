@@ -13,11 +13,11 @@ import numpy as np
 
 import modewright as mw
 from codegen.library import load_library
-from engine.planned import CompiledRun
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.stimulus import resolve_recording
-from engine.trajectory import Trajectory
+from engine.batch.compiled_run import CompiledRun
+from engine.results.trajectory import Trajectory
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
+from engine.simulation.stimuli import resolve_recording
 from language.ir.program import Program
 from language.model.system import Scenario, System
 from tests.bench.manoeuvre import NOMINAL, Manoeuvre

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.library import load_library
-from engine.batch import Batch, SignalStatistic
-from engine.planned_batch import CompiledBatch
+from engine.batch.batch import Batch, SignalStatistic
+from engine.batch.compiled_batch import CompiledBatch
 from tests.bench import in_c, ours
 from tests.bench.manoeuvre import NOMINAL, Manoeuvre
 

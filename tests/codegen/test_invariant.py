@@ -14,7 +14,7 @@ from codegen.proofs.infeasible import decision_sites
 from codegen.proofs.invariant import find_invariants
 from codegen.proofs.symbolic import SymbolicProgram
 from codegen.source import run_c_passes
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from modewright.api import program as program_named
 from tests.lockstep.chance.kinds import spec_of

@@ -10,7 +10,7 @@ import pytest
 
 from codegen.leap import FastPathMode, add_fast_path
 from codegen.source import emit_c_files, restrict_to_step
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import Branch
 from language.ir.program import Program

@@ -8,7 +8,7 @@ import pytest
 from codegen.lean import slice_to_outputs
 from codegen.predictor import Predictor, build_predictor, columns_of
 from codegen.source import restrict_to_step
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from tests.language.making import program
 

@@ -10,8 +10,8 @@ import pytest
 
 from codegen.build import flags_at_level
 from codegen.stepper import CompiledStepper
-from engine.interpreter import Interpreter
-from engine.simulate import simulate
+from engine.interpreter.interpreter import Interpreter
+from engine.simulation.simulate import simulate
 from modewright.api import load
 from tests.language.making import ROOT, program
 from tests.lockstep.heater import heater

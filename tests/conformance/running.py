@@ -11,7 +11,7 @@ from typing import Any
 from codegen.build import FLAGS, WARNINGS, find_compiler
 from codegen.names import CNames
 from codegen.source import emit_c_files
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import automaton_of, program_of
 from language.model.automaton import Automaton

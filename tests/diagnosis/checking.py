@@ -7,7 +7,7 @@ from pathlib import Path
 
 from diagnosis.mistakes import find_clock_and_sign_errors
 from diagnosis.recording_check import RecordingCheck, check_recordings
-from engine.recording import Recording
+from engine.recordings.recording import Recording
 from language.overlays.expand_document import Project
 from modewright.compiled import simulate_resolved
 from tests.diagnosis.driving import (

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.free_run import simulate_free_run
-from engine.recording import Channel, Recording
+from engine.recordings.recording import Channel, Recording
 from language.loading.load import automaton_of, command_line_value
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
@@ -154,6 +154,6 @@ def scale_channel(key: str, factor: float) -> Spoil:
 
 def truncate_recording(recording: Recording, seconds: int) -> Recording:
     """The first seconds of a recording."""
-    from engine.recording import crop
+    from engine.recordings.recording import crop
 
     return replace(crop(recording, (Fraction(0), Fraction(seconds))), windows=())

@@ -10,7 +10,7 @@ import pytest
 
 import modewright as mw
 from diagnosis.free_run import FreeRun, simulate_free_run
-from engine.recording import read_recording, split_by_windows
+from engine.recordings.recording import read_recording, split_by_windows
 from language.loading.load import automaton_of, command_line_value
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton

@@ -11,7 +11,7 @@ import pytest
 from diagnosis.candidate import compile_candidate
 from diagnosis.case import Case, read_series
 from diagnosis.series import has_feedthrough
-from engine.recorded_part import overlap
+from engine.recordings.recording_window import overlap
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton

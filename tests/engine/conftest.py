@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.recording import Recording, read_recording
+from engine.recordings.recording import Recording, read_recording
 from language.text.diagnostic import SpecError
 from tests.engine.reading import COLUMNS, Read, RenderProblems, render_problems, write_map
 

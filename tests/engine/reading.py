@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.recording import Channel, Recording, read_recording
+from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.recording_map_reader import read_map
 from language.model.system import RecordingMap
 from language.overlays.expand_document import Project, read_document

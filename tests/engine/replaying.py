@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from engine.interpreter import Stepper
-from engine.recording import Recording, read_recording
-from engine.replay import Replay, replay, used_columns
-from engine.trajectory import Event
+from engine.interpreter.interpreter import Stepper
+from engine.recordings.recording import Recording, read_recording
+from engine.results.trajectory import Event
+from engine.simulation.replay import Replay, replay, used_columns
 from language.ir.program import Program
 from language.loading.load import automaton_of, program_of
 from language.loading.recording_map_reader import read_map

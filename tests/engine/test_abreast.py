@@ -12,9 +12,9 @@ import pytest
 
 from codegen.abreast import LANES
 from codegen.run_source import emit_simulator_files
-from engine.batch import Batch, InputTable, SignalStatistic
-from engine.planned_batch import CompiledBatch, run_compiled_batch
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, InputTable, SignalStatistic
+from engine.batch.compiled_batch import CompiledBatch, run_compiled_batch
+from engine.batch.interpreted_batch import run_interpreted_batch
 from language.model.system import Scenario, System
 from modewright.api import load
 from tests.engine.test_planned import DRIVELINES, assert_same_batch, compile_unoptimised, load_drive

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.adjustment import bind_parameters
-from engine.batch import Batch, BatchResult, InputTable, SignalStatistic
-from engine.simulate import simulate
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, BatchResult, InputTable, SignalStatistic
+from engine.batch.interpreted_batch import run_interpreted_batch
+from engine.batch.parameter_binding import bind_parameters
+from engine.simulation.simulate import simulate
 from language.model.system import Scenario, StimulusPiece
 from modewright.api import load
 

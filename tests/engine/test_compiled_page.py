@@ -12,14 +12,14 @@ from codegen.build import flags_at_level
 from codegen.library import load_library
 from codegen.predictor import Predictor, build_predictor, columns_of
 from codegen.stepper import CompiledStepper
-from engine.batch import Batch, SignalStatistic
-from engine.interpreter import Interpreter
-from engine.planned import CompiledRun
-from engine.planned_batch import run_compiled_batch
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.trajectory import Trajectory
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, SignalStatistic
+from engine.batch.compiled_batch import run_compiled_batch
+from engine.batch.compiled_run import CompiledRun
+from engine.batch.interpreted_batch import run_interpreted_batch
+from engine.interpreter.interpreter import Interpreter
+from engine.results.trajectory import Trajectory
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
 from modewright.api import Loaded, load
 from tests.language.making import project_of
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.continuous import ContinuousRun, PartialStep
-from engine.trajectory import Trajectory
+from engine.execution.event_loop import ContinuousRun, PartialStep
+from engine.results.trajectory import Trajectory
 
 PLANT = """
 language: 1

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.difference import compare_runs
-from engine.difference_picture import draw_difference
-from engine.trajectory import Event, Trajectory
+from engine.results.comparison_plot import draw_difference
+from engine.results.run_comparison import compare_runs
+from engine.results.trajectory import Event, Trajectory
 
 
 def run(values: list[float], modes: list[int] | None = None, step: float = 1.0) -> Trajectory:

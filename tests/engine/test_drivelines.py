@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.library_stepper import ScipyMethod
-from engine.reference import simulate_with_scipy
-from engine.simulate import simulate
+from engine.reference.scipy_reference import simulate_with_scipy
+from engine.reference.scipy_stepper import ScipyMethod
+from engine.simulation.simulate import simulate
 from language.model.system import Instance, Scenario, System
 from modewright.api import load
 from tests.language.making import ROOT

@@ -15,13 +15,13 @@ import pytest
 import modewright as mw
 from codegen.build import flags_at_level
 from codegen.library import SimulatorLibrary, load_library
-from engine.batch import Batch, BatchResult, InputTable, SignalStatistic
-from engine.plan import planning_obstacle
-from engine.planned import CompiledRun
-from engine.planned_batch import CompiledBatchCache, run_compiled_batch
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, BatchResult, InputTable, SignalStatistic
+from engine.batch.compiled_batch import CompiledBatchCache, run_compiled_batch
+from engine.batch.compiled_run import CompiledRun
+from engine.batch.interpreted_batch import run_interpreted_batch
+from engine.batch.run_plan import planning_obstacle
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
 from language.model.system import Scenario, ScheduledCalibration, StimulusPiece, System
 from language.programs.simulation_assembly import SimulationAssembly
 from modewright.api import load

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from engine.band import INACTIVE_COLOUR, PALETTE
-from engine.plot import draw_overview
-from engine.trajectory import Event, Trajectory
+from engine.results.mode_band import INACTIVE_COLOUR, PALETTE
+from engine.results.plot import draw_overview
+from engine.results.trajectory import Event, Trajectory
 
 
 def run(scale: float = 1.0) -> Trajectory:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.recording import Recording, read_recording
+from engine.recordings.recording import Recording, read_recording
 from language.loading.recording_map_reader import read_map
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import MissingToolError, SpecError

@@ -8,7 +8,7 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from engine.recording import read_recording
+from engine.recordings.recording import read_recording
 from language.text.diagnostic import SpecError
 from tests.engine.reading import GOOD, HEAD, RenderProblems, render_problems, write_map
 
@@ -162,7 +162,7 @@ class TestAFileThatIsNotWhatItSeems:
     def test_a_packed_file_that_is_huge_unpacked(
         self, told: RenderProblems, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("engine.recorded_csv.MAX_BYTES", 1000)
+        monkeypatch.setattr("engine.recordings.csv_reader.MAX_BYTES", 1000)
         packed = gzip.compress(GOOD.encode() + b"\n" * 50_000, mtime=0)
         assert len(packed) < 1000
         assert "larger than 1000 bytes" in told(packed, name="drive.csv.gz")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.recording import Recording, read_recording, split_by_windows
+from engine.recordings.recording import Recording, read_recording, split_by_windows
 from language.loading.recording_map_reader import read_map
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import SpecError

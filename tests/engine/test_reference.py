@@ -12,13 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine import starting
-from engine.continuous import SimulationStopped
-from engine.library_stepper import INTEGRATION_BLOCKS, ScipyStepper, without_integration
-from engine.reference import reference_numbers, simulate_reference, with_reference_numbers
-from engine.simulate import simulate
-from engine.starting import programs_of
-from engine.trajectory import Event, Trajectory
+from engine.execution.event_loop import SimulationStopped
+from engine.reference.scipy_reference import (
+    reference_numbers,
+    simulate_reference,
+    with_reference_numbers,
+)
+from engine.reference.scipy_stepper import INTEGRATION_BLOCKS, ScipyStepper, without_integration
+from engine.results.trajectory import Event, Trajectory
+from engine.simulation import instance_programs as starting
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
 from language.ir.program import Program
 from language.loading.load import program_of
 from language.loading.scenario_reader import read_scenario

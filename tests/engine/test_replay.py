@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.interpreter import Stepper
-from engine.replay import Replay, used_columns
+from engine.interpreter.interpreter import Stepper
+from engine.simulation.replay import Replay, used_columns
 from tests.engine.replaying import (
     ARRIVAL,
     ESTIMATORS,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from engine import shapes
+from engine.interpreter import expression_closures as shapes
 from language.ir.ops import (
     Assign,
     Binary,

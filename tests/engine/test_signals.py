@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.interpreter import Stepper
-from engine.sensing import FirstOrderLag, noise_stream
-from engine.simulate import simulate
+from engine.interpreter.interpreter import Stepper
+from engine.simulation.sensors import FirstOrderLag, noise_stream
+from engine.simulation.simulate import simulate
 from language.ir.program import Program
 from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import read_system

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.simulate import simulate
+from engine.simulation.simulate import simulate
 from expectation.expected import Test
 from expectation.judging import Outcome, evaluate_test
 from modewright.tests import load_test

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.simulate import simulate
+from engine.simulation.simulate import simulate
 from expectation.coverage import instrument_programs, measure_coverage
 from expectation.expected import Test
 from expectation.judging import evaluate_test

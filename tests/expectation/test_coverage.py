@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from engine.simulate import simulate
-from engine.starting import automata_of
-from engine.stimulus import resolve_recording
+from engine.simulation.instance_programs import automata_of
+from engine.simulation.simulate import simulate
+from engine.simulation.stimuli import resolve_recording
 from expectation.coverage import Coverage, instrument_programs, measure_coverage, merge_coverages
 from language.ir.ops import Store
 from language.ir.traversal import walk_ops

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import modewright as mw
-from engine.simulate import simulate
+from engine.simulation.simulate import simulate
 from modewright import show_tests, tests
 from modewright.cli import app
 from tests.expectation.latching import write_project

@@ -14,8 +14,8 @@ from fmpy.build import build_platform_binary
 
 from codegen.fmi.archive import build_fmu
 from codegen.fmi.variable import Version
-from engine.interpreter import Interpreter
-from engine.page import calibrate
+from engine.interpreter.apply_calibration import calibrate
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from lockstep.compare import TickLog
 from modewright.api import program

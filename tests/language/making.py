@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.expressions.parser import parse_expression
 from language.expressions.syntax_tree import SyntaxTree
 from language.expressions.units import Dimension, parse_unit

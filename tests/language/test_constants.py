@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import round_to_type
 from language.ir.ops import Assign
 from language.ir.program import Program, TransitionInfo

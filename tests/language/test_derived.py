@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import lower_automaton, program_of
 from tests.language.making import load_shipped, problem_lines, program, project_of, solve_constants

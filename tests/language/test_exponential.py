@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from tests.language.flowing import Flow
 from tests.language.making import solve_constants
 

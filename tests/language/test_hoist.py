@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.ops import Assign
 from language.ir.printer import format_expr
 from language.ir.program import Program

@@ -8,7 +8,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.observers.input_change import change_moments
 from lockstep.compare import compare
 from tests.language.test_recursive import STATES, A, Matrix, covariance, make_program, step, ticks

@@ -13,7 +13,7 @@ from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import automaton_of, lower_automaton
 from language.overlays.expand_document import read_document

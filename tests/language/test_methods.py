@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.integration.stability_limit import largest_stable_step
 from language.ir.program import Program, StabilityLimit
 from language.loading.load import automaton_of, program_of

@@ -12,7 +12,7 @@ from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from lockstep.compare import compare
 from tests.language.making import program

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from filterpy.common import van_loan_discretization
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.ops import Block, Branch, Compare, Loop, Ref, RunBlock, Value
 from language.ir.traversal import walk_ops
 from lockstep.compare import compare

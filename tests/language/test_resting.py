@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.ops import Assign, Ref
 from language.ir.program import Program
 from language.ir.traversal import block_writes, reachable_blocks

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.traversal import reachable_blocks
 from language.programs.model_run import SATURATION_BLOCK
 from tests.language.making import program, project_of

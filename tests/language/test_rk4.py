@@ -9,9 +9,9 @@ from fractions import Fraction
 
 import pytest
 
-from engine.interpreter import Interpreter
-from engine.simulate import simulate
-from engine.trajectory import Trajectory
+from engine.interpreter.interpreter import Interpreter
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
 from language.integration.rk4 import TERMS
 from language.model.system import Instance, Scenario, System
 from tests.language.making import NOWHERE, automaton, program, stepper

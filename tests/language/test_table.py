@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.numerics.interpolation import Interpolation
 from tests.language.making import automaton, problem_lines, program
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from codegen.source import emit_c_files
-from engine.simulate import simulate
+from engine.simulation.simulate import simulate
 from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
 from language.ir.program import Program
 from language.loading.calibration_page_reader import parse_pages

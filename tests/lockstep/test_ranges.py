@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType, round_to_type
 from lockstep.compare import TickLog, compare
 from modewright.api import program

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NUMBER_TYPES
 from language.ir.program import Program
 from language.loading.load import load_automaton, program_of

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from codegen.comment import sanitise_comment
-from engine.plot import Panel, PlotLine, draw_picture
-from engine.trajectory import Trajectory
+from engine.results.plot import Panel, PlotLine, draw_picture
+from engine.results.trajectory import Trajectory
 from language.overlays.expand_document import parse_document
 from language.text.diagnostic import Problem, Source, Span, render_problem
 from modewright.checking import problem_json

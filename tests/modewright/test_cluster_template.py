@@ -23,7 +23,7 @@ def main():
     from sweep.clustering import WorkerSetup, open_client
     staff = WorkerSetup(modewright.cluster_worker.own_fingerprint)
     with open_client(Address(count=2), Credentials(), staff) as client:
-        told = client.run(lambda: (os.getppid(), "engine.planned_batch" in sys.modules))
+        told = client.run(lambda: (os.getppid(), "engine.batch.compiled_batch" in sys.modules))
     parents, loaded = zip(*told.values())
     print(len(told), len(set(parents)), all(loaded))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.variants import run_interpreted_batch
+from engine.batch.interpreted_batch import run_interpreted_batch
 from modewright import study_page
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

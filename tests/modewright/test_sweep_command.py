@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.batch import Batch, BatchResult
+from engine.batch.batch import Batch, BatchResult
 from modewright import studies
 from modewright.cli import app
 from modewright.console import progress_bar

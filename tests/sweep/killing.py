@@ -7,7 +7,7 @@ import signal
 from collections.abc import Mapping
 from pathlib import Path
 
-from engine.batch import Batch, BatchResult
+from engine.batch.batch import Batch, BatchResult
 from sweep.block import Block
 from sweep.cluster_worker import Answer, answer_block
 from sweep.fingerprint import fingerprint

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.batch import Batch, BatchResult, EventKind
+from engine.batch.batch import Batch, BatchResult, EventKind
 from language.overlays.expand_document import Project, parse_document, read_document
 from language.text.diagnostic import Problems, Source
 from sweep.block import Block

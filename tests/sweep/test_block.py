@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from engine.batch import Batch, BatchResult
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, BatchResult
+from engine.batch.interpreted_batch import run_interpreted_batch
 from modewright.compiled import run_batch, run_block
 from sweep.block import Block, Row, compute_rows
 from sweep.structure import format_decimal

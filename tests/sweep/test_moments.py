@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.batch import Batch, BatchResult
+from engine.batch.batch import Batch, BatchResult
 from modewright.show_study import summary_json
 from sweep.executor import SerialExecutor
 from sweep.interval import interval_of_mean, interval_of_quantile

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.variants import run_interpreted_batch
+from engine.batch.interpreted_batch import run_interpreted_batch
 from language.overlays.expand_document import Project, read_document
 from sweep.block import Block, compute_rows
 from sweep.case import variant_values_of

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.batch import Batch, BatchResult
-from engine.variants import run_interpreted_batch
+from engine.batch.batch import Batch, BatchResult
+from engine.batch.interpreted_batch import run_interpreted_batch
 from language.text.diagnostic import SpecError
 from sweep.block import Block, Row
 from sweep.executor import BlockResult, SerialExecutor

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from engine.batch import Batch, BatchResult
+from engine.batch.batch import Batch, BatchResult
 from modewright import show_study
 from sweep.bins import MAX_BINS, histogram_bin_edges
 from sweep.executor import SerialExecutor

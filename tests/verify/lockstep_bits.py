@@ -16,9 +16,9 @@ import sys
 from collections.abc import Iterator
 from fractions import Fraction
 
-from engine.interpreter import Interpreter
-from engine.simulate import simulate
-from engine.starting import programs_of
+from engine.interpreter.interpreter import Interpreter
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.simulate import simulate
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.printer import digest
 from language.ir.program import Program

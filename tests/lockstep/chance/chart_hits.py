@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from engine.firing import fired_transitions
-from engine.interpreter import Interpreter
+from engine.execution.transition_events import fired_transitions
+from engine.interpreter.interpreter import Interpreter
 from language.charts.chart_context import (
     NEVER_LEFT,
     history_ref,

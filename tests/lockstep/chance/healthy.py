@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.closures import BlockCompiler
+from engine.interpreter.block_compiler import BlockCompiler
 from language.ir.number_type import NUMBER_TYPES
 from language.ir.program import Program
 from lockstep.compare import TickLog, Verdict, compare_output
@@ -68,7 +68,8 @@ def _differs(mutant: Mutant, one: ReferenceRun, ticks: int, patch: pytest.Monkey
     with patch.context() as patched:
         mutant.patch(patched)
         patched.setattr(
-            "engine.interpreter._compile_program", lambda same: BlockCompiler(same.program)
+            "engine.interpreter.interpreter._compile_program",
+            lambda same: BlockCompiler(same.program),
         )
         tape = record_ticks(one.spec, one.program, ticks, mutant.rewrite(one.program))
     # A run that is stopped earlier differs as well.

@@ -13,8 +13,8 @@ from typing import Any
 
 import yaml
 
-from engine.interpreter import Interpreter
-from engine.trajectory import Event
+from engine.interpreter.interpreter import Interpreter
+from engine.results.trajectory import Event
 from language.ir.program import Program, TransitionInfo
 from tests.lockstep.chance.probe import ORDER, SWITCH, TWO
 from tests.lockstep.chance.spec import Spec

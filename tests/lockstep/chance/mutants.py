@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from engine.arithmetic import ARITHMETIC_OF_TYPE
+from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
 from language.ir.number_type import NUMBER_TYPES
 from language.ir.ops import Assign, Block, Branch, Op, Ref, RunBlock, Value
 from language.ir.program import Program, Variable
 from tests.lockstep.chance.mutant import Mutant, Patch, attribute, item, rewrite_operations
 
-ACTIONS = "engine.actions"
-SHAPES = "engine.shapes"
+ACTIONS = "engine.interpreter.statement_closures"
+SHAPES = "engine.interpreter.expression_closures"
 
 
 def _elementary(name: str, function: Callable[..., Any]) -> Patch:

@@ -8,9 +8,9 @@ from typing import Any, get_args
 
 import pytest
 
-from engine.actions import StatementClosure
-from engine.closures import BlockCompiler
-from engine.shapes import ExpressionClosure
+from engine.interpreter.block_compiler import BlockCompiler
+from engine.interpreter.expression_closures import ExpressionClosure
+from engine.interpreter.statement_closures import StatementClosure
 from language.ir.ops import Assign, Binary, Call, Compare, Expr, Op, Unary
 from language.ir.program import Program
 from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY
@@ -47,7 +47,9 @@ def count_executed(spec: Spec, program: Program, ticks: int) -> Counter[str]:
             return _counting(read, counts, name) if name else read
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("engine.interpreter._compile_program", lambda same: Counting(same.program))
+        patch.setattr(
+            "engine.interpreter.interpreter._compile_program", lambda same: Counting(same.program)
+        )
         record_ticks(spec, program, ticks)
     return counts
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from engine.interpreter import Interpreter
+from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from lockstep.compare import TickLog
 from tests.lockstep.chance.hits import BROKEN, INPUTS, LAST, RULES, Hits

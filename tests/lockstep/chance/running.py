@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from random import Random
 
-from engine.continuous import ContinuousRun, SimulationStopped
-from engine.interpreter import Interpreter
-from engine.trajectory import Event
+from engine.execution.event_loop import ContinuousRun, SimulationStopped
+from engine.interpreter.interpreter import Interpreter
+from engine.results.trajectory import Event
 from language.ir.program import Program
 from lockstep.compare import TickLog
 from tests.lockstep.chance.spec import Spec
@@ -67,7 +67,7 @@ def _seen(tape: TickLog, stepper: Interpreter, look: Look) -> None:
 def _flow(
     run: ContinuousRun, inputs: Iterator[Tick], count: int, stepped: Callable[[], None]
 ) -> None:
-    """As engine/simulate.py does: flow to the end of a step, new inputs, jumps."""
+    """As engine/simulation/simulate.py does: flow to the end of a step, new inputs, jumps."""
     run.on_step = stepped
     try:
         for number in range(count):

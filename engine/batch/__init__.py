@@ -1,0 +1,1 @@
+"""Many runs of a system: variants of parameters, interpreted or compiled."""

@@ -1,0 +1,165 @@
+"""Planned: a run carried out by a compiled library; a batch is in engine/batch/compiled_batch.py.
+
+Results are those of the interpreter, bit for bit. What a library leaves, the interpreter does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.batch.build_assembly import assembly_of
+from engine.batch.run_plan import build_run_plan
+from engine.execution.invariant_monitor import invariant_event
+from engine.execution.range_monitor import format_range_violation, range_event
+from engine.execution.transition_events import mode_names, transition_event
+from engine.results.row_recorder import recorded_columns
+from engine.results.trajectory import Event, Trajectory, column_array, fault_names
+from language.ir.number_type import round_to_type
+from language.ir.program import InvariantInfo, Program, unqualified_name
+from language.model.system import Scenario, System
+from language.programs.simulation_assembly import SimulationAssembly, range_event_variables
+
+EVENT_DTYPE = np.dtype(
+    [
+        ("time", "f8"),
+        ("value", "f8"),
+        ("number", "i4"),
+        ("micro_step", "i4"),
+        ("mode", "i4"),
+        ("reserved", "i4"),
+    ]
+)
+"""`Event` of codegen/templates/run.h.jinja."""
+INITIAL_EVENT_CAPACITY = 1000
+"""Events for which a single run has room at first; it is made again where there were more."""
+
+
+class RunLibrary(Protocol):
+    """Compiled runs of an assembly (codegen/library.py)."""
+
+    @property
+    def columns(self) -> Sequence[int]:
+        """The place of each column of the assembly in a row."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers a row has."""
+
+    @property
+    def lanes(self) -> int:
+        """How many variants may be carried out side by side."""
+
+    def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
+        """Return what carries variants out, from a first to one behind the last."""
+
+
+BuildLibrary = Callable[[SimulationAssembly], RunLibrary]
+
+
+class CompiledRun:
+    """One run that is planned: it can be carried out again and again."""
+
+    def __init__(
+        self,
+        system: System,
+        scenario: Scenario,
+        programs: Mapping[str, Program],
+        build: BuildLibrary,
+    ) -> None:
+        """Take a resolved scenario that can be planned."""
+        self.scenario = scenario
+        self.assembly = assembly_of(system, scenario, programs)
+        self.plan = build_run_plan(system, scenario, self.assembly)
+        self.library = build(self.assembly)
+        self.recorded = recorded_columns(system, scenario, programs)
+        self._values = np.array(
+            [round_to_type(c.value) for _, c in self.assembly.tunables()], dtype=np.float64
+        )
+        self._rows = np.empty((len(self.plan.rows.high), self.library.width))
+        self._events = np.empty(INITIAL_EVENT_CAPACITY, dtype=EVENT_DTYPE)
+        self._count = np.zeros(1, dtype=np.int64)
+        self._is_left = np.zeros(1, dtype=np.uint8)
+        self._faults = np.zeros(len(programs), dtype=np.uint32)
+        self._call = self.library.bind(self.plan, self._members())
+
+    def run(self) -> bool:
+        """Run in C; tell whether that was all. The numbers are in this object's arrays."""
+        self._call(0, 1)
+        count = int(self._count[0])
+        if count > len(self._events):
+            self._events = np.empty(2 * count, dtype=EVENT_DTYPE)
+            self._call = self.library.bind(self.plan, self._members())
+            self._call(0, 1)
+        return not self._is_left[0]
+
+    def trajectory(self) -> Trajectory | None:
+        """Return the trajectory; None where the interpreter has to tell what happened."""
+        if not self.run():
+            return None
+        programs = self.assembly.programs
+        columns = zip(self.recorded, self.library.columns, strict=True)
+        return Trajectory(
+            name=self.scenario.name,
+            times=self.plan.rows.high.copy(),
+            signals={
+                column.name: column_array(column.type, self._rows[:, place].tolist())
+                if column.type != "real"
+                else self._rows[:, place].copy()
+                for column, place in columns
+            },
+            units={column.name: column.unit for column in self.recorded},
+            modes={
+                signal: names
+                for name, program in programs.items()
+                for signal, names in mode_names(program, f"{name}.").items()
+            },
+            events=tuple(_events(self._events[: int(self._count[0])], self.assembly)),
+            faults=tuple(
+                fault
+                for (name, program), word in zip(
+                    programs.items(), self._faults.tolist(), strict=True
+                )
+                for fault in fault_names(name, program, word)
+            ),
+        )
+
+    def _members(self) -> dict[str, Any]:
+        return {
+            "values": self._values,
+            "tables": 0,
+            "noise_strides": np.zeros(len(self.assembly.sensors) + 1, dtype=np.int64),
+            "measures": 0,
+            "outputs": 0,
+            "most_events": len(self._events),
+            "events": self._events,
+            "counts": self._count,
+            "is_left": self._is_left,
+            "faults": self._faults,
+            "rows": self._rows,
+        }
+
+
+def _events(found: NDArray[np.void], assembly: SimulationAssembly) -> list[Event]:
+    """Return what C wrote down as events."""
+    known: list[tuple[str, Program, Any]] = []
+    for name, program in assembly.programs.items():
+        known += [(name, program, info) for info in program.transitions]
+        known += [(name, program, variable) for variable in range_event_variables(program)]
+        known += [(name, program, info) for info in program.invariants]
+    events = []
+    for one in found.tolist():
+        time, value, number, micro_step, mode, _ = one
+        name, program, what = known[number]
+        if hasattr(what, "slot"):
+            events.append(transition_event(name, program, what, time, micro_step))
+        elif isinstance(what, InvariantInfo):
+            events.append(invariant_event(name, program, what, time))
+        else:
+            text = format_range_violation(what.name, value, *what.range)
+            signal = unqualified_name(what.name)
+            events.append(range_event(time, name, signal, program.mode_name(mode), text))
+    return events

@@ -1,0 +1,296 @@
+"""Adjustment: which values of a batch one Program takes, and which need a Program per value.
+
+A swept parameter is made tunable in the Programs of the batch, a swept initial value becomes a
+tunable parameter of its own: so all variants share their Programs, and differ in calibrations.
+Numbers that are solved at check time (gains, matrix exponentials) and times of waits cannot follow
+a tunable: what they depend on is set before the Program is made, once for each value.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.batch.batch import Batch
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.stimuli import resolve_recording
+from language.expressions.syntax_tree import Name
+from language.ir.printer import digest
+from language.ir.program import Program
+from language.model.automaton import Automaton
+from language.model.declaration import Formula, Parameter
+from language.model.system import Scenario, System
+from language.text.diagnostic import SpecError
+
+Bounds = tuple[float, float]
+"""The least and the largest value of a parameter."""
+INITIAL_PARAMETER = "start_of_{}"
+"""The name of the parameter that a swept initial value becomes."""
+
+
+@dataclass(frozen=True)
+class ParameterBinding:
+    """How a batch is carried out: `system` and `scenario` in which swept values are tunable.
+
+    `tuned` gives for each swept name its instance and tunable parameter; `rebuilt` says why a name
+    needs a Program per value. `programs` are those of the batch's own values of what is rebuilt.
+    Where nothing is, `ends` are the values [SI] between which the Programs are the same.
+    """
+
+    system: System
+    scenario: Scenario
+    programs: Mapping[str, Program]
+    tunables: Mapping[str, tuple[str, str]]
+    rebuild_reasons: Mapping[str, str]
+    bounds: Mapping[str, Bounds] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ProgramGroup:
+    """Variants (places in the batch) that share their Programs."""
+
+    variants: NDArray[np.int64]
+    binding: ParameterBinding
+
+
+def bind_parameters(batch: Batch) -> ParameterBinding:
+    """Return how the names of a batch are swept.
+
+    Raises ValueError for a name that is not there, SpecError for a value that no Program takes.
+    """
+    require_known_names(batch)
+    scenario = _without_initial(resolve_recording(batch.system, batch.scenario), batch)
+    seen_bounds = value_bounds(batch)
+    for ends in (
+        (declared, seen_bounds)
+        if (declared := _declared_bounds(batch, seen_bounds)) != seen_bounds
+        else (seen_bounds,)
+    ):
+        shared_binding = _bind_all_tunable(batch, scenario, ends)
+        if shared_binding:
+            return shared_binding
+    arrays = {**batch.parameters, **batch.initial}
+    rebuild_reasons: dict[str, str] = {}
+    system, tunables = batch.system, {}
+    for name in dict.fromkeys([*batch.parameters, *batch.initial]):
+        reason = None if name in batch.initial else _rebuild_reason(batch, scenario, name)
+        if reason:
+            rebuild_reasons[name] = reason
+        else:
+            tunables[name] = _tunable_of(name, batch)
+            system = _with_tunable(system, name, batch, float(arrays[name][0]))
+    return ParameterBinding(
+        system, scenario, programs_of(system, scenario), tunables, rebuild_reasons
+    )
+
+
+def value_bounds(batch: Batch) -> dict[str, Bounds]:
+    """Return between which values [SI] the parameters of a batch are."""
+    return {name: (float(min(v)), float(max(v))) for name, v in batch.parameters.items()}
+
+
+def _declared_bounds(batch: Batch, seen_bounds: Mapping[str, Bounds]) -> dict[str, Bounds]:
+    """Return the declared ranges of parameters that have one, where all values are inside."""
+    bounds = {}
+    for name, (low, high) in seen_bounds.items():
+        owner, _, short = name.partition(".")
+        declared = batch.system.instances[owner].automaton.parameters[short].range
+        first, last = map(float, declared) if declared else (low, high)
+        bounds[name] = (first, last) if first <= low and high <= last else (low, high)
+    return bounds
+
+
+def _bind_all_tunable(
+    batch: Batch, scenario: Scenario, bounds: Mapping[str, Bounds]
+) -> ParameterBinding | None:
+    """Return the Programs in which all names are tunable, where nothing but values differs."""
+    names = list(dict.fromkeys([*batch.parameters, *batch.initial]))
+    systems, program_sets = [], []
+    try:
+        for end in range(2):
+            system = batch.system
+            for name in names:
+                value = bounds[name][end] if name in bounds else 0.0
+                system = _with_tunable(system, name, batch, value)
+            systems.append(system)
+            program_sets.append(programs_of(system, scenario))
+    except SpecError:
+        return None
+    if any(_is_not_real(program_sets[0], name) for name in names):
+        return None
+    low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in program_sets)
+    tunables = {name: _tunable_of(name, batch) for name in names}
+    return (
+        ParameterBinding(systems[0], scenario, program_sets[0], tunables, {}, bounds)
+        if low == high
+        else None
+    )
+
+
+def group_variants(batch: Batch) -> list[ProgramGroup]:
+    """Return the variants of a batch by the values that need a Program of their own."""
+    binding = bind_parameters(batch)
+    if not binding.rebuild_reasons:
+        return [ProgramGroup(np.arange(batch.count), binding)]
+    names = list(binding.rebuild_reasons)
+    table = np.stack([batch.parameters[name] for name in names], axis=1)
+    rows, row_of_variant = np.unique(table, axis=0, return_inverse=True)
+    result = []
+    for number, row in enumerate(rows):
+        system = binding.system
+        for name, value in zip(names, row.tolist(), strict=True):
+            system = _with_parameter_value(system, name, value)
+        programs = programs_of(system, binding.scenario)
+        group_binding = dataclasses.replace(binding, system=system, programs=programs)
+        result.append(
+            ProgramGroup(np.flatnonzero(row_of_variant.reshape(-1) == number), group_binding)
+        )
+    return result
+
+
+def require_known_names(batch: Batch) -> None:
+    """Raise ValueError for a name that is not there, or for arrays of another length."""
+    for name in batch.parameters:
+        owner, _, short = name.partition(".")
+        instance = batch.system.instances.get(owner)
+        if instance is None or short not in instance.automaton.parameters:
+            raise ValueError(f"`{name}` is no parameter of {batch.system.name}")
+        if instance.automaton.parameters[short].table is not None:
+            raise ValueError(f"`{name}` is a table: a batch varies numbers")
+    for name in batch.initial:
+        owner, _, short = name.partition(".")
+        instance = batch.system.instances.get(owner)
+        if instance is None or short not in instance.automaton.states:
+            raise ValueError(f"`{name}` is no state of {batch.system.name}")
+    arrays = {**batch.parameters, **batch.initial}
+    arrays |= {name: table.values for name, table in batch.inputs.items()}
+    for name, values in arrays.items():
+        if len(values) != batch.count or not np.all(np.isfinite(values)):
+            raise ValueError(f"`{name}` needs {batch.count} finite values")
+    if len(batch.variant_inputs) not in (0, batch.count):
+        raise ValueError(
+            f"{len(batch.variant_inputs)} courses are not those of {batch.count} variants"
+        )
+    for name, table in batch.inputs.items():
+        if name not in batch.system.inputs:
+            raise ValueError(f"`{name}` is no input of {batch.system.name}")
+        if (
+            not table.starts
+            or table.starts[0] != 0
+            or table.values.shape[1:] != (len(table.starts),)
+        ):
+            raise ValueError(f"`{name}` needs a value for each start, the first at 0 s")
+    known = (*batch.system.signals, *batch.system.inputs)
+    for name in (*batch.outputs, *(measure.signal for measure in batch.statistics)):
+        if name not in known:
+            raise ValueError(f"`{name}` is no signal of {batch.system.name}")
+
+
+def _without_initial(scenario: Scenario, batch: Batch) -> Scenario:
+    kept = {name: value for name, value in scenario.initial.items() if name not in batch.initial}
+    signals = tuple(dict.fromkeys([*batch.outputs, *(m.signal for m in batch.statistics)]))
+    return dataclasses.replace(scenario, initial=kept, signals=signals or scenario.signals[:1])
+
+
+def _tunable_of(name: str, batch: Batch) -> tuple[str, str]:
+    owner, _, short = name.partition(".")
+    return owner, INITIAL_PARAMETER.format(short) if name in batch.initial else short
+
+
+def _with_tunable(system: System, name: str, batch: Batch, first: float) -> System:
+    """Return a system in which a name is tunable; a parameter has the value `first` until then."""
+    owner, _, short = name.partition(".")
+    automaton = system.instances[owner].automaton
+    parameters, states = dict(automaton.parameters), dict(automaton.states)
+    if name not in batch.initial:
+        return _with_tunable_parameter(_with_parameter_value(system, name, first), owner, short)
+    state, fresh = states[short], INITIAL_PARAMETER.format(short)
+    key, span = f"parameters.{fresh}", state.span
+    parameters[fresh] = Parameter(fresh, "tunable", state.unit, Fraction(0), None, None, key, span)
+    formula = Formula(Name(fresh, span), state.initial.key)
+    states[short] = dataclasses.replace(state, initial=formula)
+    changed = dataclasses.replace(automaton, parameters=parameters, states=states)
+    return _with_automaton(system, owner, changed)
+
+
+def _with_parameter_value(system: System, name: str, value: float) -> System:
+    """Return the system with a parameter set, in an automaton and in the model that it knows."""
+    owner, _, short = name.partition(".")
+    exact = Fraction(repr(float(value)))  # the decimal that was meant: a wait of 2 ms is two ticks
+
+    def with_value(automaton: Automaton) -> Automaton:
+        old = automaton.parameters.get(short)
+        if old is None:
+            return automaton
+        kind = "fixed" if old.kind == "derived" else old.kind
+        new = dataclasses.replace(old, value=exact, derived=None, kind=kind)
+        model = automaton.model and with_value(automaton.model)
+        parameters = {**automaton.parameters, short: new}
+        return dataclasses.replace(automaton, parameters=parameters, model=model)
+
+    return _with_automaton(system, owner, with_value(system.instances[owner].automaton))
+
+
+def _with_automaton(system: System, owner: str, automaton: Automaton) -> System:
+    instance = dataclasses.replace(system.instances[owner], automaton=automaton)
+    return dataclasses.replace(system, instances={**system.instances, owner: instance})
+
+
+def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
+    """Return why a parameter needs a Program per value: more than a calibration follows from it."""
+    owner, _, short = name.partition(".")
+    values = batch.parameters[name]
+    own = _single_instance_system(batch.system, owner)
+    ends = [
+        _with_parameter_value(own, name, end)
+        for end in sorted({float(min(values)), float(max(values))})
+    ]
+    for system in ends:
+        programs_of(system, scenario)
+    try:
+        candidate_programs = [
+            programs_of(_with_tunable_parameter(system, owner, short), scenario)[owner]
+            for system in ends
+        ]
+    except SpecError as error:
+        return f"{error.problems[0].label}: a Program for each value"
+    if _is_not_real({owner: candidate_programs[0]}, name):
+        return f"`{name}` is a whole number in C: a Program for each value"
+    if len({digest(_without_values(program)) for program in candidate_programs}) == 1:
+        return None
+    return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
+
+
+def _is_not_real(programs: Mapping[str, Program], name: str) -> bool:
+    """Tell whether a tunable is no real in its Program: a wait is kept in ticks."""
+    owner, _, own = name.partition(".")
+    constants = programs[owner].constants if owner in programs else ()
+    return any(c.name == f"calibration.{own}" and c.type != "real" for c in constants)
+
+
+def _single_instance_system(system: System, owner: str) -> System:
+    """Return a system of one instance: its Program does not depend on those of the others."""
+    connections = {key: wire for key, wire in system.connections.items() if key[0] == owner}
+    instances = {owner: system.instances[owner]}
+    return dataclasses.replace(system, instances=instances, connections=connections)
+
+
+def _without_values(program: Program) -> Program:
+    """Return a Program in which tunables, and what follows from them, have no value."""
+    constants = tuple(
+        dataclasses.replace(c, value=0.0) if c.kind in ("tunable", "derived") else c
+        for c in program.constants
+    )
+    return dataclasses.replace(program, constants=constants)
+
+
+def _with_tunable_parameter(system: System, owner: str, short: str) -> System:
+    automaton = system.instances[owner].automaton
+    parameter = dataclasses.replace(automaton.parameters[short], kind="tunable")
+    parameters = {**automaton.parameters, short: parameter}
+    return _with_automaton(system, owner, dataclasses.replace(automaton, parameters=parameters))

@@ -1,0 +1,1 @@
+"""Execution of continuous automata: major steps, located events, monitors of ranges."""

@@ -1,0 +1,49 @@
+"""Cruise: whole major steps, one after the other, as long as nothing happens in them."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from engine.execution.range_monitor import RangeMonitor
+from engine.interpreter.interpreter import Stepper
+from language.ir.program import Program
+
+
+class FastPath:
+    """The common case of a continuous automaton whose inputs stand still and nobody watches.
+
+    Steps are counted, so no exact time is needed between them.
+    """
+
+    def __init__(self, program: Program, stepper: Stepper, ranges: RangeMonitor) -> None:
+        """Take the automaton and what tells that all of it is finite and in its range."""
+        self._stepper = stepper
+        self._ranges = ranges
+        self._step = program.major_step
+        self._h = float(program.major_step)
+        self._happened = stepper.make_reader(("work.event", "work.left"))
+
+    def locate_step(self, time: Fraction) -> tuple[int, bool]:
+        """Return the last major step up to a time, and whether the time is after it."""
+        step = self._step
+        number, rest = divmod(time.numerator * step.denominator, time.denominator * step.numerator)
+        return number, rest > 0
+
+    def advance(self, first: int, last: int) -> tuple[int, bool]:
+        """Go from one major step to another; return the one reached, and whether more was done.
+
+        That is the first segment of a step in which something happens: it flowed and elapsed. The
+        inputs are latched.
+        """
+        run, put, h = self._stepper.run, self._stepper.set, self._h
+        is_inside, happened = self._ranges.is_inside, self._happened
+        while first < last:
+            put("work.left", h)
+            run("limit")
+            run("flow")
+            run("elapse")
+            is_event, left = happened()
+            if is_event or left > 0.0 or not is_inside():
+                return first, True
+            first += 1
+        return first, False

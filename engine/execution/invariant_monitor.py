@@ -1,0 +1,44 @@
+"""Invariant watch: an assertion about a mode that does not hold is an event, never forced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+from engine.interpreter.interpreter import Stepper
+from engine.results.trajectory import Event
+from language.ir.program import InvariantInfo, Program
+
+INVARIANT_BLOCK = "invariants"
+
+
+class InvariantMonitor:
+    """The invariants of one automaton; each is reported when it ceases to hold."""
+
+    def __init__(
+        self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
+    ) -> None:
+        """Look at the active modes whenever asked."""
+        self._name, self._program, self._stepper, self._log = name, program, stepper, log
+        self._regions = program.mode_variables()
+        self._broken: set[str] = set()
+
+    def check(self, time: Fraction) -> None:
+        """Report what has ceased to hold since the last look; equations are those of now."""
+        if not self._program.invariants:
+            return
+        self._stepper.run(INVARIANT_BLOCK)
+        for info in self._program.invariants:
+            active = self._stepper.get(self._regions[info.region]) == info.mode
+            if not active or self._stepper.get(info.variable):
+                self._broken.discard(info.variable)
+            elif info.variable not in self._broken:
+                self._broken.add(info.variable)
+                self._log(invariant_event(self._name, self._program, info, float(time)))
+
+
+def invariant_event(name: str, program: Program, info: InvariantInfo, time: float) -> Event:
+    """Return the event of an invariant that ceases to hold at a time [s]."""
+    mode = program.mode_name(info.mode, info.region)
+    place = (name, f"invariant {info.name}", mode, mode, info.region)
+    return Event(time, 0, *place, kind="invariant", message=info.message)

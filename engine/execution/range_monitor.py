@@ -1,0 +1,64 @@
+"""Range watch: leaving a declared range is a named event of the trajectory (rule 18)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from operator import le
+
+from engine.interpreter.interpreter import Stepper
+from engine.results.trajectory import Event
+from language.ir.program import Program, unqualified_name
+from language.programs.simulation_assembly import RANGE_TOLERANCE
+
+FINITE_RANGE = (-sys.float_info.max, sys.float_info.max)
+"""The range of a state that has none of its own."""
+
+
+class RangeMonitor:
+    """The ranges of one continuous automaton: never clamped, each leaving is reported once."""
+
+    def __init__(
+        self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
+    ) -> None:
+        """Watch the states and discrete variables that have a range."""
+        self._name, self._program, self._stepper, self._log = name, program, stepper, log
+        self._bounds = {v.name: v.range for v in program.variables if v.range is not None}
+        self._read = stepper.make_reader(tuple(self._bounds))
+        self._outside: set[str] = set()
+        states = [v.name for v in program.variables if v.name.startswith("state.")]
+        limits = {**dict.fromkeys(states, FINITE_RANGE), **self._bounds}
+        self._read_all = stepper.make_reader(tuple(limits))
+        self._lows = tuple(low for low, _ in limits.values())
+        self._highs = tuple(high for _, high in limits.values())
+
+    def is_inside(self) -> bool:
+        """Tell whether all states are finite, and nothing is or was outside its range."""
+        values = self._read_all()
+        is_inside = all(map(le, self._lows, values)) and all(map(le, values, self._highs))
+        return is_inside and not self._outside
+
+    def check(self, time: Fraction) -> None:
+        """Report what has left its range since the last look."""
+        for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
+            slack = RANGE_TOLERANCE * (high - low)
+            if low - slack <= value <= high + slack:
+                self._outside.discard(variable)
+            elif variable not in self._outside:
+                self._outside.add(variable)
+                mode = self._program.mode_name(self._stepper.get("memory.mode"))
+                text = format_range_violation(variable, value, low, high)
+                self._log(
+                    range_event(float(time), self._name, unqualified_name(variable), mode, text)
+                )
+
+
+def format_range_violation(variable: str, value: float, low: float, high: float) -> str:
+    """Return what is told of a variable outside its range."""
+    return f"`{unqualified_name(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
+
+
+def range_event(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
+    """Return the event of a signal that left its range, in a mode."""
+    return Event(time, 0, instance, f"range {signal}", mode, mode, kind="range", message=message)

@@ -1,0 +1,1 @@
+"""Interpretation of a Program: blocks, statements and expressions as closures."""

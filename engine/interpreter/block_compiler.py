@@ -1,0 +1,289 @@
+"""Closures: the blocks of a Program as Python functions over one frame of values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from engine.interpreter import expression_closures as shapes, statement_closures as actions
+from engine.interpreter.expression_closures import ExpressionClosure, Frame
+from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
+from engine.interpreter.statement_closures import StatementClosure
+from engine.interpreter.value_frame import RANGE_VIOLATIONS, FrameLayout, frame_layout_of
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Count,
+    Expr,
+    FaultBit,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Select,
+    Store,
+    Switch,
+    Unary,
+    Value,
+)
+from language.ir.program import Function, Program
+from language.ir.traversal import expr_names, substitute_variable
+from language.numerics.evaluate import BINARY_OPERATIONS
+
+MAX_FUSED_ASSIGNMENTS = 4
+"""Most assignments in one function (engine/interpreter/statement_closures.py)."""
+MAX_UNROLLED_TURNS = 8
+"""Loops of at most so many turns have a copy of their body for each: indices become constants."""
+
+
+class _InnerOperation(NamedTuple):
+    """An operation inside another: both operators, and its slots."""
+
+    operators: tuple[str, str]
+    slots: tuple[int, int]
+
+
+class BlockCompiler:
+    """From operations to closures; constant parts are evaluated once, with the same operations."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
+        self.arithmetic = ARITHMETIC_OF_TYPE[program.number_type]
+        value = self.arithmetic.to_frame_value
+        self.scope = frame_layout_of(program)
+        fixed = ("constant.", "solved.")
+        scalars = [c for c in program.constants if c.name.startswith(fixed) and not c.items]
+        self.fixed = {c.name: value(c.value) for c in scalars}
+        self.functions: dict[str, Callable[..., Any]] = {}
+        for function in sorted(program.functions, key=lambda f: _call_depth(f, program.functions)):
+            self.functions[function.name] = self._compile_function(function)
+        reals = [v.name for v in program.variables if v.type == "real"]
+        reals += [c.name for c in program.constants if c.type == "real"]
+        self.reals = frozenset(reals)
+        self._done: dict[str, StatementClosure] = {}
+        self.blocks = {name: self._compile_named_block(name) for name in program.blocks}
+
+    def _compile_function(self, function: Function) -> Callable[..., Any]:
+        """Return a function of Python: its frame is its arguments, then its own variables."""
+        names = _local_names(function)
+        outer = self.scope
+        self.scope = FrameLayout(
+            {name: slot for slot, name in enumerate(names)}, [None] * len(names)
+        )
+        act = self._compile_block(function.body)
+        y, count = self.scope.slots["work.y"], len(function.parameters)
+        rest = self.scope.values[count:]
+        self.scope = outer
+
+        def call(*values: Any) -> Any:
+            frame: Frame = [*values, *rest]
+            act(frame)
+            return frame[y]
+
+        return call
+
+    def _compile_named_block(self, name: str) -> StatementClosure:
+        if name not in self._done:
+            self._done[name] = self._compile_block(self.program.blocks[name])
+        return self._done[name]
+
+    def _compile_block(self, block: Block) -> StatementClosure:
+        statements: list[StatementClosure] = []
+        pending: list[Assign] = []
+        for op in block:
+            if pending and not (isinstance(op, Assign) and self._can_fuse(pending, op)):
+                statements.append(self._compile_assignments(pending))
+                pending = []
+            if isinstance(op, Assign):
+                pending.append(op)
+            else:
+                statements.append(self._compile_operation(op))
+        return actions.sequence(
+            [*statements, *([self._compile_assignments(pending)] if pending else [])]
+        )
+
+    def _can_fuse(self, pending: Sequence[Assign], op: Assign) -> bool:
+        """Tell whether an assignment is done in one function with those before it."""
+        alike = (self._operand_slot(pending[-1].value) is None) == (
+            self._operand_slot(op.value) is None
+        )
+        return alike and len(pending) < MAX_FUSED_ASSIGNMENTS
+
+    def _compile_assignments(self, assignments: Sequence[Assign]) -> StatementClosure:
+        targets = [self.scope.slots[op.target] for op in assignments]
+        sources = [self._operand_slot(op.value) for op in assignments]
+        if None not in sources:
+            return actions.copy(targets, [slot for slot in sources if slot is not None])
+        return actions.assign(targets, [self._compile_expression(op.value) for op in assignments])
+
+    def _compile_operation(self, op: Op) -> StatementClosure:
+        slots = self.scope.slots
+        match op:
+            case Assign():
+                return self._compile_assignments([op])
+            case Store(array, index, value):
+                return actions.store(
+                    slots[array], self._compile_expression(index), self._compile_expression(value)
+                )
+            case Branch(condition, then, other):
+                two = self._compile_block(then), self._compile_block(other)
+                return actions.branch(self._compile_expression(condition), *two)
+            case Switch(selector, cases):
+                table = {number: self._compile_block(block) for number, block in cases}
+                return actions.switch_case(slots[selector], table)
+            case Loop(count, index, body) if count <= MAX_UNROLLED_TURNS and _is_indexed(body):
+                turns = [substitute_variable(body, index, k) for k in range(count)]
+                last = Assign(index, Value(count - 1))
+                return self._compile_block((*(op for turn in turns for op in turn), last))
+            case Loop(count, index, (Branch(condition, then, ()),)) if index not in expr_names(
+                condition
+            ):
+                more = self._compile_expression(condition)
+                return actions.loop_while(count, slots[index], more, self._compile_block(then))
+            case Loop(count, index, body):
+                return actions.loop(count, slots[index], self._compile_block(body))
+            case Count(timer, condition, limit, _):
+                return actions.count_while(slots[timer], self._compile_expression(condition), limit)
+            case FaultBit(fault, signal, is_set):
+                slot, bit = slots["memory.faults"], self.faults[fault]
+                left = slots[RANGE_VIOLATIONS]
+                return (
+                    actions.set_fault(slot, bit, signal, left)
+                    if is_set
+                    else actions.clear_fault(slot, bit)
+                )
+            case RunBlock(name):
+                return self._compile_named_block(name)
+
+    def _operand_slot(self, expr: Expr) -> int | None:
+        """Return the slot of an operand that is read without a function of its own."""
+        return self._find_slot(expr)
+
+    def _find_slot(self, expr: Expr) -> int | None:
+        """Return where a value stands that needs no operation."""
+        if isinstance(expr, Ref) and expr.name in self.scope.slots:
+            return self.scope.slots[expr.name]
+        if _is_constant(expr, self.fixed):
+            return self.scope.slot_of_literal(self._fold_constant(expr))
+        return None
+
+    def _compile_expression(self, expr: Expr) -> ExpressionClosure:
+        place = self._find_slot(expr)
+        if place is not None:
+            return shapes.load_slot(place)
+        match expr:
+            case Item(name, index) if _is_constant(index, {}):
+                return shapes.load_element(self.scope.slots[name], self._fold_constant(index))
+            case Item(name, index):
+                return shapes.load_item(self.scope.slots[name], self._compile_expression(index))
+            case Unary("-", operand):
+                return shapes.negate(self._compile_expression(operand))
+            case Unary(_, operand):
+                return shapes.logical_not(self._compile_expression(operand))
+            case Binary("and", Compare(">=", a, low), Compare("<=", b, high)):
+                return self._compile_range_test(a, low, b, high) or self._compile_binary(
+                    "and", expr.left, expr.right
+                )
+            case Binary(operator, left, right) | Compare(operator, left, right):
+                return self._compile_binary(operator, left, right)
+            case Select(condition, then, other):
+                parts = [self._compile_expression(part) for part in (condition, then, other)]
+                return shapes.select(*parts)
+            case Call(function, arguments):
+                known = self.functions.get(function) or self.arithmetic.elementary[function]
+                return shapes.call_function(
+                    known, [self._compile_expression(argument) for argument in arguments]
+                )
+            case _:
+                raise TypeError(f"not an expression: {expr!r}")
+
+    def _compile_range_test(self, *parts: Expr) -> ExpressionClosure | None:
+        slots = [self._operand_slot(part) for part in parts]
+        found = [slot for slot in slots if slot is not None]
+        return shapes.range_test(*found) if len(found) == len(slots) else None
+
+    def _compile_binary(self, operator: str, left: Expr, right: Expr) -> ExpressionClosure:
+        """Return the function of two operands; an inner operation of two slots is part of it."""
+        a, b = self._operand_slot(left), self._operand_slot(right)
+        if a is not None and b is not None:
+            return shapes.SLOT_SLOT[operator](a, b)
+        if b is not None:
+            if inner := self._match_inner_operation(operator, left):
+                return shapes.FUSED_LEFT[inner.operators](*inner.slots, b)
+            return shapes.EXPRESSION_SLOT[operator](self._compile_expression(left), b)
+        inner = self._match_inner_operation(operator, right)
+        if a is not None:
+            if inner:
+                return shapes.FUSED_RIGHT[inner.operators](a, *inner.slots)
+            return shapes.SLOT_EXPRESSION[operator](a, self._compile_expression(right))
+        if inner:
+            return shapes.EXPRESSION_FUSED[inner.operators](
+                self._compile_expression(left), *inner.slots
+            )
+        return shapes.EXPRESSION_EXPRESSION[operator](
+            self._compile_expression(left), self._compile_expression(right)
+        )
+
+    def _match_inner_operation(self, outer_operator: str, expr: Expr) -> _InnerOperation | None:
+        """Return the operation of two slots that an operand is, if there is a shape for it."""
+        if not isinstance(expr, Binary) or (outer_operator, expr.operator) not in shapes.FUSED_LEFT:
+            return None
+        a, b = self._operand_slot(expr.left), self._operand_slot(expr.right)
+        if a is None or b is None:
+            return None
+        return _InnerOperation((outer_operator, expr.operator), (a, b))
+
+    def _fold_constant(self, expr: Expr) -> Any:
+        match expr:
+            case Value(value):
+                return self.arithmetic.to_frame_value(value)
+            case Ref(name):
+                return self.fixed[name]
+            case Unary("-", operand):
+                return -self._fold_constant(operand)
+            case Binary("/", left, right):
+                return self.arithmetic.divide(self._fold_constant(left), self._fold_constant(right))
+            case Binary(operator, left, right):
+                return BINARY_OPERATIONS[operator](
+                    self._fold_constant(left), self._fold_constant(right)
+                )
+            case _:
+                raise TypeError(f"not foldable: {expr!r}")
+
+
+def _is_constant(expr: Expr, constants: Mapping[str, float]) -> bool:
+    match expr:
+        case Value():
+            return True
+        case Ref(name):
+            return name in constants
+        case Unary("-", operand):
+            return _is_constant(operand, constants)
+        case Binary(_, left, right):
+            return _is_constant(left, constants) and _is_constant(right, constants)
+        case _:
+            return False
+
+
+def _is_indexed(body: Block) -> bool:
+    """Tell whether a loop reads or sets elements, and nothing in it has a body of its own."""
+    return all(isinstance(op, Assign | Store) for op in body) and "Item(" in repr(body)
+
+
+def _local_names(function: Function) -> list[str]:
+    targets = [op.target for op in function.body if isinstance(op, Assign)]
+    parameters = [f"work.{name}" for name in function.parameters]
+    return list(dict.fromkeys([*parameters, "work.y", *targets]))
+
+
+def _call_depth(function: Function, functions: tuple[Function, ...]) -> int:
+    """How many functions a function calls, directly or through others: callees come first."""
+    text = repr(function.body)
+    called = [f for f in functions if f is not function and f"function='{f.name}'" in text]
+    return sum(1 + _call_depth(f, functions) for f in called)

@@ -1,0 +1,221 @@
+"""Actions: what operations do, as Python functions over one frame; several in a row as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from engine.interpreter.expression_closures import ExpressionClosure, Frame
+
+StatementClosure = Callable[[Frame], None]
+
+
+def no_op(v: Frame) -> None:
+    """Do nothing."""
+
+
+def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
+    """Return what does some actions one after the other."""
+    match [action for action in statements if action is not no_op]:
+        case []:
+            return no_op
+        case [only]:
+            return only
+        case [first, second]:
+
+            def two(v: Frame) -> None:
+                first(v)
+                second(v)
+
+            return two
+        case [first, second, third]:
+
+            def three(v: Frame) -> None:
+                first(v)
+                second(v)
+                third(v)
+
+            return three
+        case all_statements:
+
+            def act(v: Frame) -> None:
+                for action in all_statements:
+                    action(v)
+
+            return act
+
+
+def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> StatementClosure:
+    """Return what sets one to four variables, one after the other."""
+    match targets, values:
+        case [s], [a]:
+
+            def one(v: Frame) -> None:
+                v[s] = a(v)
+
+            return one
+        case [s, t], [a, b]:
+
+            def two(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+
+            return two
+        case [s, t, u], [a, b, c]:
+
+            def three(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+                v[u] = c(v)
+
+            return three
+        case [s, t, u, w], [a, b, c, d]:
+
+            def four(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+                v[u] = c(v)
+                v[w] = d(v)
+
+            return four
+    raise ValueError(f"{len(targets)} variables")
+
+
+def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
+    """Return what copies one to four variables, one after the other."""
+    match targets, sources:
+        case [s], [a]:
+
+            def one(v: Frame) -> None:
+                v[s] = v[a]
+
+            return one
+        case [s, t], [a, b]:
+
+            def two(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+
+            return two
+        case [s, t, u], [a, b, c]:
+
+            def three(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+                v[u] = v[c]
+
+            return three
+        case [s, t, u, w], [a, b, c, d]:
+
+            def four(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+                v[u] = v[c]
+                v[w] = v[d]
+
+            return four
+    raise ValueError(f"{len(targets)} variables")
+
+
+def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> StatementClosure:
+    """Return what sets one element of an array."""
+
+    def act(v: Frame) -> None:
+        v[slot][index(v)] = value(v)
+
+    return act
+
+
+def branch(
+    condition: ExpressionClosure, if_true: StatementClosure, if_false: StatementClosure
+) -> StatementClosure:
+    """Return what does one of two actions; a condition changes nothing."""
+    if if_true is no_op and if_false is no_op:
+        return no_op
+    if if_false is no_op:
+
+        def act_or_not(v: Frame) -> None:
+            if condition(v):
+                if_true(v)
+
+        return act_or_not
+
+    def act(v: Frame) -> None:
+        if condition(v):
+            if_true(v)
+        else:
+            if_false(v)
+
+    return act
+
+
+def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementClosure:
+    """Return what does the action of the number that a variable has."""
+    if all(action is no_op for action in table.values()):
+        return no_op
+
+    def act(v: Frame) -> None:
+        table.get(v[slot], no_op)(v)
+
+    return act
+
+
+def loop(count: int, slot: int, body: StatementClosure) -> StatementClosure:
+    """Return what does an action a number of times."""
+
+    def act(v: Frame) -> None:
+        for index in range(count):
+            v[slot] = index
+            body(v)
+
+    return act
+
+
+def loop_while(
+    count: int, slot: int, condition: ExpressionClosure, body: StatementClosure
+) -> StatementClosure:
+    """Return what does an action a number of times, but no longer than a condition holds.
+
+    Once that is false it stays so: nothing else is done in the loop.
+    """
+
+    def act(v: Frame) -> None:
+        for index in range(count):
+            v[slot] = index
+            if not condition(v):
+                break
+            body(v)
+
+    return act
+
+
+def count_while(slot: int, condition: ExpressionClosure, limit: int) -> StatementClosure:
+    """Return what counts up to a limit while a condition holds, else back to 0."""
+
+    def act(v: Frame) -> None:
+        if condition(v):
+            number = v[slot]
+            v[slot] = number + 1 if number < limit else limit
+        else:
+            v[slot] = 0
+
+    return act
+
+
+def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> StatementClosure:
+    """Return what sets a fault bit, and notes the signal that left its range."""
+
+    def act(v: Frame) -> None:
+        v[slot] |= bit
+        if signal:
+            v[violations_slot][signal] = None
+
+    return act
+
+
+def clear_fault(slot: int, bit: int) -> StatementClosure:
+    """Return what clears a fault bit."""
+
+    def act(v: Frame) -> None:
+        v[slot] &= ~bit
+
+    return act

@@ -1,0 +1,1 @@
+"""Readers of recordings: CSV, Parquet, MF4 and CAN logs."""

@@ -1,0 +1,174 @@
+"""Recorded CAN: frames of a log (candump, ASC, BLF), decoded by the DBC files of the map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from engine.recordings.recording_file import (
+    RecordedFile,
+    Samples,
+    exact_fraction,
+    require_size,
+    unreadable_error,
+)
+from language.model.system import RecordingMap
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
+from language.text.project_files import path_exists, project_root_of, require_inside_project
+
+DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
+"""Endings of files that say what CAN frames mean; DBC is the usual one."""
+CanFrame = tuple[float, bytes]
+FrameKey = tuple[int, bool]
+"""Number of a frame, and whether it is an extended one."""
+
+
+def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
+    """Read a log of CAN frames. Raises SpecError, ToolMissing (no python-can, cantools)."""
+    source = Source(display_path(path))
+    require_size(path, source)
+    try:
+        import can
+        import cantools
+    except ImportError:
+        raise MissingToolError(
+            "a log of CAN frames needs the packages `python-can` and `cantools`: "
+            "pip install 'modewright[can]'"
+        ) from None
+    if not mapping.databases:
+        problems = Problems()
+        label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
+        problems.error("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")
+        raise SpecError(problems.reported)
+    messages = _read_databases(mapping, cantools)
+    frames = _read_frames(path, source, can)
+    return _CanLog(source, messages, frames).to_recorded_file()
+
+
+def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]:
+    problems = Problems()
+    found: dict[FrameKey, Any] = {}
+    for written in mapping.databases:
+        folders = (Path(written.span.source.name).parent, Path())
+        paths = [folder / written.text for folder in folders if path_exists(folder / written.text)]
+        if not paths:
+            problems.error("unreadable", written.span, f"there is no file `{written.text}`")
+            continue
+        if paths[0].suffix.lower() not in DATABASE_SUFFIXES:
+            label = f"`{written.text}` is not a DBC file by its name"
+            problems.error(
+                "unreadable", written.span, label, f"it ends with {DATABASE_SUFFIXES[0]}"
+            )
+            continue
+        with problems.collect_errors():
+            require_inside_project(
+                paths[0], written.span, project_root_of(Path(written.span.source.name))
+            )
+            try:
+                database = cantools.database.load_file(paths[0])
+                found |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
+            except Exception as error:  # of a broken file the library raises whatever it meets
+                label = f"`{written.text}` cannot be understood: {_first_line(error)}"
+                problems.error("unreadable", written.span, label)
+    problems.raise_if_errors()
+    return found
+
+
+def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[CanFrame]]:
+    readers = {".blf": can.BLFReader, ".asc": can.ASCReader, ".log": can.CanutilsLogReader}
+    found: dict[FrameKey, list[CanFrame]] = {}
+    try:
+        with readers[path.suffix.lower()](str(path)) as log:
+            for frame in log:
+                if not (frame.is_error_frame or frame.is_remote_frame):
+                    key = (frame.arbitration_id, frame.is_extended_id)
+                    found.setdefault(key, []).append((frame.timestamp, bytes(frame.data)))
+    except Exception as error:  # of a broken file the library raises whatever it meets
+        raise unreadable_error(
+            source, f"understood as a log of CAN frames: {_first_line(error)}"
+        ) from None
+    return found
+
+
+class _CanLog:
+    """The frames of a log by the messages of its databases."""
+
+    def __init__(
+        self, source: Source, messages: dict[FrameKey, Any], frames: dict[FrameKey, list[CanFrame]]
+    ) -> None:
+        self.source = source
+        self.messages = messages
+        self.frames = frames
+        self.decoded: dict[FrameKey, list[dict[str, Any]]] = {}
+        self.places: dict[str, list[tuple[FrameKey, Any]]] = {}
+        for key, message in messages.items():
+            for signal in message.signals:
+                self.places.setdefault(signal.name, []).append((key, signal))
+                self.places.setdefault(f"{message.name}.{signal.name}", []).append((key, signal))
+
+    def to_recorded_file(self) -> RecordedFile:
+        """Return the signals whose messages are in the log."""
+        names = [
+            name for name, found in self.places.items() for key, _ in found if key in self.frames
+        ]
+        count = sum(len(frames) for frames in self.frames.values())
+        return RecordedFile(
+            self.source,
+            "signal",
+            names,
+            self.samples,
+            count,
+            True,
+            explain_missing=self.explain_missing,
+        )
+
+    def explain_missing(self, name: str) -> str:
+        """Say why a signal is not there."""
+        for key, _ in self.places.get(name, []):
+            message = self.messages[key]
+            return f"its message `{message.name}` ({key[0]:#x}) is not in the log"
+        if not any(key in self.messages for key in self.frames):
+            return f"the DBC has none of the {len(self.frames)} messages of the log"
+        return ""
+
+    def samples(self, name: str) -> Samples:
+        """Return the values of a signal."""
+        ((key, signal),) = [place for place in self.places[name] if place[0] in self.frames]
+        decoded = self._decode(key)
+        frames = self.frames[key]
+        values: list[float | None] = [_to_float(values.get(signal.name)) for values in decoded]
+        return Samples(
+            values,
+            lambda k: repr(values[k]),
+            lambda k: Span(self.source, k + 1, 1),
+            [exact_fraction(time) for time, _ in frames],
+            signal.unit or "",
+        )
+
+    def _decode(self, key: FrameKey) -> Sequence[dict[str, Any]]:
+        if key not in self.decoded:
+            message, found = self.messages[key], []
+            for k, (time, data) in enumerate(self.frames[key], start=1):
+                try:
+                    found.append(message.decode(data, decode_choices=False))
+                except Exception as error:
+                    label = f"frame {k} of message `{message.name}`, at {time:.6g} s, has "
+                    label += (
+                        f"{len(data)} bytes, the DBC says {message.length}: {_first_line(error)}"
+                    )
+                    problems = Problems()
+                    problems.error("value", Span(self.source, k, 1), label)
+                    raise SpecError(problems.reported) from None
+            self.decoded[key] = found
+        return self.decoded[key]
+
+
+def _to_float(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip().splitlines()
+    return text[0].rstrip(".") if text else type(error).__name__

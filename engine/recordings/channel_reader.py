@@ -1,0 +1,248 @@
+"""Channel reader: the values of a recorded file in SI, each with its time, by the map's columns."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from engine.recordings.csv_reader import DECIMAL
+from engine.recordings.recording_file import MAX_PROBLEMS, RecordedFile, Samples
+from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
+from language.model.system import ColumnMapping, RecordingMap
+from language.text.diagnostic import Problems, Span, suggest_name
+
+MAX_STAMP_LENGTH = 40
+TIME_LIMIT = 10**12
+"""Time stamps are below this, in their unit."""
+STAMP_PATTERN = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+STAMP_LINES = re.compile(rf"(?:{STAMP_PATTERN}\n)*+{STAMP_PATTERN}", re.ASCII)
+"""Numbers without an exponent alone, one a line: most columns of time are such."""
+STAMP_CACHE_SIZE = 2**16
+"""Time stamps that are kept: recordings of one logger have the same ones."""
+POWERS_OF_TEN = [10**k for k in range(MAX_STAMP_LENGTH + 1)]
+LOGGER_UNITS = {
+    "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
+    "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
+}  # fmt: skip
+"""Units as loggers and DBC files write them."""
+
+
+def require_names(
+    file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
+) -> None:
+    """Report names that a map reads and a file lacks or has twice, and a file without values."""
+    for name in dict.fromkeys(names):
+        count = list(file.names).count(name)
+        if not count:
+            label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
+            hint = file.explain_missing(name) or suggest_name(name, file.names)
+            problems.error("column", file.head, label, hint)
+        elif count > 1:
+            problems.error("column", file.head, f"there are two {file.noun}s `{name}`")
+    if not file.rows:
+        label = "the recording has a head line and no values"
+        if file.is_stamped:
+            label = "the recording has no values"
+        problems.error("empty", file.head, label)
+
+
+class ChannelReader:
+    """Reads channels of a file by a map, with exact time stamps."""
+
+    def __init__(self, file: RecordedFile, mapping: RecordingMap, problems: Problems) -> None:
+        """Read the time that the rows share; what is wrong is reported into `problems`."""
+        self.file = file
+        self.mapping = mapping
+        self.problems = problems
+        self.clock = [] if file.is_stamped else self.times(mapping.time)
+
+    @cached_property
+    def shared_times(self) -> tuple[Fraction, ...]:
+        """The time stamps that the rows share; empty where one is blank."""
+        known = tuple(time for time in self.clock if time is not None)
+        return known if len(known) == len(self.clock) else ()
+
+    @property
+    def has_max_problems(self) -> bool:
+        """Tell whether so many problems were found that the rest is not looked at."""
+        return len(self.problems.reported) >= MAX_PROBLEMS
+
+    def times(self, name: str) -> list[Fraction | None]:
+        """Return the time stamps of a column [s]; None where it is blank."""
+        samples = self.file.read(name)
+        factor = self.mapping.time_unit.factor
+        plain = None if self.has_max_problems else _parse_plain_stamps(samples)
+        if plain is not None:
+            return [value * factor for value in plain] if factor != 1 else [*plain]
+        found: list[Fraction | None] = []
+        last: Fraction | None = None
+        rounded = -math.inf
+        for k in range(len(samples.values)):
+            if self.has_max_problems:
+                break
+            text = samples.text(k)
+            value = _parse_stamp(text)
+            if value is not None:
+                value = value * factor if factor != 1 else value
+            elif name == self.mapping.time or text:
+                label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
+                self.problems.error("time", samples.place(k), label)
+            if value is not None:
+                number = samples.values[k] or 0.0
+                if last is not None and number <= rounded and value <= last:
+                    self._report_unsorted(text, last, samples.place(k))
+                last, rounded = value, number
+            found.append(value)
+        return found
+
+    def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
+        label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+        hint = "sort the recording, and remove repeated rows"
+        self.problems.error("time", place, label, hint)
+
+    def _own_stamps(
+        self, column: ColumnMapping, parts: Sequence[Samples]
+    ) -> Sequence[Fraction | None]:
+        """Return the stamps that the parts of a column carry themselves."""
+        stamps = parts[0].stamps or ()
+        if any(part.stamps != stamps for part in parts[1:]):
+            label = f"the {self.file.noun}s of `{column.name}` do not have the same time stamps"
+            hint = "a mean is taken of values that were measured together"
+            self.problems.error("time", column.span, label, hint)
+        for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
+            if after <= before and not self.has_max_problems:
+                self._report_unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+        return stamps
+
+    def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
+        """Return time stamps [s] and values in SI of a column of the map."""
+        parts = [self.file.read(name) for name in column.columns]
+        if self.file.is_stamped:
+            stamps = self._own_stamps(column, parts)
+        else:
+            stamps = self.times(column.time) if column.time else self.clock
+        cells = [
+            self._values(name, part, column)
+            for name, part in zip(column.columns, parts, strict=True)
+        ]
+        times: list[Fraction] = []
+        values_si: list[float] = []
+        scale = float(column.scale[0]) * column.sign
+        means = cells[0] if len(cells) == 1 else _row_means(cells)
+        if stamps is self.clock and len(self.shared_times) == len(means) > 0 and not column.delay:
+            values = _scale_all(means, scale)
+            if values is not None:
+                return self.shared_times, tuple(values)
+        for k, (stamp, mean) in enumerate(zip(stamps, means, strict=False)):
+            if mean is None:
+                continue
+            if stamp is None:
+                if column.time and not self.file.read(column.time).text(k):
+                    label = f"a value of `{column.name}` without a time stamp"
+                    self.problems.error("time", parts[0].place(k), label)
+                continue
+            value = mean * scale
+            if not math.isfinite(value):
+                place = parts[0].place(k)
+                self.problems.error("value", place, f"`{column.name}` is {value} in SI")
+            times.append(stamp + column.delay if column.delay else stamp)
+            values_si.append(value)
+        if not times and not self.problems.has_errors:
+            label = f"{self.file.noun} `{column.columns[0]}` has no values"
+            self.problems.error("empty", self.file.head, label)
+        return tuple(times), tuple(values_si)
+
+    def _values(self, name: str, samples: Samples, column: ColumnMapping) -> list[float | None]:
+        factor, offset = float(column.unit.factor), float(column.unit.offset)
+        self._check_unit(name, samples.unit, column)
+        plain = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
+        if plain is not None:
+            return [*plain]
+        found: list[float | None] = []
+        for k, value in enumerate(samples.values):
+            if self.has_max_problems:
+                break
+            if value is not None and not math.isfinite(value):
+                label = f"`{samples.text(k)}` in {self.file.noun} `{name}` is not a finite number"
+                self.problems.error("value", samples.place(k), label)
+                value = None
+            elif value is None and column.blank == "refuse":
+                label = f"{self.file.noun} `{name}` has no value here"
+                hint = "`blank: skip` in the map leaves empty cells out"
+                self.problems.error("value", samples.place(k), label, hint)
+            found.append(None if value is None else value * factor + offset)
+        return found
+
+    def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
+        """A unit that the file itself gives, where we know it, is that of the map."""
+        unit = file_unit(written)
+        if unit is None:
+            return
+        text = unit.text
+        same = are_compatible(unit.dimension, column.unit.dimension)
+        if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
+            label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
+            self.problems.error("unit", column.span, label, f"`unit: {text}` in the map")
+
+
+def file_unit(written: str) -> Unit | None:
+    """Return the unit that a logger or a DBC file writes, where we know it."""
+    try:
+        return parse_unit(LOGGER_UNITS.get(written, written))
+    except UnitError:
+        return None
+
+
+def _scale_all(
+    values: Sequence[float | None], factor: float, offset: float | None = None
+) -> list[float] | None:
+    """Return values scaled, all at once; None where there is one that is none or is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        known = np.array(values, dtype=np.float64)
+        found = known * factor if offset is None else known * factor + offset
+    return found.tolist() if np.isfinite(known).all() and np.isfinite(found).all() else None
+
+
+def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
+    """Return the mean of each row; None where one has no value."""
+    found: list[float | None] = []
+    for row in zip(*columns, strict=False):
+        total = 0.0
+        for cell in row:
+            total += cell or 0.0
+        found.append(None if None in row else total / len(row))
+    return found
+
+
+def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
+    """Return time stamps that grow and have no exponent, all at once; None for any others."""
+    numbers = [value for value in samples.values if value is not None]
+    is_growing = all(after > before for before, after in itertools.pairwise(numbers))
+    if not numbers or len(numbers) < len(samples.values) or not is_growing:
+        return None
+    texts = [samples.text(k) for k in range(len(numbers))]
+    if not STAMP_LINES.fullmatch("\n".join(texts)) or max(map(len, texts)) > MAX_STAMP_LENGTH:
+        return None
+    found = [_parse_plain_stamp(text) for text in texts]
+    return found if max(-found[0], found[-1]) < TIME_LIMIT else None
+
+
+@lru_cache(STAMP_CACHE_SIZE)
+def _parse_plain_stamp(text: str) -> Fraction:
+    whole, _, part = text.partition(".")
+    return Fraction(int(whole + part), POWERS_OF_TEN[len(part)])
+
+
+def _parse_stamp(text: str) -> Fraction | None:
+    if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
+        return None
+    whole, _, part = text.partition(".")
+    is_plain = "e" not in text and "E" not in text
+    value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
+    return value if abs(value.numerator) < TIME_LIMIT * value.denominator else None

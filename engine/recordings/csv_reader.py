@@ -1,0 +1,147 @@
+"""Recorded CSV: a text with a head line, also gzipped; every cell knows its line and column."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import math
+import re
+import zlib
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+
+from engine.recordings.recording_file import MAX_BYTES, MAX_PROBLEMS, RecordedFile, Samples
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source, Span
+
+DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+"""A number: longer ones, and words such as `nan`, are none."""
+
+DECIMAL_BYTES = b"+-.0123456789"
+"""What most numbers are made of: where `float` takes such a text, it is a number."""
+MAX_PLAIN_LINE = 100_000
+"""A line that is shorter has no cell that is too long for a CSV reader."""
+
+
+def read_csv(path: Path, problems: Problems) -> RecordedFile:
+    """Read a CSV file; rows that do not fit the head line are reported. Raises SpecError."""
+    source = Source(display_path(path))
+    lines = _read_lines(path, source)
+    source = Source(source.name, tuple(lines))
+    rows = _CsvRows(source, problems)
+    return RecordedFile(source, "column", rows.head, rows.samples, len(rows.rows))
+
+
+def _read_lines(path: Path, source: Source) -> list[str]:
+    problems = Problems()
+    place = Span(source, 1, 1)
+    text = ""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.raise_if_errors()
+        data = path.read_bytes()
+        if path.suffix == ".gz":
+            data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.raise_if_errors()
+        text = data.decode("utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        problems.error("unreadable", place, f"the recording cannot be read: {reason}")
+    except (zlib.error, EOFError) as error:
+        problems.error("unreadable", place, f"the recording cannot be unpacked: {error}")
+    except UnicodeDecodeError:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    problems.raise_if_errors()
+    if "\0" in text:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    elif not text.strip():
+        problems.error("empty", place, "the recording is empty")
+    problems.raise_if_errors()
+    return text.splitlines()
+
+
+class _CsvRows:
+    """The cells of a CSV text, each with its place."""
+
+    def __init__(self, source: Source, problems: Problems) -> None:
+        self.source = source
+        self.head: list[str] = []
+        self.numbers: list[int] = []
+        self.rows: list[list[str]] = []
+        if len(problems.reported) >= MAX_PROBLEMS or not self._split_all_rows():
+            self._parse_each_row(problems)
+
+    def _split_all_rows(self) -> bool:
+        """Take all rows at once where none has quotes and all as many cells; tell whether so."""
+        lines = self.source.lines
+        if '"' in "".join(lines) or max(map(len, lines)) >= MAX_PLAIN_LINE:
+            return False
+        numbers = [number for number, line in enumerate(lines, start=1) if line.strip()]
+        rows = [lines[number - 1].split(",") for number in numbers]
+        if len(set(map(len, rows))) > 1:
+            return False
+        self.head = [cell.strip() for cell in rows[0]]
+        self.numbers, self.rows = numbers[1:], rows[1:]
+        return True
+
+    def _parse_each_row(self, problems: Problems) -> None:
+        for number, line in enumerate(self.source.lines, start=1):
+            if not line.strip():
+                continue
+            row = self._parse_row(number, line, problems)
+            if not self.head:
+                self.head = [cell.strip() for cell in row]
+            elif len(row) != len(self.head):
+                label = f"this row has {len(row)} cells, the head line has {len(self.head)}"
+                hint = "a recording is separated by commas, with decimal points"
+                problems.error("row", Span(self.source, number, 1, len(line)), label, hint)
+            else:
+                self.numbers.append(number)
+                self.rows.append(row)
+            if len(problems.reported) >= MAX_PROBLEMS:
+                break
+
+    def _parse_row(self, number: int, line: str, problems: Problems) -> list[str]:
+        if '"' not in line and len(line) < MAX_PLAIN_LINE:
+            return line.split(",")
+        try:
+            return next(csv.reader([line], strict=True))
+        except csv.Error as error:
+            problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
+            return [""] * len(self.head)
+
+    @cached_property
+    def columns(self) -> list[tuple[str, ...]]:
+        """The cells of each column."""
+        return list(zip(*self.rows, strict=True)) or [()] * len(self.head)
+
+    def samples(self, name: str) -> Samples:
+        """Return the cells of a column."""
+        position = self.head.index(name)
+        texts = list(map(str.strip, self.columns[position]))
+
+        def place(k: int) -> Span:
+            line, row = self.numbers[k], self.rows[k]
+            column = 1 + sum(len(cell) + 1 for cell in row[:position])
+            return Span(self.source, line, column, max(1, len(row[position])))
+
+        return Samples(_parse_numbers(texts), texts.__getitem__, place)
+
+
+def _parse_numbers(texts: list[str]) -> list[float | None]:
+    """Return the number of each cell, None for an empty one, NaN for what is none."""
+    with suppress(ValueError):
+        if not "".join(texts).encode().translate(None, DECIMAL_BYTES):
+            return list(map(float, texts))
+    return [_parse_number(text) for text in texts]
+
+
+def _parse_number(text: str) -> float | None:
+    if not text:
+        return None
+    return float(text) if DECIMAL.fullmatch(text) else math.nan

@@ -1,0 +1,40 @@
+"""Recorded Parquet: a table of numbers; places are rows, counted from 1."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from engine.recordings.recording_file import RecordedFile, Samples, require_size, unreadable_error
+from engine.results.parquet import import_pyarrow
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Source, Span
+
+
+def read_parquet(path: Path) -> RecordedFile:
+    """Read a Parquet file. Raises SpecError, ToolMissing (no pyarrow)."""
+    source = Source(display_path(path))
+    require_size(path, source)
+    arrow = import_pyarrow("a Parquet file")
+    try:
+        table = arrow.parquet.read_table(path)
+    except (OSError, arrow.ArrowException) as error:
+        first = str(error).splitlines()[0]
+        raise unreadable_error(source, f"understood as Parquet: {first}") from None
+
+    def read(name: str) -> Samples:
+        cells = table.column(name).to_pylist()
+
+        def text(k: int) -> str:
+            return "" if cells[k] is None else repr(cells[k])
+
+        return Samples([_to_float(cell) for cell in cells], text, lambda k: Span(source, k + 1, 1))
+
+    return RecordedFile(source, "column", table.column_names, read, table.num_rows)
+
+
+def _to_float(cell: Any) -> float | None:
+    if cell is None:
+        return None
+    return float(cell) if isinstance(cell, int | float) else math.nan

@@ -1,0 +1,171 @@
+"""Recording: a measured file as channels, each value with its own exact time stamp."""
+
+from __future__ import annotations
+
+import dataclasses
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.recordings.channel_reader import ChannelReader, require_names
+from engine.recordings.csv_reader import read_csv
+from engine.recordings.recording_file import RecordedFile, require_regular_file
+from engine.recordings.recording_window import file_of, windows_of
+from language.model.system import ColumnMapping, RecordingMap, Window
+from language.overlays.expand_document import display_path
+from language.text.diagnostic import Problems, Source
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One signal: time stamps [s], exact and increasing, and values in SI, both (n_samples,)."""
+
+    column: ColumnMapping
+    times: tuple[Fraction, ...]
+    values: tuple[float, ...]
+
+    @cached_property
+    def seconds(self) -> NDArray[np.float64]:
+        """Time stamps [s] (n_samples,), rounded."""
+        return np.array([time.numerator / time.denominator for time in self.times])
+
+    @cached_property
+    def array(self) -> NDArray[np.float64]:
+        """Values in SI (n_samples,)."""
+        return np.array(self.values)
+
+    def slice_samples(self, selection: slice) -> Channel:
+        """Return a stretch of the samples."""
+        found = Channel(self.column, self.times[selection], self.values[selection])
+        vars(found).update(seconds=self.seconds[selection], array=self.array[selection])
+        return found
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The channels that a map takes from a file, by the name in the map.
+
+    `windows` [s] are the times to use, in order; where there is none, all is used.
+    """
+
+    name: str
+    channels: dict[str, Channel]
+    end: Fraction
+    start: Fraction = Fraction(0)
+    windows: tuple[Window, ...] = ()
+
+    def is_used(self, time: Fraction) -> bool:
+        """Tell whether a time [s] is in one of the windows."""
+        return not self.windows or any(start <= time <= end for start, end in self.windows)
+
+
+def split_by_windows(recording: Recording) -> list[Recording]:
+    """Return a recording as one for each of its windows."""
+    return [crop(recording, window) for window in recording.windows] or [recording]
+
+
+def crop(recording: Recording, window: Window) -> Recording:
+    """Return what a recording has in a window; a channel without a value there is left out."""
+    channels = {}
+    for name, channel in recording.channels.items():
+        first = bisect_left(channel.times, window[0])
+        last = bisect_right(channel.times, window[1])
+        if first < last:
+            channels[name] = channel.slice_samples(slice(first, last))
+    start, end = max(window[0], recording.start), min(window[1], recording.end)
+    return Recording(recording.name, channels, end, start, (window,))
+
+
+def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
+    """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a log of CAN frames.
+
+    `run.csv@0..12.5` is the part of a file from 0 s to 12.5 s.
+
+    Raises SpecError with all problems, ToolMissing.
+    """
+    problems = Problems()
+    file = open_recording(path, mapping, problems)
+    columns = [mapping.columns[name] for name in used]
+    wanted = [name for column in columns for name in column.columns]
+    if not file.is_stamped:
+        if not mapping.time:
+            label = f"map `{mapping.name}` names no column of time, which this file needs"
+            problems.error("missing", mapping.span, label, "`time: {column: t_s, unit: s}`")
+            problems.raise_if_errors()
+        wanted = [mapping.time, *wanted, *[column.time for column in columns if column.time]]
+    require_names(file, wanted, mapping, problems)
+    problems.raise_if_errors()
+    reader = ChannelReader(file, mapping, problems)
+    channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
+    problems.raise_if_errors()
+    _share_seconds(channels.values())
+    ends = [*reader.clock[:1], *reader.clock[-1:]]
+    if file.is_stamped:
+        ends = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
+    known = [time for time in ends if time is not None]
+    windows = windows_of(path, mapping, problems)
+    problems.raise_if_errors()
+    return crop_to_windows(Recording(path.name, channels, max(known), min(known), windows), mapping)
+
+
+def _share_seconds(channels: Iterable[Channel]) -> None:
+    """Let channels that were sampled together have the same array of seconds."""
+    first: dict[int, Channel] = {}
+    for channel in channels:
+        together = first.setdefault(id(channel.times), channel)
+        vars(channel)["seconds"] = together.seconds
+
+
+def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
+    """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
+    path = file_of(path)
+    require_regular_file(path, Source(display_path(path)))
+    ending = path.suffix.lower()
+    if ending == ".parquet":
+        from engine.recordings.parquet_reader import read_parquet
+
+        return read_parquet(path)
+    if ending in (".mf4", ".mdf") or (ending == ".dat" and _is_mdf(path)):
+        from engine.recordings.mdf_reader import read_mdf
+
+        return read_mdf(path)
+    if ending in (".blf", ".asc", ".log"):
+        from engine.recordings.can_reader import read_can
+
+        return read_can(path, mapping)
+    return read_csv(path, problems)
+
+
+def _is_mdf(path: Path) -> bool:
+    """Tell whether a file starts as MDF does; `.dat` may be anything."""
+    try:
+        with path.open("rb") as file:
+            return file.read(3) == b"MDF"
+    except OSError:
+        return False
+
+
+def crop_to_windows(recording: Recording, mapping: RecordingMap) -> Recording:
+    """Return a recording from the start of its first window to the end of its last one.
+
+    Raises SpecError for a window in which a channel has no value.
+    """
+    if not recording.windows:
+        return recording
+    problems = Problems()
+    for piece in split_by_windows(recording):
+        for name in recording.channels.keys() - piece.channels.keys():
+            (start, end), *_ = piece.windows
+            label = f"`{name}` has no value from {float(start):g} s to {float(end):g} s"
+            hint = f"{recording.name} goes from {float(recording.start):g} s to "
+            hint += f"{float(recording.end):g} s"
+            problems.error("range", mapping.span, label + ", a window of this map", hint)
+    problems.raise_if_errors()
+    whole = crop(recording, (recording.windows[0][0], recording.windows[-1][1]))
+    return dataclasses.replace(whole, windows=recording.windows)

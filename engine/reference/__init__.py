@@ -1,0 +1,1 @@
+"""Reference simulations by solvers of scipy, to check the engine against."""

@@ -1,0 +1,243 @@
+"""Library stepper: a continuous Program whose flow is integrated by scipy.
+
+Of the Program only its field (`rates_<mode>`, `guards_<mode>`) and its instants (`init`,
+`equations`, `watch`, `jump`) are kept; crossings are halved on the library's dense output.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from engine.execution.event_loop import SimulationStopped
+from engine.interpreter.interpreter import Interpreter
+from language.ir.program import ModeInfo, Program, unqualified_name
+from language.ir.regions import CHART
+
+ScipyMethod = Literal["DOP853", "Radau", "LSODA"]
+"""Explicit of order 8 and implicit of order 5 (Hairer, Norsett, Wanner, Solving Ordinary
+Differential Equations I, II.5, and II, IV.8); switching between stiff and not (Petzold 1983)."""
+SCIPY_METHODS: tuple[ScipyMethod, ...] = ("DOP853", "Radau", "LSODA")
+StateVector = list[float]
+Solution = Callable[[float], StateVector]
+"""The states in SI at a time [s] since the start of a flow."""
+Reals = NDArray[np.float64]
+
+INTEGRATION_BLOCKS = (
+    "flow",
+    "dense",
+    "peek",
+    "point",
+    "move_",
+    "step",
+    "series_",
+    "locate_",
+    "look_",
+    "segment",
+    "settle",
+)
+"""What the blocks that integrate or locate are named, or how their names begin."""
+RTOL = 1e-11
+"""Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
+MIN_SCALE = 1e-9
+"""Size in SI [unit of the state] below which a state counts as 0: keeps rounding out of steps."""
+MAX_EVALUATIONS = 100_000
+"""Rates evaluated in one flow: 6000 steps of DOP853 within a major step are no progress."""
+GUARD_CHECKS = 4
+"""Looks at the guards per flow, evenly spread: shorter pulses than a quarter step may be missed."""
+BISECTIONS = 52
+"""Halvings of the bracket of a crossing: 1 ms / 4 / 2^52 = 6e-20 s, below one ULP of any time."""
+
+
+def without_integration(program: Program) -> Program:
+    """Return a continuous Program without its blocks that integrate or locate."""
+    blocks = {
+        n: block for n, block in program.blocks.items() if not n.startswith(INTEGRATION_BLOCKS)
+    }
+    return dataclasses.replace(program, blocks=blocks)
+
+
+def evaluated_guards(program: Program, mode: ModeInfo) -> tuple[str, ...]:
+    """Return the endings of the guard variables that are evaluated in a mode of the chart."""
+    infos = program.transitions
+    found = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
+    return tuple(dict.fromkeys(found))
+
+
+class ScipyStepper:
+    """A continuous Program whose `flow` is scipy's; every other block is interpreted."""
+
+    def __init__(self, program: Program, method: ScipyMethod = "DOP853") -> None:
+        """Take the Program; its own motion is left out, so it cannot be run by mistake."""
+        self.program = program
+        self.method = method
+        self._inner = Interpreter(without_integration(program))
+        names = [v.name for v in program.variables if v.name.startswith("state.")]
+        self._names = tuple(unqualified_name(name) for name in names)
+        self._states = self._inner.make_reader(tuple(names))
+        self._rates = self._inner.make_reader(tuple(f"work.rate_{name}" for name in self._names))
+        self._sizes = np.full(len(names), MIN_SCALE)
+        self._time = 0.0
+        timed = ("work.rise_", "memory.age")
+        self._is_timed = any(v.name.startswith(timed) for v in program.variables)
+        self._guards = {}
+        levels = [v.name for v in program.variables if v.name.startswith("memory.level_")]
+        for mode in program.modes:
+            slots = evaluated_guards(program, mode)
+            guards = (f"work.guard_{slot}" for slot in slots)
+            before = (f"memory.armed_{slot}" for slot in slots)
+            now = self._inner.make_reader(
+                (*guards, *(f"work.{unqualified_name(name)}" for name in levels))
+            )
+            armed = self._inner.make_reader((*before, *levels))
+            self._guards[mode.name] = (now, armed)
+
+    def get(self, name: str) -> Any:
+        """Return the value of a variable or constant, `group.name`."""
+        return self._inner.get(name)
+
+    def set(self, name: str, value: float | int | bool) -> None:
+        """Set a variable."""
+        self._inner.set(name, value)
+
+    def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+        """Return a function that returns the values of some variables."""
+        return self._inner.make_reader(names)
+
+    def pop_range_violations(self) -> tuple[str, ...]:
+        """Return nothing: a continuous automaton is never held in a range."""
+        return ()
+
+    def run(self, block: str) -> None:
+        """Run a block, `flow` by scipy."""
+        if block == "flow":
+            self._flow(self.get("work.h"))
+        elif block == "peek":
+            self._peek(self.get("work.s"))
+        elif block == "dense":
+            return
+        else:
+            self._inner.run(block)
+
+    def _flow(self, h: float) -> None:
+        """Move the states over h [s], or to the first change of a guard before that."""
+        mode = self.program.mode_name(self.get("memory.mode"))
+        path = self._solve(mode, h)
+        change = self._locate_first_change(mode, path, h)
+        elapsed = h if change is None else change
+        for name, value in zip(self._names, path(elapsed), strict=True):
+            self.set(f"state.{name}", value)
+        self.set("work.elapsed", elapsed)
+        self.set("work.crossed", change is not None)
+        self._time += elapsed
+
+    def _peek(self, h: float) -> None:
+        """Move the states over h [s], whatever the guards do."""
+        mode = self.program.mode_name(self.get("memory.mode"))
+        for name, value in zip(self._names, self._solve(mode, h)(h), strict=True):
+            self.set(f"state.{name}", value)
+
+    def _solve(self, mode: str, h: float) -> Solution:
+        """Return the solution from the states over h [s]. Raises Stopped where there is none."""
+        start: StateVector = list(self._states())
+        first = self._rates_at(mode, start, 0.0)
+        for name, value, rate in zip(self._names, start, first, strict=True):
+            if not (math.isfinite(value) and math.isfinite(rate)):
+                raise SimulationStopped(
+                    f"{self._describe_instant(mode)}: state `{name}` is {value}, its rate {rate}"
+                )
+        if not start:
+            return lambda time: []
+        moved = np.maximum(np.abs(start), h * np.abs(first))
+        self._sizes = np.maximum(self._sizes, moved)
+        solution = self._solve_ivp(mode, start, h)
+        end: StateVector = solution.y[:, -1].tolist()
+
+        def path(time: float) -> StateVector:
+            if time == h:
+                return end
+            point: StateVector = solution.sol(time).tolist()
+            return point
+
+        return path
+
+    def _solve_ivp(self, mode: str, start: StateVector, h: float) -> Any:
+        """Return scipy's solution over h [s], with its polynomial.
+
+        No step is longer than a major step; Radau and LSODA, whose polynomials are of lower order
+        than their steps, take at least as many steps as there are looks at the guards.
+        """
+        evaluations = 0
+
+        def rates(time: float, point: Reals) -> StateVector:
+            nonlocal evaluations
+            evaluations += 1
+            if evaluations > MAX_EVALUATIONS:
+                raise SimulationStopped(
+                    f"{self._describe_instant(mode)}: more than {MAX_EVALUATIONS} rates in one flow"
+                )
+            return self._rates_at(mode, point.tolist(), float(time))
+
+        longest = h if self.method == "DOP853" else h / GUARD_CHECKS
+        options = {"rtol": RTOL, "atol": RTOL * self._sizes, "max_step": longest}
+        with np.errstate(over="ignore", invalid="ignore"):  # such a step is rejected by its error
+            solution = solve_ivp(
+                rates,
+                (0.0, h),
+                start,
+                self.method,
+                dense_output=True,
+                first_step=longest,
+                **options,
+            )
+        if not solution.success:
+            raise SimulationStopped(f"{self._describe_instant(mode)}: scipy: {solution.message}")
+        return solution
+
+    def _locate_first_change(self, mode: str, path: Solution, h: float) -> float | None:
+        """Return when [s] the first guard changes, on the far side; None if none does."""
+        if not self._guards[mode][0]():
+            return None
+        low = 0.0
+        for look in range(1, GUARD_CHECKS + 1):
+            high = h * (look / GUARD_CHECKS)
+            if self._has_guard_changed(mode, path(high), high):
+                return self._bisect(mode, path, low, high)
+            low = high
+        return None
+
+    def _bisect(self, mode: str, path: Solution, low: float, high: float) -> float:
+        """Return the upper end of the bracket (low, high] [s]: a guard has changed there."""
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            if self._has_guard_changed(mode, path(middle), middle):
+                high = middle
+            else:
+                low = middle
+        return high
+
+    def _has_guard_changed(self, mode: str, point: StateVector, time: float) -> bool:
+        now, armed = self._guards[mode]
+        self._set_point(point, time)
+        self._inner.run(f"guards_{mode}")
+        return now() != armed()
+
+    def _rates_at(self, mode: str, point: StateVector, time: float) -> StateVector:
+        self._set_point(point, time)
+        self._inner.run(f"rates_{mode}")
+        return list(self._rates())
+
+    def _set_point(self, point: StateVector, time: float) -> None:
+        if self._is_timed:
+            self._inner.set("work.s", time)
+        for name, value in zip(self._names, point, strict=True):
+            self._inner.set(f"work.at_{name}", value)
+
+    def _describe_instant(self, mode: str) -> str:
+        return f"t = {self._time:.9g} s, `{self.program.name}` in mode `{mode}`"

@@ -1,0 +1,1 @@
+"""Results of a run: the trajectory, files, comparison and plots."""

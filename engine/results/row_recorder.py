@@ -1,0 +1,113 @@
+"""Rows: what is recorded of a run - every signal that was asked for, at every row's time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.results.trajectory import SignalArray as Column, column_array
+from language.expressions.units import display_unit
+from language.ir.program import Program, ValueType
+from language.lowering.connection_program import output_block
+from language.model.declaration import Formula
+from language.model.system import Scenario, System
+
+RowValues = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class RecordedColumn:
+    """A recorded signal: the name, its type and unit, and the output block or signal it reads."""
+
+    name: str
+    type: ValueType
+    unit: str
+    block: str | None
+    source: str
+
+
+def recorded_columns(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> tuple[RecordedColumn, ...]:
+    """Return what is recorded: the scenario's choice, else outputs of all and expressions."""
+    known: dict[str, RecordedColumn] = {}
+    for name, thing in system.inputs.items():
+        kind: ValueType = "truth" if thing.is_bool else "real"
+        known[name] = RecordedColumn(name, kind, str(thing.unit.dimension), None, name)
+    default_names: list[str] = []
+    for owner, program in programs.items():
+        for wire in program.outputs:
+            name = f"{owner}.{wire.name}"
+            known[name] = RecordedColumn(name, wire.type, display_unit(wire.unit), None, name)
+            default_names.append(name)
+    for name, sensor in system.sensors.items():
+        known[name] = RecordedColumn(name, "real", str(sensor.dimension), None, name)
+        default_names.append(name)
+    for name, output in system.outputs.items():
+        if isinstance(output, Formula):
+            dimension = system.dimensions.get(name)
+            kind = "real" if dimension else "truth"
+            block = output_block(name)
+            known[name] = RecordedColumn(name, kind, str(dimension or "1"), block, name)
+            default_names.append(name)
+        else:
+            part = known[output]
+            known[name] = RecordedColumn(
+                name, part.type, display_unit(part.unit), None, part.source
+            )
+    return tuple(known[name] for name in scenario.signals or default_names)
+
+
+class RowRecorder:
+    """The rows of a run, in the order of time."""
+
+    def __init__(self, columns: tuple[RecordedColumn, ...]) -> None:
+        """Take what is recorded."""
+        self.columns = columns
+        self.times: list[Fraction] = []
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(
+        self,
+        time: Fraction,
+        read: Callable[[str], Any],
+        formula: Callable[[str, Callable[[str], Any]], Any],
+    ) -> None:
+        """Add the row of a time: `read` gives a signal, `formula` evaluates an output."""
+        self.times.append(time)
+        row = [formula(c.block, read) if c.block else read(c.source) for c in self.columns]
+        self._rows.append(tuple(row))
+
+    def make_row_picker(self, names: Sequence[str]) -> Callable[[RowValues], RowValues] | None:
+        """Return what picks a row out of the values of some signals; None if they are too few."""
+        if any(column.block or column.source not in names for column in self.columns):
+            return None
+        places = [names.index(column.source) for column in self.columns]
+        return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
+
+    def extend(self, times: Sequence[Fraction], rows: Iterable[RowValues]) -> None:
+        """Add rows that are complete."""
+        self.times += times
+        self._rows += rows
+
+    def signals(self) -> dict[str, Column]:
+        """Return the values of each signal (n_rows,)."""
+        columns = list(zip(*self._rows, strict=True)) if self._rows else [()] * len(self.columns)
+        return {
+            column.name: column_array(column.type, values)
+            for column, values in zip(self.columns, columns, strict=True)
+        }
+
+    def units(self) -> dict[str, str]:
+        """Return the unit of each signal."""
+        return {column.name: column.unit for column in self.columns}
+
+    def seconds(self) -> NDArray[np.float64]:
+        """Return the times [s] (n_rows,)."""
+        return np.array([float(time) for time in self.times])

@@ -1,0 +1,260 @@
+"""Difference: two runs signal by signal, and where their modes disagree."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.results.trajectory import Event, SignalArray, Trajectory
+from language.ir.regions import CHART
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SignalDifference:
+    """One signal: RMS, largest difference and its time [s], and when it first left `allowed`.
+
+    All in the signal's SI unit; infinite where only one of the two is a number.
+    """
+
+    name: str
+    unit: str
+    rms: float
+    largest: float
+    at: float
+    allowed: float
+    first: float | None
+
+
+@dataclass(frozen=True)
+class ModeWindow:
+    """A stretch of time [s] in which the modes of a mode signal disagree, both by name."""
+
+    signal: str
+    start: float
+    end: float
+    a: str
+    b: str
+
+
+@dataclass(frozen=True)
+class ModeSequence:
+    """The transitions of one automaton, or of a region of it, in both runs.
+
+    `parted` is the first position at which they are not the same (None: never); `apart` is the
+    largest distance in time [s] of two that are the same, before that.
+    """
+
+    instance: str
+    count_a: int
+    count_b: int
+    parted: int | None
+    apart: float
+
+
+@dataclass(frozen=True)
+class RunDifference:
+    """All differences of two runs over the span [s] that both cover."""
+
+    span: tuple[float, float]
+    samples: int
+    signals: tuple[SignalDifference, ...]
+    windows: tuple[ModeWindow, ...]
+    sequences: tuple[ModeSequence, ...]
+    only_a: tuple[str, ...]
+    only_b: tuple[str, ...]
+    uncovered: float
+
+    @property
+    def is_within(self) -> bool:
+        """Tell whether nothing is beyond its tolerance, missing, or outside the common span."""
+        lacking = self.only_a or self.only_b or self.uncovered > 0.0 or self.windows
+        parted = any(sequence.parted is not None for sequence in self.sequences)
+        return not lacking and not parted and all(item.first is None for item in self.signals)
+
+    @property
+    def first(self) -> tuple[float, str] | None:
+        """When and in what the runs part first."""
+        found = [(item.first, item.name) for item in self.signals if item.first is not None]
+        found += [(window.start, window.signal) for window in self.windows]
+        return min(found, default=None)
+
+
+def compare_runs(
+    a: Trajectory,
+    b: Trajectory,
+    *,
+    relative: float = 0.0,
+    tolerances: Mapping[str, float] | None = None,
+    slack: float = 0.0,
+    patterns: Sequence[str] = (),
+    span: tuple[float, float] | None = None,
+) -> RunDifference:
+    """Compare two runs at the samples of `a`; `b` is read between its samples if need be.
+
+    A signal may differ by `relative` times its peak in `a`, or by its tolerance (keys are patterns
+    of names, values in SI); without either, by nothing. Modes may disagree for `slack` [s].
+    Raises ValueError for runs without common time or signal, and for different units.
+    """
+    names = [name for name in a.signals if _matches(name, patterns)]
+    common = [name for name in names if name in b.signals]
+    times, uncovered = _common_times(a, b, span)
+    _require_comparable(a, b, common, tolerances or {})
+    modes = [name for name in common if name in a.modes or name in b.modes]
+    signals = []
+    for name in common:
+        if name not in modes:
+            allowed = _tolerance_of(name, a, relative, tolerances or {})
+            signals.append(_compare_signal(name, a, b, times, allowed))
+    windows = [found for name in modes for found in _mode_windows(name, a, b, times)]
+    bounds = (float(times[0]), float(times[-1]))
+    return RunDifference(
+        span=bounds,
+        samples=len(times),
+        signals=tuple(signals),
+        windows=tuple(found for found in windows if found.end - found.start > slack),
+        sequences=tuple(_compare_mode_sequences(a, b, common, bounds)),
+        only_a=tuple(name for name in names if name not in b.signals),
+        only_b=tuple(n for n in b.signals if n not in a.signals and _matches(n, patterns)),
+        uncovered=uncovered,
+    )
+
+
+def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
+    """Return a signal at given times (n,): reals on straight lines, whole numbers held."""
+    values = trajectory.signals[name]
+    if trajectory.times.tobytes() == times.tobytes():
+        return values.astype(np.float64)
+    if values.dtype == np.int64:
+        return _hold_previous(trajectory.times, values, times).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        found: Reals = np.interp(times, trajectory.times, values)
+    return found
+
+
+def _hold_previous(sample_times: Reals, values: SignalArray, times: Reals) -> SignalArray:
+    return values[np.maximum(np.searchsorted(sample_times, times, side="right") - 1, 0)]
+
+
+def _common_times(
+    a: Trajectory, b: Trajectory, span: tuple[float, float] | None
+) -> tuple[Reals, float]:
+    """Return the times of `a` that both cover, and how many seconds only one covers."""
+    if not len(a.times) or not len(b.times):
+        raise ValueError("a run without samples cannot be compared")
+    wanted = span or (-np.inf, np.inf)
+    starts = [max(float(run.times[0]), wanted[0]) for run in (a, b)]
+    ends = [min(float(run.times[-1]), wanted[1]) for run in (a, b)]
+    times = a.times[(a.times >= max(starts)) & (a.times <= min(ends))]
+    if not len(times):
+        raise ValueError("the runs have no time in common")
+    return times, max(starts) - min(starts) + max(ends) - min(ends)
+
+
+def _require_comparable(
+    a: Trajectory, b: Trajectory, common: Sequence[str], tolerances: Mapping[str, float]
+) -> None:
+    if not common:
+        raise ValueError("the runs have no signal in common")
+    for name in common:
+        if a.units[name] != b.units[name]:
+            raise ValueError(f"`{name}` is in `{a.units[name]}` and in `{b.units[name]}`")
+    for pattern in tolerances:
+        if not fnmatch.filter(common, pattern):
+            raise ValueError(f"no common signal matches the tolerance of `{pattern}`")
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _tolerance_of(
+    name: str, run: Trajectory, relative: float, tolerances: Mapping[str, float]
+) -> float:
+    values = np.abs(run.signals[name].astype(np.float64))
+    peak = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+    given = [value for pattern, value in tolerances.items() if fnmatch.fnmatchcase(name, pattern)]
+    return max([relative * peak, *given])
+
+
+def _compare_signal(
+    name: str, a: Trajectory, b: Trajectory, times: Reals, allowed: float
+) -> SignalDifference:
+    ours, theirs = resample_signal(a, name, times), resample_signal(b, name, times)
+    same = (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))
+    with np.errstate(invalid="ignore", over="ignore"):
+        apart = np.where(same, 0.0, np.abs(ours - theirs))
+        apart = np.where(np.isnan(apart), np.inf, apart)
+        rms = float(np.sqrt(np.mean(apart**2)))
+    beyond = np.flatnonzero(apart > allowed)
+    worst = int(np.argmax(apart))
+    first = float(times[beyond[0]]) if len(beyond) else None
+    largest = float(apart[worst])
+    return SignalDifference(name, a.units[name], rms, largest, float(times[worst]), allowed, first)
+
+
+def _mode_windows(name: str, a: Trajectory, b: Trajectory, times: Reals) -> list[ModeWindow]:
+    ours = _mode_names(a, b, name, times)
+    theirs = _mode_names(b, a, name, times)
+    found: list[ModeWindow] = []
+    for k, (one, other) in enumerate(zip(ours, theirs, strict=True)):
+        if one == other:
+            continue
+        end = float(times[min(k + 1, len(times) - 1)])
+        last = found[-1] if found else None
+        if last and last.end == times[k] and (last.a, last.b) == (one, other):
+            found[-1] = ModeWindow(name, last.start, end, one, other)
+        else:
+            found.append(ModeWindow(name, float(times[k]), end, one, other))
+    return found
+
+
+def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> list[str]:
+    names = run.modes.get(name) or other.modes[name]
+    values = run.signals[name]
+    held = (
+        values
+        if run.times.tobytes() == times.tobytes()
+        else _hold_previous(run.times, values, times)
+    )
+    return [names.get(int(number), str(number)) for number in held]
+
+
+def _compare_mode_sequences(
+    a: Trajectory, b: Trajectory, common: Sequence[str], span: tuple[float, float]
+) -> list[ModeSequence]:
+    if not a.modes or not b.modes:
+        return []  # samples alone: what is not known is not compared
+    compared = {name.rpartition(".")[0] for name in common}
+    parts = dict.fromkeys((event.instance, event.region) for event in (*a.events, *b.events))
+    found = []
+    for instance, region in parts:
+        if compared != {""} and instance not in compared:
+            continue
+        ours, theirs = (
+            [
+                event
+                for event in _events_within(run.events_of(instance), span)
+                if event.region == region
+            ]
+            for run in (a, b)
+        )
+        pairs = list(zip(ours, theirs, strict=False))
+        same = next(
+            (k for k, (x, y) in enumerate(pairs) if (x.source, x.target) != (y.source, y.target)),
+            len(pairs),
+        )
+        parted = None if same == len(ours) == len(theirs) else same
+        apart = max((abs(x.time - y.time) for x, y in pairs[:same]), default=0.0)
+        name = instance if region == CHART else f"{instance}.{region}"
+        found.append(ModeSequence(name, len(ours), len(theirs), parted, apart))
+    return found
+
+
+def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
+    return [event for event in events if span[0] <= event.time <= span[1]]

@@ -1,0 +1,125 @@
+"""Trajectory: values over time with modes, and the events in between."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from language.ir.program import Program
+from language.ir.regions import CHART
+from language.text.diagnostic import MissingToolError
+
+if TYPE_CHECKING:
+    from engine.results.plot import Picture
+
+SignalArray = NDArray[np.float64] | NDArray[np.int64]
+TIME_HEADER = "t [s]"
+"""Head of the first column of every table of samples."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A transition: time [s], micro-step at that instant, and what changed.
+
+    In a chart a transition `to: []` has no target: nothing is entered.
+    Of another `kind` is a signal that left its range, or an invariant that ceased to hold:
+    `transition` names it, `message` says how, `source` and `target` are both the mode.
+    """
+
+    time: float
+    micro_step: int
+    instance: str
+    transition: str
+    source: str
+    target: str
+    region: str = CHART
+    kind: Literal["transition", "range", "invariant"] = "transition"
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of signals (n_samples,) each, in SI, and all events up to `stopped`.
+
+    `signals` are keyed `instance.output`; modes are whole numbers, `modes` names them.
+    `stopped` says why the run ended before the horizon; None if it did not. `faults` are the
+    latched fault bits as `instance: fault`; a run with one does not count for accuracy (rule 18).
+    """
+
+    name: str
+    times: NDArray[np.float64]
+    signals: Mapping[str, SignalArray]
+    units: Mapping[str, str]
+    modes: Mapping[str, Mapping[int, str]]
+    events: tuple[Event, ...]
+    stopped: str | None = None
+    faults: tuple[str, ...] = ()
+
+    def events_of(self, instance: str) -> tuple[Event, ...]:
+        """Return the events of one instance."""
+        return tuple(event for event in self.events if event.instance == instance)
+
+    def csv(self) -> str:
+        """Return the samples as CSV: a head line with units, shortest exact decimals."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(column_headers(self))
+        columns = [values.tolist() for values in (self.times, *self.signals.values())]
+        writer.writerows(zip(*columns, strict=True))
+        return text.getvalue()
+
+    def frame(self) -> Any:
+        """Return a pandas DataFrame over time: reals in SI, modes by name, `attrs["units"]`.
+
+        Raises ToolMissing.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingToolError(
+                "a frame needs the package `pandas`: pip install 'modewright[frame]'"
+            ) from None
+        index = pandas.Index(self.times, name=TIME_HEADER)
+        columns = {
+            name: pandas.Categorical.from_codes(
+                np.searchsorted(sorted(self.modes[name]), values),
+                [self.modes[name][number] for number in sorted(self.modes[name])],
+            )
+            if name in self.modes
+            else values
+            for name, values in self.signals.items()
+        }
+        frame = pandas.DataFrame(columns, index=index)
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
+        """Return a picture: signals by unit (patterns such as `plant.*`; all), modes, events."""
+        from engine.results.plot import (
+            draw_overview,  # matplotlib takes a second: only if asked for
+        )
+
+        return draw_overview([self], signals, span)
+
+
+def column_headers(trajectory: Trajectory) -> list[str]:
+    """Return the heads of a table of samples: `name [unit]`, the time first."""
+    return [TIME_HEADER, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
+
+
+def column_array(kind: str, values: Sequence[float | int | bool]) -> SignalArray:
+    """Return the values of one signal (n_samples,): doubles for reals, else whole numbers."""
+    if kind == "real":
+        return np.array(values, dtype=np.float64)
+    return np.array(values, dtype=np.int64)
+
+
+def fault_names(name: str, program: Program, word: int) -> tuple[str, ...]:
+    """Return the names of the latched bits of a fault word, as `instance: fault`."""
+    return tuple(f"{name}: {fault}" for bit, fault in enumerate(program.faults) if word >> bit & 1)

@@ -1,0 +1,1 @@
+"""Simulation and replay of a system: schedule, wiring, sensors, stimuli."""

@@ -1,0 +1,83 @@
+"""Feeding: the inputs of a system's instances, from signals as they are now."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Container, Mapping
+from fractions import Fraction
+
+from engine.execution.event_loop import SimulationStopped
+from engine.interpreter.interpreter import Stepper
+from engine.simulation.signal_values import Signals
+from language.ir.program import Program, unqualified_name
+from language.model.system import Connection, System
+
+
+class InputWiring:
+    """What is connected to each instance, and what a tick has seen of it."""
+
+    def __init__(
+        self,
+        system: System,
+        programs: Mapping[str, Program],
+        steppers: Mapping[str, Stepper],
+        signals: Signals,
+    ) -> None:
+        """Nothing was fed yet."""
+        self.system = system
+        self.programs = programs
+        self.steppers = steppers
+        self.signals = signals
+        self.wires: dict[str, list[Connection]] = {name: [] for name in programs}
+        for (owner, _), connection in system.connections.items():
+            self.wires[owner].append(connection)
+        self._seen: dict[tuple[str, str, str], int] = {}
+        self._flags = self._inputs_with_variable("is_new.")
+        self._limited = self._inputs_with_variable("latched.")
+
+    def _inputs_with_variable(self, group: str) -> set[tuple[str, str]]:
+        """Return the inputs of all instances that have a variable of a group."""
+        return {
+            (name, unqualified_name(variable.name))
+            for name, program in self.programs.items()
+            for variable in program.variables
+            if variable.name.startswith(group)
+        }
+
+    def set_inputs(self, name: str, time: Fraction) -> bool:
+        """Set the inputs of an instance; tell whether one changed. Raises Stopped."""
+        stepper, changed = self.steppers[name], False
+        for connection in self.wires[name]:
+            thing = connection.target[1]
+            value = self.signals.evaluate_connection(connection)
+            kind = self.system.instances[name].automaton.inputs[thing].type
+            if kind != "real":
+                value = bool(value) if kind == "bool" else int(value)
+            before = stepper.get(f"input.{thing}")
+            stepper.set(f"input.{thing}", value)
+            now = stepper.get(f"input.{thing}")
+            if not math.isfinite(now) and (name, thing) not in self._limited:
+                place = describe_instant(name, self.programs[name], stepper, time)
+                raise SimulationStopped(f"{place}: input `{thing}` is {now}")
+            changed = changed or now != before
+        return changed
+
+    def flag_new_inputs(self, name: str, sampling: Container[str]) -> None:
+        """A measured input is new where a sensor that it reads has sampled since the last tick.
+
+        `sampling` are the sensors that sample.
+        """
+        for connection in self.wires[name]:
+            thing = connection.target[1]
+            read = [sensor for sensor in connection.reads if sensor in sampling]
+            if read and (name, thing) in self._flags:
+                counts = {sensor: self.signals.sensors[sensor].count for sensor in read}
+                news = [self._seen.get((name, thing, s), 0) != n for s, n in counts.items()]
+                self._seen.update({(name, thing, s): count for s, count in counts.items()})
+                self.steppers[name].set(f"is_new.{thing}", any(news))
+
+
+def describe_instant(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:
+    """Return an instant of an instance in words."""
+    mode = program.mode_name(stepper.get("memory.mode"))
+    return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"

@@ -1,0 +1,248 @@
+"""Replay: a recording through a sampled automaton that ticks at its own period."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from engine.execution.transition_events import fired_by_micro_step, mode_names, transition_event
+from engine.interpreter.interpreter import Interpreter, Stepper
+from engine.recordings.recording import Channel, Recording
+from engine.results.trajectory import Event, SignalArray, Trajectory, column_array, fault_names
+from language.expressions.units import display_unit
+from language.ir.program import Program
+from language.ir.regions import CHART
+from language.loading.map_pairing import pair_columns
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.text.diagnostic import Problems, SpecError
+
+MAX_TICKS = 20_000_000
+"""Most ticks of one replay."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An output against a column of the recording, at the ticks with a new value."""
+
+    output: str
+    rms: float
+    largest: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came out of a replay: a trajectory per tick with the inputs that were read.
+
+    `innovation_rms` is the root mean square of the one-step innovation per measured input, over
+    the ticks that had a new value while an observer was active.
+    """
+
+    trajectory: Trajectory
+    innovation_rms: Mapping[str, float]
+    comparisons: tuple[Comparison, ...]
+
+
+def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str], list[str]]:
+    """Return the columns of a map that an automaton reads or compares, and those left out.
+
+    Raises SpecError: an input without a column, a wrong dimension, an unknown output.
+    """
+    problems = Problems()
+    used, left_out = pair_columns(automaton, mapping, problems)
+    for column in (mapping.columns[name] for name in used):
+        if column.to is not None and column.hold == "linear":
+            label = f"column `{column.name}` is held `linear`: a replay reads the latest"
+            hint = "`hold: previous`; linear is for a scenario's `recording`"
+            problems.error("form", column.span, label, hint)
+    problems.raise_if_errors()
+    left_out += [name for name in mapping.constants if name not in automaton.inputs]
+    return used, left_out
+
+
+def replay(
+    automaton: Automaton,
+    program: Program,
+    recording: Recording,
+    mapping: RecordingMap,
+    build: Callable[[Program], Stepper] = Interpreter,
+    on_tick: Callable[[Stepper], None] | None = None,
+) -> Replay:
+    """Tick through a recording: inputs held, a channel without a new value has innovation 0.
+
+    The first tick is where every input has had a value; tick k is k periods later.
+    """
+    if program.period is None:
+        raise ValueError(f"{program.name} is continuous: only a sampled automaton is replayed")
+    stepper = build(program)
+    feeds = [c for c in recording.channels.values() if c.column.to is not None]
+    start = max(channel.times[0] for channel in feeds) if feeds else Fraction(0)
+    count = int((recording.end - start) // program.period) + 1
+    if count > MAX_TICKS or count < 1:
+        problems = Problems()
+        label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
+        problems.error("range", mapping.span, label)
+        raise SpecError(problems.reported)
+    _set_constants(automaton, program, mapping, stepper)
+    keep = _run_ticks(program, stepper, feeds, start, count, on_tick)
+    word = stepper.get("memory.faults") if program.faults else 0
+    faults = fault_names(automaton.name, program, word)
+    trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
+    compared = [c for c in recording.channels.values() if c.column.compare is not None]
+    found = [
+        _compare_output(channel, trajectory, start, program, recording) for channel in compared
+    ]
+    return Replay(trajectory, keep.innovation_rms(), tuple(one for one in found if one))
+
+
+def _run_ticks(
+    program: Program,
+    stepper: Stepper,
+    channels: Sequence[Channel],
+    start: Fraction,
+    count: int,
+    on_tick: Callable[[Stepper], None] | None,
+) -> _TickRecorder:
+    """Tick `count` times from `start` [s]: channels are latched, then the step runs."""
+    assert program.period is not None
+    cursors = [_ChannelCursor(channel, program) for channel in channels]
+    keep = _TickRecorder(program, [cursor.target for cursor in cursors])
+    for tick in range(count):
+        time = start + tick * program.period
+        for cursor in cursors:
+            cursor.advance(time, stepper)
+        stepper.run("step")
+        keep.record(time, stepper)
+        if on_tick:
+            on_tick(stepper)
+    return keep
+
+
+class _ChannelCursor:
+    """A channel and how far it has been read."""
+
+    def __init__(self, channel: Channel, program: Program) -> None:
+        self.channel = channel
+        self.target = f"input.{channel.column.to}"
+        self.position = 0
+        kinds = {variable.name: variable.type for variable in program.variables}
+        flag = f"is_new.{channel.column.to}"
+        self.flag = flag if flag in kinds else None
+        self.truth = kinds[self.target] == "truth"
+
+    def advance(self, time: Fraction, stepper: Stepper) -> None:
+        """Latch the latest value with a stamp up to `time`, and say whether it is new."""
+        times, position = self.channel.times, self.position
+        while position < len(times) and times[position] <= time:
+            position += 1
+        is_new = position > self.position
+        if is_new:
+            value = self.channel.values[position - 1]
+            stepper.set(self.target, value != 0.0 if self.truth else value)
+        self.position = position
+        if self.flag:
+            stepper.set(self.flag, is_new)
+
+
+def _set_constants(
+    automaton: Automaton, program: Program, mapping: RecordingMap, stepper: Stepper
+) -> None:
+    for name, value in program.defaults.items():
+        stepper.set(f"input.{name}", value)
+    for name, (number, _) in mapping.constants.items():
+        if name in automaton.inputs:
+            stepper.set(f"input.{name}", float(number))
+
+
+class _TickRecorder:
+    """Rows of what each tick gave."""
+
+    def __init__(self, program: Program, input_names: Sequence[str]) -> None:
+        self.program = program
+        self.names = {f"in.{name.partition('.')[2]}": name for name in input_names}
+        self.names.update({wire.name: wire.source for wire in program.outputs})
+        for region, variable in program.mode_variables().items():
+            self.names.setdefault("mode" if region == CHART else region, variable)
+        variables = {variable.name: variable for variable in program.variables}
+        self.kinds = {name: variables[source].type for name, source in self.names.items()}
+        self.units = {
+            name: display_unit(variables[source].unit) for name, source in self.names.items()
+        }
+        self.innovations = [n for n in variables if n.startswith("innovation.")]
+        observing = {info.mode for info in program.observers}
+        self.observing = {m.number for m in program.modes if m.name in observing}
+        self.times: list[Fraction] = []
+        self.rows: list[tuple[Any, ...]] = []
+        self.squares = dict.fromkeys(self.innovations, 0.0)
+        self.counts = dict.fromkeys(self.innovations, 0)
+        self.events: list[Event] = []
+        self.mode: int | None = None
+
+    def record(self, time: Fraction, stepper: Stepper) -> None:
+        self.times.append(time)
+        self.rows.append(tuple([stepper.get(source) for source in self.names.values()]))
+        if self.mode in self.observing:
+            for name in self.innovations:
+                if stepper.get(f"is_new.{name.partition('.')[2]}"):
+                    self.squares[name] += stepper.get(name) ** 2
+                    self.counts[name] += 1
+        name, program = self.program.name, self.program
+        taken = fired_by_micro_step(program, stepper)
+        self.events += [
+            transition_event(name, program, info, float(time), step) for step, info in taken
+        ]
+        self.mode = stepper.get("memory.mode")
+
+    def innovation_rms(self) -> dict[str, float]:
+        return {
+            name.partition(".")[2]: math.sqrt(self.squares[name] / self.counts[name])
+            for name in self.innovations
+            if self.counts[name]
+        }
+
+    def trajectory(self, name: str) -> Trajectory:
+        columns = list(zip(*self.rows, strict=True))
+        signals: dict[str, SignalArray] = {}
+        for (key, kind), values in zip(self.kinds.items(), columns, strict=True):
+            signals[key] = column_array(kind, values)
+        return Trajectory(
+            name=name,
+            times=np.array([float(time) for time in self.times]),
+            signals=signals,
+            units=self.units,
+            modes=mode_names(self.program),
+            events=tuple(self.events),
+        )
+
+
+def _compare_output(
+    channel: Channel,
+    trajectory: Trajectory,
+    start: Fraction,
+    program: Program,
+    recording: Recording,
+) -> Comparison | None:
+    """Compare an output with a column at the ticks in which it has a new value to use, if any."""
+    assert program.period is not None and channel.column.compare is not None
+    output = trajectory.signals[channel.column.compare]
+    differences = []
+    for time, value in zip(channel.times, channel.values, strict=True):
+        tick = math.ceil((time - start) / program.period)
+        if 0 <= tick < len(output) and recording.is_used(time):
+            differences.append(float(output[tick]) - value)
+    if not differences:
+        return None
+    array = np.array(differences)
+    return Comparison(
+        channel.column.compare,
+        float(np.sqrt(np.mean(array**2))),
+        float(np.max(np.abs(array))),
+        trajectory.units[channel.column.compare],
+    )

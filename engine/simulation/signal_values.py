@@ -1,0 +1,146 @@
+"""Signals: what every wire of a system carries - inputs, outputs, sensors, delayed lines."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from engine.interpreter.interpreter import Interpreter, Stepper
+from engine.simulation.sensors import SensorRun
+from engine.simulation.stimuli import InputSignal
+from language.expressions.syntax_tree import names
+from language.ir.program import Program
+from language.lowering.connection_program import (
+    WIRE_RESULT,
+    connection_block,
+    wire_formulas,
+    wires_program,
+)
+from language.model.declaration import Formula
+from language.model.system import Connection, DelayedSignal, Scenario, System
+
+ReadSignal = Callable[[str], Any]
+
+
+class DelayLine:
+    """A delayed signal: exact for an input of the system, else the values that were put in."""
+
+    def __init__(self, line: DelayedSignal, input_signal: InputSignal | None) -> None:
+        """Take the line and, where it reads an input of the system, that input's course."""
+        self.line = line
+        self.course = input_signal
+        self._kept: deque[tuple[Fraction, Any]] = deque()
+
+    def push(self, time: Fraction, value: Any) -> None:
+        """Keep the value that the signal has from a time on."""
+        self._kept.append((time, value))
+
+    def at(self, time: Fraction, since: Fraction | None = None) -> Any:
+        """Return the signal as it was one delay ago; before that, as it was at the start."""
+        delayed = time - self.line.delay
+        if self.course:
+            delayed_since = None if since is None else max(since - self.line.delay, Fraction(0))
+            return self.course.at(max(delayed, Fraction(0)), delayed_since)
+        while len(self._kept) > 1 and self._kept[1][0] <= delayed:
+            self._kept.popleft()
+        return self._kept[0][1]
+
+
+class Signals:
+    """The value of every signal at one instant; `time` is that instant [s]."""
+
+    def __init__(
+        self,
+        system: System,
+        scenario: Scenario,
+        programs: Mapping[str, Program],
+        steppers: Mapping[str, Stepper],
+    ) -> None:
+        """Take the system, a resolved scenario and what runs the instances."""
+        formulas = wire_formulas(system, scenario)
+        self._reads = {
+            key: tuple(dict.fromkeys(name.path for name in names(formula.tree)))
+            for key, formula in formulas.items()
+        }
+        self._outputs = {
+            f"{owner}.{wire.name}": (steppers[owner], wire)
+            for owner, program in programs.items()
+            for wire in program.outputs
+        }
+        truths = {name for name, (_, wire) in self._outputs.items() if wire.type == "truth"}
+        truths |= {name for name, thing in system.inputs.items() if thing.is_bool}
+        truths |= {line.name for line in system.delayed_signals.values() if line.source in truths}
+        self._wires = Interpreter(wires_program(formulas, frozenset(truths)))
+        self.courses = {
+            name: InputSignal(name, stimulus, self._evaluate_piece)
+            for name, stimulus in scenario.inputs.items()
+        }
+        self.sensors = {
+            name: SensorRun(sensor, scenario.seed) for name, sensor in system.sensors.items()
+        }
+        self.lines = {
+            name: DelayLine(line, self.courses.get(line.source))
+            for name, line in system.delayed_signals.items()
+        }
+        self._inputs: dict[str, Any] = {}
+        self.time = Fraction(0)
+        self.read_inputs(self.time)
+
+    def read_inputs(self, time: Fraction) -> None:
+        """Give every input of the system its value at an instant."""
+        self.time = time
+        self._inputs = {name: course.at(time) for name, course in self.courses.items()}
+
+    def current_value(self, name: str) -> Any:
+        """Return what a signal is now; a sensor gives its latest sample."""
+        if name in self._outputs:
+            stepper, wire = self._outputs[name]
+            return stepper.get(wire.source)
+        if name in self._inputs:
+            return self._inputs[name]
+        sensor = self.sensors.get(name)
+        if sensor is None:
+            return self.lines[name].at(self.time)
+        if sensor.sensor.period is None:
+            return sensor.evaluate(self.time, self.current_value(sensor.sensor.source))
+        return sensor.value
+
+    def varies(self, name: str) -> bool:
+        """Tell whether a signal changes between the instants."""
+        course = self.courses.get(name)
+        if course is None and name in self.lines:
+            course = self.lines[name].course
+        return course is not None and course.varies
+
+    def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
+        """Return what reads signals at a time of the step that began at `since`."""
+
+        def read(name: str) -> Any:
+            course = self.courses.get(name)
+            if course:
+                return course.at(time, since)
+            line = self.lines.get(name)
+            return line.at(time, since) if line and line.course else self.current_value(name)
+
+        return read
+
+    def evaluate_connection(self, connection: Connection, read: ReadSignal | None = None) -> Any:
+        """Return the value that a connection gives."""
+        source, read = connection.source, read or self.current_value
+        if isinstance(source, str):
+            return read(source)
+        if isinstance(source, Formula):
+            return self.evaluate_formula(connection_block(connection), read)
+        return source.numerator / source.denominator
+
+    def evaluate_formula(self, block: str, read: ReadSignal) -> Any:
+        """Return the value of an expression of the wires."""
+        for name in self._reads[block]:
+            self._wires.set(f"signal.{name}", read(name))
+        self._wires.run(block)
+        return self._wires.get(WIRE_RESULT)
+
+    def _evaluate_piece(self, block: str, time: float) -> float:
+        return float(self.evaluate_formula(block, lambda _: time))

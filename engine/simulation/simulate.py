@@ -1,0 +1,295 @@
+"""Simulate: a system through a scenario - continuous flow, events, ticks, one instant at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+from engine.execution.event_loop import ContinuousRun, SimulationStopped
+from engine.execution.invariant_monitor import InvariantMonitor
+from engine.execution.range_monitor import range_event
+from engine.execution.transition_events import fired_by_micro_step, mode_names, transition_event
+from engine.interpreter.apply_calibration import calibrate
+from engine.interpreter.interpreter import Interpreter, Stepper
+from engine.results.row_recorder import RowRecorder, recorded_columns
+from engine.results.trajectory import Event, Trajectory, fault_names
+from engine.simulation.event_schedule import Schedule
+from engine.simulation.input_wiring import InputWiring, describe_instant
+from engine.simulation.instance_programs import programs_of
+from engine.simulation.signal_values import Signals
+from engine.simulation.stimuli import resolve_recording
+from engine.simulation.system_environment import SystemEnvironment
+from language.ir.program import Program
+from language.model.system import Scenario, System
+
+BuildStepper = Callable[[Program], Stepper]
+TickCallback = Callable[[str, Program, Stepper], None]
+CONVERTER_OF_TYPE: Mapping[str, Callable[[Any], Any]] = {"real": float, "truth": bool, "whole": int}
+"""What an input of a type makes of a number."""
+
+
+def simulate(
+    system: System,
+    scenario: Scenario,
+    build: BuildStepper = Interpreter,
+    on_tick: TickCallback | None = None,
+    programs: Mapping[str, Program] | None = None,
+) -> Trajectory:
+    """Return the trajectory of a system through a scenario.
+
+    `build` makes the steppers (the interpreter, or a compiled one with the same protocol);
+    `on_tick` is called after each tick of a sampled instance, and after each major step of a
+    continuous one until something outside happens between two of them; `programs` are those of the
+    instances where they are made already. Raises SpecError for what is wrong with a recording.
+    """
+    return _Simulation(system, resolve_recording(system, scenario), build, on_tick, programs).run()
+
+
+class _Simulation:
+    """The instances of a system and the instants at which something happens."""
+
+    def __init__(
+        self,
+        system: System,
+        scenario: Scenario,
+        build: BuildStepper,
+        on_tick: TickCallback | None,
+        programs: Mapping[str, Program] | None,
+    ) -> None:
+        self.system = system
+        self.scenario = scenario
+        self.ticked = on_tick
+        self.programs = dict(programs or programs_of(system, scenario))
+        self.schedule = Schedule(system, scenario, self.programs)
+        self.steppers = {name: build(program) for name, program in self.programs.items()}
+        self.signals = Signals(system, scenario, self.programs, self.steppers)
+        self.rows = RowRecorder(recorded_columns(system, scenario, self.programs))
+        self.events: list[Event] = []
+        self.feeding = InputWiring(system, self.programs, self.steppers, self.signals)
+        self.left: set[tuple[str, str]] = set()
+        self.invariants = {
+            name: InvariantMonitor(name, program, self.steppers[name], self.events.append)
+            for name, program in self.programs.items()
+        }
+        self.words: dict[str, int] = {}
+        self.around: dict[str, SystemEnvironment] = {}
+        self.flows: dict[str, ContinuousRun] = {}
+        for name, program in self.programs.items():
+            if program.period is None:
+                self._add_continuous_run(name, program)
+
+    def _add_continuous_run(self, name: str, program: Program) -> None:
+        stepper, log = self.steppers[name], self.events.append
+        around = SystemEnvironment(name, stepper, self.signals, self.feeding.wires[name], program)
+        self.around[name] = around
+        self.flows[name] = ContinuousRun(name, program, stepper, log, around)
+        if self.ticked:
+            self.flows[name].on_step = partial(self._report_step, name)
+
+    def _report_step(self, name: str) -> None:
+        has_step = "step" in self.programs[name].blocks
+        if self.ticked and has_step and self.flows[name].off_step is None:
+            self.ticked(name, self.programs[name], self.steppers[name])
+
+    def run(self) -> Trajectory:
+        """Run to the horizon, or until something stops the run: what was done is kept."""
+        stopped = None
+        rows = iter(self.schedule.rows)
+        row = next(rows)
+        try:
+            self._start()
+            for time in self.schedule.instants():
+                row_times = []
+                while row < time:
+                    row_times.append(row)
+                    row = next(rows)
+                self._flow_to(time, row_times)
+                self._process_instant(time)
+                if row == time:
+                    self.rows.add(time, self.signals.current_value, self.signals.evaluate_formula)
+                    row = next(rows)
+        except SimulationStopped as reason:
+            stopped = str(reason)
+        return self._build_trajectory(stopped)
+
+    def _start(self) -> None:
+        for name, program in self.programs.items():
+            stepper = self.steppers[name]
+            for variable in program.inputs:
+                stepper.set(variable.name, CONVERTER_OF_TYPE[variable.type](0.0))
+            for key, default in program.defaults.items():
+                stepper.set(f"input.{key}", default)
+            for variable in program.variables:
+                if variable.name.startswith("is_new."):
+                    stepper.set(variable.name, True)
+        for line in self.signals.lines.values():
+            if line.course is None:
+                line.push(Fraction(0), self.signals.current_value(line.line.source))
+        for name, flow in self.flows.items():
+            self.feeding.set_inputs(name, Fraction(0))
+            flow.start()
+
+    def _flow_to(self, time: Fraction, row_times: Sequence[Fraction]) -> None:
+        """Flow all continuous instances up to an instant, and keep the rows before it."""
+        try:
+            for flow in self.flows.values():
+                flow.flow_to(time, row_times)
+        finally:
+            self._record_rows(row_times)
+
+    def _record_rows(self, row_times: Sequence[Fraction]) -> None:
+        """Keep the rows that every continuous instance has reached."""
+        environments = list(self.around.values())
+        reached = min((len(around.looked) for around in environments), default=len(row_times))
+        pick_row = (
+            self.rows.make_row_picker(environments[0].names) if len(environments) == 1 else None
+        )
+        if pick_row:
+            self.rows.extend(row_times[:reached], map(pick_row, environments[0].looked))
+            reached = 0
+        for number, row in enumerate(row_times[:reached]):
+            values: dict[str, Any] = {}
+            for around in environments:
+                values.update(zip(around.names, around.looked[number], strict=True))
+            self.rows.add(
+                row, partial(self._value_at_row, row, values), self.signals.evaluate_formula
+            )
+        for around in environments:
+            around.looked.clear()
+
+    def _value_at_row(self, row: Fraction, values: Mapping[str, Any], name: str) -> Any:
+        return values[name] if name in values else self.signals.reader_at(row, row)(name)
+
+    def _process_instant(self, time: Fraction) -> None:
+        """Flow has ended: inputs take their new values, then jumps, then ticks in their order."""
+        self.signals.read_inputs(time)
+        self._apply_calibrations(time, continuous=False)
+        for name in self.flows:
+            if time > 0 or not self._reads_sampled_instance(name):
+                self._update_flow(name, time)
+        if time == 0:
+            for run in self.signals.sensors.values():
+                run.start(self.signals.current_value(run.sensor.source))
+        for name in self.system.order:
+            if name in self.schedule.samples and self.schedule.samples[name].has(time):
+                self._sample(name, time)
+            elif name in self.schedule.ticks and self.schedule.ticks[name].has(time):
+                self._tick(name, time)
+        for name in self.flows:
+            self._update_flow(name, time)
+        for flow in self.flows.values():
+            flow.end_step()
+        self._apply_calibrations(time, continuous=True)
+        for name in self.schedule.captures_at(time):
+            self._capture(name, time)
+
+    def _apply_calibrations(self, time: Fraction, continuous: bool) -> None:
+        """A new calibration holds from this tick or, if continuous, from the next step on."""
+        for page in self.scenario.calibrations:
+            if page.time == time:
+                for name, program in self.programs.items():
+                    values = {p: v for (owner, p), v in page.values.items() if owner == name}
+                    if (program.period is None) == continuous:
+                        calibrate(self.steppers[name], program, values)
+
+    def _sample(self, name: str, time: Fraction) -> None:
+        run = self.signals.sensors[name]
+        run.sample(time, self.signals.current_value(run.sensor.source))
+        self._push_to_lines([name], time)
+
+    def _capture(self, name: str, time: Fraction) -> None:
+        """Keep a signal that arrives later, as it is when everything at an instant has happened."""
+        if name in self.signals.sensors:
+            run = self.signals.sensors[name]
+            run.capture(time, self.signals.current_value(run.sensor.source))
+        else:
+            line = self.signals.lines[name]
+            line.push(time, self.signals.current_value(line.line.source))
+
+    def _push_to_lines(self, sources: Sequence[str], time: Fraction) -> None:
+        for line in self.signals.lines.values():
+            if line.line.source in sources:
+                line.push(time, self.signals.current_value(line.line.source))
+
+    def _update_flow(self, name: str, time: Fraction) -> None:
+        """An input that changed is an event: guards are read again (rule 11)."""
+        changed, flow = self.feeding.set_inputs(name, time), self.flows[name]
+        if changed and time == 0:
+            flow.start()
+        if changed or not flow.is_settled:
+            flow.settle()
+        else:
+            self.steppers[name].run("equations")
+
+    def _reads_sampled_instance(self, name: str) -> bool:
+        """Tell whether an input reads a sampled instance: its first value is that of tick 0."""
+        reads = [read for connection in self.feeding.wires[name] for read in connection.reads]
+        return any(read.partition(".")[0] in self.programs for read in reads)
+
+    def _tick(self, name: str, time: Fraction) -> None:
+        stepper, program = self.steppers[name], self.programs[name]
+        sources = [f"{name}.{wire.name}" for wire in program.outputs]
+        self.feeding.set_inputs(name, time)
+        self.feeding.flag_new_inputs(name, self.schedule.samples)
+        self._advance_lags(sources, time)
+        stepper.run("step")
+        self._advance_lags(sources, time)
+        self._push_to_lines(sources, time)
+        fired = fired_by_micro_step(program, stepper)
+        self.events += [
+            transition_event(name, program, info, float(time), step) for step, info in fired
+        ]
+        self._report_range_violations(name, time)
+        self.invariants[name].check(time)
+        if self.ticked:
+            self.ticked(name, program, stepper)
+        self._require_finite(name, time)
+
+    def _report_range_violations(self, name: str, time: Fraction) -> None:
+        """Report each signal that was held in its range once, with time and mode (rule 18)."""
+        stepper, program = self.steppers[name], self.programs[name]
+        self.words[name] = self.words.get(name, 0) | stepper.get("memory.faults")
+        for signal in stepper.pop_range_violations():
+            if (name, signal) not in self.left:
+                self.left.add((name, signal))
+                mode = program.mode_name(stepper.get("memory.mode"))
+                text = f"`{signal}` was held in its range"
+                self.events.append(range_event(float(time), name, signal, mode, text))
+
+    def _advance_lags(self, sources: Sequence[str], time: Fraction) -> None:
+        for run in self.signals.sensors.values():
+            if run.sensor.lag and run.sensor.source in sources:
+                run.lag.advance(time, self.signals.current_value(run.sensor.source))
+
+    def _require_finite(self, name: str, time: Fraction) -> None:
+        stepper, program = self.steppers[name], self.programs[name]
+        for wire in program.outputs:
+            value = stepper.get(wire.source)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SimulationStopped(
+                    f"{describe_instant(name, program, stepper, time)}: output `{wire.name}` is {value}"
+                )
+
+    def _build_trajectory(self, stopped: str | None) -> Trajectory:
+        return Trajectory(
+            name=self.scenario.name,
+            times=self.rows.seconds(),
+            signals=self.rows.signals(),
+            units=self.rows.units(),
+            modes={
+                signal: names
+                for name, program in self.programs.items()
+                for signal, names in mode_names(program, f"{name}.").items()
+            },
+            events=tuple(self.events),
+            stopped=stopped,
+            faults=tuple(
+                fault
+                for name, program in self.programs.items()
+                if program.faults
+                for fault in fault_names(name, program, self.words.get(name, 0))
+            ),
+        )

@@ -1,0 +1,80 @@
+"""Surroundings: what a continuous instance reads from the wires, and who watches its outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+from engine.interpreter.interpreter import Stepper
+from engine.simulation.signal_values import Signals
+from language.ir.program import Program
+from language.model.system import Connection
+
+
+class SystemEnvironment:
+    """The wires around one continuous instance (see engine/execution/event_loop.py, Around)."""
+
+    def __init__(
+        self,
+        name: str,
+        stepper: Stepper,
+        signals: Signals,
+        connections: Sequence[Connection],
+        program: Program,
+    ) -> None:
+        """Take the instance with its Program, and the connections of its inputs.
+
+        `looked` has the values of `names` at each look.
+        """
+        self.name = name
+        self.looked: list[tuple[Any, ...]] = []
+        self._stepper = stepper
+        self._signals = signals
+        variables = {variable.name for variable in program.variables}
+        self._varying = [c for c in connections if f"work.rise_{c.target[1]}" in variables]
+        self._outputs = [f"{name}.{wire.name}" for wire in program.outputs]
+        own = [run for run in signals.sensors.values() if run.sensor.source in self._outputs]
+        self._lagging = [run for run in own if run.sensor.lag]
+        self._unsampled = [run for run in own if run.sensor.period is None]
+        self.names = (*self._outputs, *(run.sensor.name for run in self._unsampled))
+        self._read = stepper.make_reader(tuple(wire.source for wire in program.outputs))
+        self._since = Fraction(0)
+        self.has_observers = bool(self._lagging)
+        self.has_constant_inputs = not self._varying
+
+    def interpolate_inputs(self, start: Fraction, stop: Fraction) -> None:
+        """Lay a parabola through an input at the start, the middle and the end of a flow."""
+        self._since = start
+        h = float(stop - start)
+        for connection in self._varying:
+            value = self._input_function(connection)
+            first, middle, last = value(start), value((start + stop) / 2), value(stop)
+            name = connection.target[1]
+            self._stepper.set(f"input.{name}", first)
+            self._stepper.set(f"work.rise_{name}", (4.0 * middle - 3.0 * first - last) / h)
+            self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
+
+    def set_inputs(self, time: Fraction) -> None:
+        """Set the inputs to what they are at a time of that flow: the limit from below."""
+        for connection in self._varying:
+            name = f"input.{connection.target[1]}"
+            self._stepper.set(name, self._input_function(connection)(time))
+
+    def observe_boundary(self, time: Fraction) -> None:
+        """Carry the lags of sensors on to a time."""
+        for run in self._lagging:
+            run.lag.advance(time, self._signals.current_value(run.sensor.source))
+
+    def sample_outputs(self, time: Fraction) -> None:
+        """Keep the outputs, and the sensors that give their value whenever they are read."""
+        found = self._read()
+        for run in self._unsampled:
+            value = found[self._outputs.index(run.sensor.source)]
+            found = (*found, run.evaluate(time, value))
+        self.looked.append(found)
+
+    def _input_function(self, connection: Connection) -> Callable[[Fraction], Any]:
+        return lambda time: self._signals.evaluate_connection(
+            connection, self._signals.reader_at(time, self._since)
+        )
