@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from codegen.cache import cache_subfolder
+from codegen.toolchain.build_cache import cache_subfolder
 from diagnosis.bench import ModelSet
 from diagnosis.candidate import compile_candidate
 from diagnosis.estimate import Estimate

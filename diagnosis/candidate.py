@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Predictor, build_predictor, columns_of
+from codegen.predictor.predictor import Predictor, build_predictor, columns_of
 from diagnosis.layers import (
     DISTURBANCE_STATE,
     PlacedEffect,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Prediction
+from codegen.predictor.predictions import Prediction
 from diagnosis.bench import ModelSet
 from diagnosis.companion import angle_rates
 from diagnosis.estimate import Estimate, with_normal_equations

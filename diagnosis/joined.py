@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import StackedRecordings
+from codegen.predictor.predictions import StackedRecordings
 from diagnosis.series import SampledRecording
 
 Reals = NDArray[np.float64]

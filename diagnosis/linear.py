@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Predictor
+from codegen.predictor.predictor import Predictor
 
 Reals = NDArray[np.float64]
 MAX_QUOTIENT = 1e12

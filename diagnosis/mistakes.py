@@ -14,7 +14,7 @@ from statistics import median
 
 import numpy as np
 
-from codegen.build import BuildError
+from codegen.toolchain.compiler import BuildError
 from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.candidate import Candidate
 from diagnosis.estimate import Estimate, evaluate

@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import StackedPrediction
+from codegen.predictor.predictions import StackedPrediction
 from diagnosis.candidate import Candidate
 from diagnosis.linear import LinearModel, linearise
 from diagnosis.prediction import PredictionResult

@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Predictor
-from codegen.runs import Prediction, StackedPrediction, StackedRecordings
+from codegen.predictor.predictions import Prediction, StackedPrediction, StackedRecordings
+from codegen.predictor.predictor import Predictor
 from diagnosis.candidate import Candidate
 from diagnosis.joined import stack_recordings
 from diagnosis.noise import MAD_TO_STD

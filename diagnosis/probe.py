@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Prediction, StackedRecordings
+from codegen.predictor.predictions import Prediction, StackedRecordings
 from diagnosis.bench import ModelSet
 from diagnosis.candidate import Candidate, compile_candidate
 from diagnosis.estimate import Estimate

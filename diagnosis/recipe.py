@@ -22,8 +22,8 @@ from typing import Any
 import codegen
 import diagnosis
 import language
-from codegen.cache import cache_subfolder
-from codegen.predictor import PredictorColumns
+from codegen.predictor.predictor import PredictorColumns
+from codegen.toolchain.build_cache import cache_subfolder
 from diagnosis.uncertain import FreeParameter
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 

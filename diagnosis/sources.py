@@ -6,8 +6,8 @@ import hashlib
 import platform
 from importlib import metadata
 
-from codegen.build import BuildError, compiler_version
-from codegen.rendering import product_version
+from codegen.toolchain.compiler import BuildError, compiler_version
+from codegen.toolchain.templates import product_version
 from diagnosis.dossier import DiagnosisReport
 from diagnosis.layers import shipped_effects
 from diagnosis.recipe import node_text

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from fractions import Fraction
 
-from codegen.rendering import product_version
+from codegen.toolchain.templates import product_version
 from diagnosis.dossier import DiagnosisReport
 from diagnosis.layers import automaton_with_effects as laid_automaton
 from diagnosis.naming import quantities_of

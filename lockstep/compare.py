@@ -10,10 +10,15 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from codegen.build import FLAGS
-from codegen.harness import build_executable, compared_variables, tick_inputs, tunable_constants
-from codegen.instructions import InstructionCounts, count_instructions
-from codegen.machine import HOST, Machine
+from codegen.harness.harness import (
+    build_executable,
+    compared_variables,
+    tick_inputs,
+    tunable_constants,
+)
+from codegen.harness.instruction_count import InstructionCounts, count_instructions
+from codegen.toolchain.compiler import FLAGS
+from codegen.toolchain.machine import HOST, Machine
 from engine.execution.transition_events import fired_transitions
 from engine.interpreter.interpreter import Stepper
 from language.ir.number_type import NumberType, shortest_decimal

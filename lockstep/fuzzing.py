@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 
-from codegen.fuzzing import Range, WordValues, decode_sequence, run_fuzzer, word_table
-from codegen.harness import tick_inputs
+from codegen.coverage.libfuzzer import Range, WordValues, decode_sequence, run_fuzzer, word_table
+from codegen.harness.harness import tick_inputs
 from engine.interpreter.interpreter import Interpreter
 from engine.simulation.simulate import CONVERTER_OF_TYPE
 from language.ir.program import Program

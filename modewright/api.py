@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from codegen.build import flags_at_level
-from codegen.machine import CORTEX_M4F, HOST, MACHINES
+from codegen.toolchain.compiler import flags_at_level
+from codegen.toolchain.machine import CORTEX_M4F, HOST, MACHINES
 from engine.recordings.recording import Recording, read_recording
 from engine.results.trajectory import Trajectory
 from engine.simulation.replay import Replay, replay as replay_recording, used_columns

@@ -6,12 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codegen.exchange.characteristic import PageFile
-from codegen.exchange.desk import Remark
-from codegen.exchange.formats import FORMATS, read_page
-from codegen.exchange.owned import NameFilter
-from codegen.exchange.page import page_characteristics, page_constants, page_name
-from codegen.exchange.taking import ImportedValues, import_values
+from codegen.exchange.calibration.calibration_page import (
+    page_characteristics,
+    page_constants,
+    page_name,
+)
+from codegen.exchange.calibration.characteristic import PageFile
+from codegen.exchange.calibration.formats import FORMATS, read_page
+from codegen.exchange.calibration.import_context import Remark
+from codegen.exchange.calibration.name_filter import NameFilter
+from codegen.exchange.calibration.page_import import ImportedValues, import_values
 from language.ir.program import Constant, Program
 from language.loading.load import automaton_of, program_of
 from language.model.automaton import Automaton

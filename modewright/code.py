@@ -6,19 +6,19 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from codegen.asam import a2l as asam
-from codegen.border import generate_boundary_sequences
-from codegen.can_database import FIRST_IDENTIFIER, emit_dbc as dbc_of
-from codegen.cmake import emit_cmake_file
-from codegen.exploring import corpus_records, generate_corpus
-from codegen.fmi.archive import build_fmu as fmu_of
-from codegen.fmi.variable import Version
-from codegen.instructions import InstructionCounts, count_instructions as counted
-from codegen.mcdc import McdcCoverage, add_infeasibility_proofs, measure_mcdc as covered
-from codegen.metrics import Metrics, measure_code as measured
+from codegen.coverage.boundary_values import generate_boundary_sequences
+from codegen.coverage.coverage_exploration import corpus_records, generate_corpus
+from codegen.coverage.mcdc import McdcCoverage, add_infeasibility_proofs, measure_mcdc as covered
+from codegen.emit.c_module import emit_c_files
+from codegen.exchange.a2l import writer as asam
+from codegen.exchange.cmake import emit_cmake_file
+from codegen.exchange.dbc import FIRST_IDENTIFIER, emit_dbc as dbc_of
+from codegen.exchange.fmi.archive import build_fmu as fmu_of
+from codegen.exchange.fmi.variable import Version
+from codegen.harness.instruction_count import InstructionCounts, count_instructions as counted
+from codegen.harness.metrics import Metrics, measure_code as measured
 from codegen.proofs.all import CHECKS, run_checks
-from codegen.proofs.proof import ToolVerdict
-from codegen.source import emit_c_files
+from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.number_type import NumberType
 from language.ir.printer import digest
 from language.ir.program import Program

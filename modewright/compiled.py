@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache, partial
 
-from codegen.build import BuildError
-from codegen.library import load_library
-from codegen.stepper import CompiledStepper
+from codegen.simulator.compiled_stepper import CompiledStepper
+from codegen.simulator.simulator_library import load_library
+from codegen.toolchain.compiler import BuildError
 from engine.batch.batch import Batch, BatchResult
 from engine.batch.compiled_batch import CompiledBatchCache
 from engine.batch.compiled_run import CompiledRun

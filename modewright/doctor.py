@@ -57,7 +57,7 @@ def _check_dependencies() -> Iterator[HealthCheck]:
 
 
 def _check_compiler() -> HealthCheck:
-    from codegen.build import BuildError, compiler_version
+    from codegen.toolchain.compiler import BuildError, compiler_version
     from language.text.diagnostic import MissingToolError
 
     try:
@@ -70,7 +70,7 @@ def _check_compiler() -> HealthCheck:
 
 
 def _check_cache() -> HealthCheck:
-    from codegen.cache import CACHE_VARIABLE, cache_fault, cache_folder
+    from codegen.toolchain.build_cache import CACHE_VARIABLE, cache_fault, cache_folder
 
     try:
         folder = cache_folder()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from modewright.checking import spec_files

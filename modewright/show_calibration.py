@@ -8,8 +8,8 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from codegen.exchange.desk import Remark
-from codegen.exchange.page import format_constant_value, page_name
+from codegen.exchange.calibration.calibration_page import format_constant_value, page_name
+from codegen.exchange.calibration.import_context import Remark
 from language.expressions.units import display_unit
 from language.ir.program import Constant, unqualified_name
 from language.text.diagnostic import Problem, render_all

@@ -8,8 +8,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from codegen.mcdc import Decision, McdcCoverage
-from codegen.proofs.proof import ToolVerdict
+from codegen.coverage.mcdc import Decision, McdcCoverage
+from codegen.toolchain.tool_verdict import ToolVerdict
 from lockstep.fuzzing import FuzzReport
 
 

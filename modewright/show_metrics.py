@@ -8,8 +8,8 @@ from typing import Any
 
 from rich.table import Table
 
-from codegen.instructions import InstructionCounts
-from codegen.metrics import Metrics
+from codegen.harness.instruction_count import InstructionCounts
+from codegen.harness.metrics import Metrics
 
 AutomatonMetrics = tuple[Metrics, InstructionCounts | None]
 """What one automaton takes, and its instructions where they were counted."""

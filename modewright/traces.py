@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
 from expectation.expected import Test
 from expectation.key_trace import KeyTraces, build_key_traces
 from expectation.trace import RequirementTrace, trace_requirements

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import modewright as mw
-from codegen.build import compile_program
+from codegen.toolchain.compiler import compile_program
 from modewright.cli import app
 from modewright.exits import run_with_exit_code
 

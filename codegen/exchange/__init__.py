@@ -1,1 +1,1 @@
-"""Exchange: calibration pages in the formats of measurement and calibration tools."""
+"""Formats of exchange: A2L, calibration pages, CAN databases, CMake projects and FMUs."""

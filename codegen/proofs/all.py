@@ -6,14 +6,14 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from codegen.proofs.contract import check_contracts
+from codegen.emit.c_module import emit_c_files
+from codegen.proofs.acsl.mode_contract import check_contracts
+from codegen.proofs.eva import check_values
 from codegen.proofs.misra import check_misra
-from codegen.proofs.proof import ToolVerdict
-from codegen.proofs.sanitised import check_sanitizers
-from codegen.proofs.stack import check_stack
-from codegen.proofs.strict import check_compiler_warnings
-from codegen.proofs.values import check_values
-from codegen.source import emit_c_files
+from codegen.proofs.sanitizer_run import check_sanitizers
+from codegen.proofs.stack_usage import check_stack
+from codegen.proofs.warnings import check_compiler_warnings
+from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.program import Program
 from language.model.automaton import Automaton
 

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.proofs.proof import ToolVerdict, tool_version
-from codegen.tool import run_tool
+from codegen.toolchain.external_tools import run_tool
+from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 from language.text.diagnostic import MissingToolError
 
 DEVIATIONS = {

@@ -33,13 +33,13 @@ EVENT_DTYPE = np.dtype(
         ("reserved", "i4"),
     ]
 )
-"""`Event` of codegen/templates/run.h.jinja."""
+"""`Event` of codegen/templates/simulator/run.h.jinja."""
 INITIAL_EVENT_CAPACITY = 1000
 """Events for which a single run has room at first; it is made again where there were more."""
 
 
 class RunLibrary(Protocol):
-    """Compiled runs of an assembly (codegen/library.py)."""
+    """Compiled runs of an assembly (codegen/simulator/simulator_library.py)."""
 
     @property
     def columns(self) -> Sequence[int]:

@@ -167,3 +167,15 @@ def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
             return Call(function, tuple(part(argument) for argument in arguments))
         case Value():
             return expr
+
+
+def negate_condition(condition: Expr) -> Expr:
+    """Return what is true where a condition is false; of an order, which NaN fails, by `not`."""
+    match condition:
+        case Unary("not", operand):
+            return operand
+        case Compare("==", left, right):
+            return Compare("!=", left, right)
+        case Compare("!=", left, right):
+            return Compare("==", left, right)
+    return Unary("not", condition)

@@ -1,6 +1,6 @@
 """Interpolation: the meaning of `lookup`, each operation rounded to the number type.
 
-ha_math has the same operations in the same order (codegen/templates/ha_math.c.jinja).
+ha_math has the same operations in the same order (codegen/templates/emit/ha_math.c.jinja).
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def a2l(
     modewright a2l estimator --out estimator.a2l --elf ecu.elf
     modewright a2l estimator --out left.a2l --elf ecu.elf --instance app.left --page left_page
     """
-    from codegen.asam.image import ImageError
+    from codegen.exchange.a2l.elf_addresses import ImageError
     from modewright import code
 
     require_writable(out)

@@ -154,7 +154,7 @@ def _report_problems_as_json(as_json: bool) -> Iterator[None]:
 
 
 def _require_format(form: str | None) -> None:
-    from codegen.exchange.formats import FORMATS
+    from codegen.exchange.calibration.formats import FORMATS
 
     if form is not None and form not in FORMATS:
         raise typer.BadParameter(f"{form}: one of {', '.join(FORMATS)}", param_hint="--format")
@@ -162,7 +162,7 @@ def _require_format(form: str | None) -> None:
 
 def _output_format(out: Path, form: str | None) -> str:
     """Return the format that a page is written in. Raises OutputError before any work is done."""
-    from codegen.exchange.formats import FORMATS, format_name
+    from codegen.exchange.calibration.formats import FORMATS, format_name
 
     _require_format(form)
     require_writable(out)

@@ -12,7 +12,7 @@ from modewright.console import progress_spinner, report_written_files
 from modewright.files import require_writable, write_files
 
 if TYPE_CHECKING:
-    from codegen.fmi.variable import Version
+    from codegen.exchange.fmi.variable import Version
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
 FmiVersion = Annotated[int, typer.Option("--version", min=2, max=3, help="of FMI: 2 or 3")]

@@ -13,7 +13,7 @@ from modewright.console import console, progress_spinner, report_written_files
 from modewright.files import OutputError, require_writable, write_files
 
 if TYPE_CHECKING:
-    from codegen.instructions import InstructionCounts
+    from codegen.harness.instruction_count import InstructionCounts
 
 FORMATS = (".html", ".json")
 

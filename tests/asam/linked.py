@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.asam.description import ModuleDescription
-from codegen.source import emit_c_files
-from codegen.tool import ARM_COMPILER
+from codegen.emit.c_module import emit_c_files
+from codegen.exchange.a2l.description import ModuleDescription
+from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.program import Program
 
 HOST = ("gcc", "-no-pie")

@@ -9,11 +9,11 @@ from pathlib import Path
 import pya2l.model as model
 import pytest
 
-from codegen.asam.a2l import ModuleLocation, _unique_name, emit_a2l, locate_module
-from codegen.asam.description import describe_module
-from codegen.asam.image import ImageError
-from codegen.exchange.page import page_constants, page_name
-from codegen.tool import ARM_COMPILER
+from codegen.exchange.a2l.description import describe_module
+from codegen.exchange.a2l.elf_addresses import ImageError
+from codegen.exchange.a2l.writer import ModuleLocation, _unique_name, emit_a2l, locate_module
+from codegen.exchange.calibration.calibration_page import page_constants, page_name
+from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.program import Program
 from modewright.api import program as shipped
 from modewright.cli import app

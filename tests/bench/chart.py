@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import FLAGS, find_compiler
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
+from codegen.toolchain.compiler import FLAGS, find_compiler
 from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType
 from language.ir.program import Program

@@ -14,7 +14,7 @@ import tempfile
 import time
 from typing import Any
 
-from codegen.cache import CACHE_VARIABLE
+from codegen.toolchain.build_cache import CACHE_VARIABLE
 from tests.bench import ours
 from tests.bench.manoeuvre import TIP_OUT
 from tests.bench.rivals import ROOT

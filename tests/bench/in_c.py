@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import FLAGS, find_compiler
+from codegen.toolchain.compiler import FLAGS, find_compiler
 from tests.bench.manoeuvre import Manoeuvre
 from tests.bench.truth import Solution
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
-from codegen.library import load_library
+from codegen.simulator.simulator_library import load_library
 from engine.batch.compiled_run import CompiledRun
 from engine.results.trajectory import Trajectory
 from engine.simulation.instance_programs import programs_of

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from codegen.build import FLAGS, compiler_version
+from codegen.toolchain.compiler import FLAGS, compiler_version
 from tests.bench import figures, growth
 from tests.bench.charts import measure_charts
 from tests.bench.first_step import measure_first_step

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import flags_at_level
-from codegen.library import load_library
+from codegen.simulator.simulator_library import load_library
+from codegen.toolchain.compiler import flags_at_level
 from tests.bench import charts, figures, ours, rivals, run, timing, variants
 from tests.bench.in_c import HERE, PEERS
 from tests.bench.manoeuvre import Manoeuvre

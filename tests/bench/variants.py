@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.library import load_library
+from codegen.simulator.simulator_library import load_library
 from engine.batch.batch import Batch, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatch
 from tests.bench import in_c, ours

@@ -8,8 +8,12 @@ import struct
 
 import pytest
 
-from codegen.border import MAX_PER_CHANGE, NEIGHBOUR_COUNT, generate_boundary_sequences
-from codegen.mcdc import EXPORTER, measure_mcdc
+from codegen.coverage.boundary_values import (
+    MAX_PER_CHANGE,
+    NEIGHBOUR_COUNT,
+    generate_boundary_sequences,
+)
+from codegen.coverage.mcdc import EXPORTER, measure_mcdc
 from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType
 from language.ir.program import Program
 from tests.language.making import program

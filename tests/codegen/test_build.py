@@ -8,14 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import build
-from codegen.build import (
-    BuildError,
-    compile_program,
-    find_compiler,
-    run_executable,
-)
-from codegen.harness import build_executable, compared_variables, tick_inputs
+from codegen.harness.harness import build_executable, compared_variables, tick_inputs
+from codegen.toolchain import compiler as build
+from codegen.toolchain.compiler import BuildError, compile_program, find_compiler, run_executable
 from language.text.diagnostic import MissingToolError
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
@@ -113,7 +108,7 @@ def test_a_compiler_that_hangs_is_a_build_error(
     def hangs(*arguments: object, **options: object) -> None:
         raise subprocess.TimeoutExpired("cc", build.TIMEOUT)
 
-    monkeypatch.setattr("codegen.build.subprocess.run", hangs)
+    monkeypatch.setattr("codegen.toolchain.compiler.subprocess.run", hangs)
     with pytest.raises(BuildError, match="120 s"):
         compile_program([tmp_path / "any.c"], tmp_path / "program")
     with pytest.raises(BuildError, match="120 s"):

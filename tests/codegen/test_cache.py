@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from codegen import cache, harness
-from codegen.build import FLAGS, find_compiler, run_compiler, run_executable
-from codegen.harness import build_executable
-from codegen.objects import object_of
+from codegen.harness import harness
+from codegen.harness.harness import build_executable
+from codegen.toolchain import build_cache as cache
+from codegen.toolchain.compiler import FLAGS, find_compiler, run_compiler, run_executable
+from codegen.toolchain.object_cache import object_of
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
 
@@ -214,7 +215,7 @@ def objects(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         made.append(Path(command[-1]).name)
         run_compiler(command, target)
 
-    monkeypatch.setattr("codegen.objects.run_compiler", counting)
+    monkeypatch.setattr("codegen.toolchain.object_cache.run_compiler", counting)
     return made
 
 

@@ -9,7 +9,7 @@ import cantools
 import pytest
 from cantools.database import Database
 
-from codegen.can_database import emit_dbc
+from codegen.exchange.dbc import emit_dbc
 from language.ir.printer import digest
 from language.ir.program import unqualified_name
 from modewright.api import program

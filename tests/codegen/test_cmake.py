@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS
-from codegen.cmake import FILE, SET_BY_CMAKE, emit_cmake_file
+from codegen.exchange.cmake import FILE, SET_BY_CMAKE, emit_cmake_file
+from codegen.toolchain.compiler import FLAGS
 from modewright.api import program
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

@@ -8,10 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import write_contracts
-from codegen.proofs.effect import add_effect_contracts, add_loop_assigns, called_by, places_of
-from codegen.proofs.outline import function_of, outline_except
-from codegen.source import emit_c_files, run_c_passes
+from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.proofs.acsl.assigns_contract import (
+    add_effect_contracts,
+    add_loop_assigns,
+    called_by,
+    places_of,
+)
+from codegen.proofs.acsl.function_outlining import function_of, outline_except
+from codegen.proofs.acsl.mode_contract import write_contracts
 from language.ir.program import Program
 from modewright.api import program
 

@@ -7,10 +7,10 @@ from random import Random
 
 import pytest
 
-from codegen import exploring
-from codegen.exploring import generate_corpus, page_scalars
-from codegen.fuzzing import FUZZER_COMPILER
-from codegen.mcdc import EXPORTER, measure_mcdc
+from codegen.coverage import coverage_exploration as exploring
+from codegen.coverage.coverage_exploration import generate_corpus, page_scalars
+from codegen.coverage.libfuzzer import FUZZER_COMPILER
+from codegen.coverage.mcdc import EXPORTER, measure_mcdc
 from language.ir.program import Program
 from modewright.api import program as program_named
 from tests.language.making import program

@@ -6,10 +6,10 @@ import shutil
 
 import pytest
 
-from codegen.frame import select_noinline_blocks
-from codegen.proofs.stack import LIMIT
-from codegen.source import emit_c_files, run_c_passes
-from codegen.tool import ARM_COMPILER
+from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.passes.inline_policy import select_noinline_blocks
+from codegen.proofs.stack_usage import LIMIT
+from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.number_type import NumberType
 from modewright.api import program
 from modewright.code import metrics

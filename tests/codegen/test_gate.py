@@ -7,11 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS, compile_program, run_executable
-from codegen.gate import LATCH, LATCH_EACH, WITHIN, fold_range_check, merge_range_checks
-from codegen.mathematics import emit_math_files
-from codegen.names import C_REAL_TYPE
-from codegen.source import emit_c_files
+from codegen.emit.c_math import emit_math_files
+from codegen.emit.c_module import emit_c_files
+from codegen.emit.c_names import C_REAL_TYPE
+from codegen.passes.range_check_merging import (
+    LATCH,
+    LATCH_EACH,
+    WITHIN,
+    fold_range_check,
+    merge_range_checks,
+)
+from codegen.toolchain.compiler import FLAGS, compile_program, run_executable
 from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
 from language.numerics.evaluate import evaluate

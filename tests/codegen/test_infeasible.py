@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from codegen.mcdc import EXPORTER, add_infeasibility_proofs, measure_mcdc
-from codegen.proofs.infeasible import decision_sites, prove_infeasible, unshare_expressions
-from codegen.source import run_c_passes
+from codegen.coverage.mcdc import EXPORTER, add_infeasibility_proofs, measure_mcdc
+from codegen.emit.c_module import run_c_passes
+from codegen.proofs.infeasible.infeasible_conditions import (
+    decision_sites,
+    prove_infeasible,
+    unshare_expressions,
+)
 from language.ir.program import Program
 from modewright import code
 from modewright.api import program as program_named

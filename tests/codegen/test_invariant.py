@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs import reach
-from codegen.proofs.fact import AtMost, Within
-from codegen.proofs.holding import Number, holds
-from codegen.proofs.infeasible import decision_sites
-from codegen.proofs.invariant import find_invariants
-from codegen.proofs.symbolic import SymbolicProgram
-from codegen.source import run_c_passes
+from codegen.emit.c_module import run_c_passes
+from codegen.proofs.infeasible import spacer as reach
+from codegen.proofs.infeasible.candidate_invariants import AtMost, Within
+from codegen.proofs.infeasible.houdini import find_invariants
+from codegen.proofs.infeasible.infeasible_conditions import decision_sites
+from codegen.proofs.infeasible.invariant_terms import Number, holds
+from codegen.proofs.infeasible.symbolic_execution import SymbolicProgram
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from modewright.api import program as program_named
@@ -63,7 +63,9 @@ def checked(spec: Spec, made: Program) -> None:
 @pytest.mark.long
 def test_of_a_chart_much_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Micro-steps, their log, histories, and which regions are left in which mode."""
-    monkeypatch.setattr("codegen.proofs.invariant._last", lambda world: ())  # they take long
+    monkeypatch.setattr(
+        "codegen.proofs.infeasible.houdini._last", lambda world: ()
+    )  # they take long
     world = SymbolicProgram(run_c_passes(program_named("supervisor")))
     facts = find_invariants(world, {}, most_where=1)
     said = {(f.cut.name, f.name, f.where): f.limits for f in facts if isinstance(f, Within)}

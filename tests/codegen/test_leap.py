@@ -8,8 +8,8 @@ import re
 
 import pytest
 
-from codegen.leap import FastPathMode, add_fast_path
-from codegen.source import emit_c_files, restrict_to_step
+from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.passes.fast_path import FastPathMode, add_fast_path
 from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import Branch

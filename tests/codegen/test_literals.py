@@ -15,8 +15,8 @@ import pytest
 from hypothesis import example, given, strategies as st
 
 import modewright as mw
-from codegen.build import compile_program, run_executable
-from codegen.expression import format_literal
+from codegen.emit.c_expression import format_literal
+from codegen.toolchain.compiler import compile_program, run_executable
 from language.expressions.units import parse_unit
 from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
 from modewright.api import program

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from codegen.disassembly import Instruction
-from codegen.longest_step import Unbounded, longest_path
+from codegen.harness.disassembly import Instruction
+from codegen.harness.worst_case_instructions import Unbounded, longest_path
 
 Shape = int | tuple[Any, ...]
 """A number of instructions, or (`if`, then, otherwise), (`loop`, turns, body), (`then`, parts)."""

@@ -9,9 +9,9 @@ import struct
 import pytest
 from typer.testing import CliRunner
 
-from codegen.border import NEIGHBOUR_COUNT
-from codegen.mcdc import EXPORTER, McdcCoverage, measure_mcdc
-from codegen.source import emit_c_files
+from codegen.coverage.boundary_values import NEIGHBOUR_COUNT
+from codegen.coverage.mcdc import EXPORTER, McdcCoverage, measure_mcdc
+from codegen.emit.c_module import emit_c_files
 from language.ir.program import Program
 from modewright import code
 from modewright.cli import app

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from codegen.proofs.pointers import is_inside, required
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
+from codegen.proofs.acsl.assigns_contract import is_inside, required
 from modewright.api import program
 
 HEAD = "estimator_Self *self, const estimator_In *in, estimator_Work *work"

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from codegen.lean import slice_to_outputs
-from codegen.predictor import Predictor, build_predictor, columns_of
-from codegen.source import restrict_to_step
+from codegen.emit.c_module import restrict_to_step
+from codegen.predictor.predictor import Predictor, build_predictor, columns_of, slice_to_outputs
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from tests.language.making import program

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codegen.proofs.terms import Real, Terms
+from codegen.proofs.infeasible.float_terms import Real, Terms
 from language.ir.number_type import MAX_FINITE, NumberType, round_to_type
 from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY_BY_TYPE
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from codegen.fault import fault_reason
-from codegen.names import c_member, transition_constants
-from codegen.purpose import describe_function
-from codegen.source import ENTRIES, emit_c_files, run_c_passes
+from codegen.emit.c_module import ENTRIES, emit_c_files, fault_reason, run_c_passes
+from codegen.emit.c_names import c_member, transition_constants
+from codegen.emit.function_comments import describe_function
 from modewright.api import program
 
 SHIPPED = ("estimator", "estimator_float32", "hko", "driveline", "supervisor", "contactor")

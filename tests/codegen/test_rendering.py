@@ -8,8 +8,8 @@ from pathlib import Path
 import jinja2
 import pytest
 
-from codegen import rendering
-from codegen.rendering import TEMPLATE_CACHE, render
+from codegen.toolchain import templates as rendering
+from codegen.toolchain.templates import TEMPLATE_CACHE, render
 
 TEMPLATE = "words_fed.jinja"
 NOTHING: dict[str, list[str]] = {"inputs": []}

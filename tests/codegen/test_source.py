@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.mathematics import emit_math_files
-from codegen.names import CNames
-from codegen.rendering import product_version
-from codegen.source import emit_c_files
+from codegen.emit.c_math import emit_math_files
+from codegen.emit.c_module import emit_c_files
+from codegen.emit.c_names import CNames
+from codegen.toolchain.templates import product_version
 from language.expressions.name_rules import reserved_words
 from language.ir.ops import Assign
 from language.ir.printer import digest

@@ -8,8 +8,8 @@ from functools import partial
 
 import pytest
 
-from codegen.build import flags_at_level
-from codegen.stepper import CompiledStepper
+from codegen.simulator.compiled_stepper import CompiledStepper
+from codegen.toolchain.compiler import flags_at_level
 from engine.interpreter.interpreter import Interpreter
 from engine.simulation.simulate import simulate
 from modewright.api import load

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from codegen.source import emit_c_files
-from codegen.unassigned import find_unassigned_reads
+from codegen.emit.c_module import emit_c_files
+from codegen.passes.definite_assignment import find_unassigned_reads
 from language.ir.ops import (
     Assign,
     Block,

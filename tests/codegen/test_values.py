@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from codegen.proofs.values import counter_limits
-from codegen.source import run_c_passes
+from codegen.emit.c_module import run_c_passes
+from codegen.proofs.eva import counter_limits
 from modewright.api import program
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.vectors import has_gcc_vectors
+from codegen.toolchain.compiler import has_gcc_vectors
 
 SAYS = """#!{python}
 print("{macros}")

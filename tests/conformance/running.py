@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from codegen.build import FLAGS, WARNINGS, find_compiler
-from codegen.names import CNames
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
+from codegen.emit.c_names import CNames
+from codegen.toolchain.compiler import FLAGS, WARNINGS, find_compiler
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import automaton_of, program_of

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from codegen.predictor import PredictorColumns
+from codegen.predictor.predictor import PredictorColumns
 from diagnosis.bench import EXCLUDED_EFFECTS
 from diagnosis.candidate import Candidate
 from diagnosis.case import Case

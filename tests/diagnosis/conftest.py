@@ -12,8 +12,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from codegen import predictor
-from codegen.cache import cache_folder
+from codegen.predictor import predictor
+from codegen.toolchain.build_cache import cache_folder
 from diagnosis import recipe
 from diagnosis.dossier import replace_non_finite
 from diagnosis.verdict import Verdict

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from codegen.runs import Prediction, StackedPrediction
+from codegen.predictor.predictions import Prediction, StackedPrediction
 from diagnosis.linear import _pseudoinverse
 from diagnosis.modes import _dwell_intervals
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from codegen.predictor import Predictor
+from codegen.predictor.predictor import Predictor
 from diagnosis.candidate import compile_candidate
 from language.overlays.expand_document import Project, expand_document, read_document
 

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from codegen import predictor as predictor_module
-from codegen.lean import slice_to_outputs
-from codegen.predictor import Predictor, columns_of
-from codegen.runs import Prediction, StackedRecordings
-from codegen.tracks import simd_recordings_context
+from codegen.predictor import predictor as predictor_module
+from codegen.predictor.predictions import Prediction, StackedRecordings
+from codegen.predictor.predictor import Predictor, columns_of, slice_to_outputs
+from codegen.predictor.simd_recordings import simd_recordings_context
 from diagnosis import recipe
 from diagnosis.bench import ModelSet, balance_disturbances
 from diagnosis.candidate import Candidate

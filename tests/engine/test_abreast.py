@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen.abreast import LANES
-from codegen.run_source import emit_simulator_files
+from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simulator_source import emit_simulator_files
 from engine.batch.batch import Batch, InputTable, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatch, run_compiled_batch
 from engine.batch.interpreted_batch import run_interpreted_batch

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen.build import flags_at_level
-from codegen.library import load_library
-from codegen.predictor import Predictor, build_predictor, columns_of
-from codegen.stepper import CompiledStepper
+from codegen.predictor.predictor import Predictor, build_predictor, columns_of
+from codegen.simulator.compiled_stepper import CompiledStepper
+from codegen.simulator.simulator_library import load_library
+from codegen.toolchain.compiler import flags_at_level
 from engine.batch.batch import Batch, SignalStatistic
 from engine.batch.compiled_batch import run_compiled_batch
 from engine.batch.compiled_run import CompiledRun

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from codegen.build import flags_at_level
-from codegen.library import SimulatorLibrary, load_library
+from codegen.simulator.simulator_library import SimulatorLibrary, load_library
+from codegen.toolchain.compiler import flags_at_level
 from engine.batch.batch import Batch, BatchResult, InputTable, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatchCache, run_compiled_batch
 from engine.batch.compiled_run import CompiledRun

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.exchange.page_text import MAX_BYTES
+from codegen.exchange.calibration.encoding import MAX_BYTES
 from language.text.diagnostic import SpecError
 from modewright.calibrations import export_calibration, import_calibration
 from tests.exchange.tuned import run_command, write_project

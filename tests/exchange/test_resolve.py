@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import compile_program, flags_at_level
-from codegen.exchange.formats import read_page
-from codegen.expression import format_literal
-from codegen.source import emit_c_files
+from codegen.emit.c_expression import format_literal
+from codegen.emit.c_module import emit_c_files
+from codegen.exchange.calibration.formats import read_page
+from codegen.toolchain.compiler import compile_program, flags_at_level
 from language.ir.number_type import round_to_type
 from language.text.diagnostic import Problems
 from modewright.api import program

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.fmi.archive import build_fmu
-from codegen.fmi.variable import VERSIONS, Version
+from codegen.exchange.fmi.archive import build_fmu
+from codegen.exchange.fmi.variable import VERSIONS, Version
 from lockstep.compare import TickLog
 from modewright.api import program
 from tests.fmi.importer import Importer, UnpackedFmu, unpack_fmu

@@ -13,8 +13,8 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
-from codegen.fmi.variable import Version
-from codegen.harness import tick_inputs, tunable_constants
+from codegen.exchange.fmi.variable import Version
+from codegen.harness.harness import tick_inputs, tunable_constants
 from language.ir.program import Program, unqualified_name
 from lockstep.compare import TickLog
 

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS, WARNINGS, BuildError
-from codegen.fmi.archive import build_fmu
-from codegen.fmi.binary import binary_path
-from codegen.fmi.content import HEADERS, emit_fmu_files, read_headers
-from codegen.fmi.variable import Version
+from codegen.exchange.fmi.archive import binary_path, build_fmu
+from codegen.exchange.fmi.content import HEADERS, emit_fmu_files, read_headers
+from codegen.exchange.fmi.variable import Version
+from codegen.toolchain.compiler import FLAGS, WARNINGS, BuildError
 from modewright.api import program
 from tests.fmi.conftest import Ready
 

@@ -12,8 +12,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.build import build_platform_binary
 
-from codegen.fmi.archive import build_fmu
-from codegen.fmi.variable import Version
+from codegen.exchange.fmi.archive import build_fmu
+from codegen.exchange.fmi.variable import Version
 from engine.interpreter.apply_calibration import calibrate
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program

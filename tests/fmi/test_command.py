@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.fmi.binary import binary_path
+from codegen.exchange.fmi.archive import binary_path
 from modewright.cli import app
 from modewright.exits import run_with_exit_code
 

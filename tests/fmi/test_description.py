@@ -15,10 +15,10 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from lark import Lark
 
-from codegen.fmi.archive import build_fmu
-from codegen.fmi.content import HEADERS, emit_fmu_files
-from codegen.fmi.unit import unit_definitions, unit_name
-from codegen.fmi.variable import Version
+from codegen.exchange.fmi.archive import build_fmu
+from codegen.exchange.fmi.content import HEADERS, emit_fmu_files
+from codegen.exchange.fmi.unit import unit_definitions, unit_name
+from codegen.exchange.fmi.variable import Version
 from modewright.api import program
 from tests.fmi.importer import Importer, unpack_fmu
 
@@ -225,7 +225,7 @@ def test_names_of_a_spec_may_be_words_of_the_c_around_it(version: Version, tmp_p
 
 def test_the_token_is_that_of_program_and_version() -> None:
     def tokens(values: dict[str, str]) -> list[str]:
-        from codegen.fmi.content import instantiation_token
+        from codegen.exchange.fmi.content import instantiation_token
 
         return [instantiation_token(program("estimator", values), version) for version in (2, 3)]
 

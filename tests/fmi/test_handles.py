@@ -10,8 +10,8 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CoSimulation, fmi2ModelExchange
 
-from codegen.fmi.standard import refusals
-from codegen.fmi.variable import Version
+from codegen.exchange.fmi.standard import refusals
+from codegen.exchange.fmi.variable import Version
 from tests.fmi.conftest import Ready
 from tests.fmi.importer import Importer
 from tests.fmi.refusing import PERIOD, REAL, assert_refused, library_function

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codegen.fmi.variable import Version
+from codegen.exchange.fmi.variable import Version
 from tests.fmi.conftest import Ready
 from tests.fmi.importer import Importer
 from tests.fmi.refusing import PERIOD, REAL, assert_refused

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from codegen.machine import HOST
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
+from codegen.toolchain.machine import HOST
 from language.ir.program import Program
 from language.numerics.evaluate import apply_function
 from lockstep.compare import Difference, TickLog, compare
@@ -34,7 +34,7 @@ def change(monkeypatch: pytest.MonkeyPatch) -> Change:
             assert sum(text.count(old) for text in found.values()) == 1, old
             return {name: text.replace(old, new) for name, text in found.items()}
 
-        monkeypatch.setattr("codegen.harness.emit_c_files", files)
+        monkeypatch.setattr("codegen.harness.harness.emit_c_files", files)
 
     return changed
 

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import (
+from codegen.emit.c_module import emit_c_files
+from codegen.harness.harness import write_harness
+from codegen.toolchain.compiler import (
     FLAGS,
     WARNINGS,
     BuildError,
@@ -20,8 +22,6 @@ from codegen.build import (
     find_compiler,
     flags_at_level,
 )
-from codegen.harness import write_harness
-from codegen.source import emit_c_files
 from language.ir.number_type import NUMBER_TYPES, NumberType, shortest_decimal
 from language.loading.system_reader import with_number_type
 from lockstep import taping

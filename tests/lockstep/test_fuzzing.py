@@ -8,15 +8,15 @@ import shutil
 
 import pytest
 
-from codegen.fuzzing import (
+from codegen.coverage.libfuzzer import (
     ABSOLUTE_WORDS,
     FUZZER_COMPILER,
     WORDS_PER_INPUT,
     decode_sequence,
     word_table,
 )
-from codegen.harness import tick_inputs
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
+from codegen.harness.harness import tick_inputs
 from language.ir.program import Program, unqualified_name
 from lockstep.fuzzing import fuzz
 from modewright import code
@@ -86,7 +86,7 @@ def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) 
         assert right in text
         return {**files, f"{name}.c": text.replace(right, wrong)}
 
-    monkeypatch.setattr("codegen.harness.emit_c_files", torn)
+    monkeypatch.setattr("codegen.harness.harness.emit_c_files", torn)
 
 
 def test_bytes_are_values_and_changes() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
 from engine.simulation.simulate import simulate
 from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
 from language.ir.program import Program
@@ -71,7 +71,7 @@ def test_c_that_does_not_compare_stamps_is_found(monkeypatch: pytest.MonkeyPatch
         files[name] = head + mark + tail.replace("    compare_stamps(self, cal);\n", "", 1)
         return files
 
-    monkeypatch.setattr("codegen.harness.emit_c_files", without)
+    monkeypatch.setattr("codegen.harness.harness.emit_c_files", without)
     found = compare(estimator("float64")).first
     assert found and (found.tick, found.signal) == (TURNED, "faults")
 

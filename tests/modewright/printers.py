@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from codegen.comment import sanitise_comment
+from codegen.emit.c_comment import sanitise_comment
 from engine.results.plot import Panel, PlotLine, draw_picture
 from engine.results.trajectory import Trajectory
 from language.overlays.expand_document import parse_document

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from codegen.comment import MAX_COMMENT_LENGTH
+from codegen.emit.c_comment import MAX_COMMENT_LENGTH
 from language.text.sanitise import INVISIBLE_CATEGORIES
 from tests.modewright.printers import HOSTILE, PRINTERS
 

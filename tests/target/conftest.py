@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from codegen.proofs.wp import OPTIONS
+from codegen.proofs.acsl.wp import OPTIONS
 
 SECONDS = "2"
 """Of a prover for one goal, where a wrong one is looked for: no prover ends it, and those that
@@ -14,4 +14,4 @@ hold are done in a tenth of it."""
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait less for goals that no prover ends."""
-    monkeypatch.setattr("codegen.proofs.wp.OPTIONS", (*OPTIONS[:-1], SECONDS))
+    monkeypatch.setattr("codegen.proofs.acsl.wp.OPTIONS", (*OPTIONS[:-1], SECONDS))

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.chart_contract import (
+from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.proofs.acsl.chart_contract import (
     ChartContract,
     prove_chart_contracts,
     write_chart_contracts,
 )
-from codegen.source import emit_c_files, run_c_passes
-from codegen.tool import DEBIAN_PACKAGES
+from codegen.toolchain.external_tools import DEBIAN_PACKAGES
 from language.charts.chart_context import ChartContext
 from language.ir.ops import Switch
 from language.loading.load import load_automaton, program_of

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS, BuildError, flags_at_level
-from codegen.machine import CORTEX_M4F, run_in_qemu
-from codegen.tool import ARM_COMPILER, EMULATOR
+from codegen.toolchain.compiler import FLAGS, BuildError, flags_at_level
+from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
+from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.compare import TickLog, compare
 from modewright.api import lockstep, program

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.chart_contract import (
+from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.proofs.acsl.chart_contract import (
     ChartContract,
     prove_chart_contracts,
     write_chart_contracts,
 )
-from codegen.source import emit_c_files, run_c_passes
-from codegen.tool import DEBIAN_PACKAGES
+from codegen.toolchain.external_tools import DEBIAN_PACKAGES
 from language.loading.load import program_of
 from language.lowering import fault_mode as fault
 from language.lowering.fault_mode import add_fault_transitions

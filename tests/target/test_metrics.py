@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS
-from codegen.instructions import count_instructions
-from codegen.machine import CORTEX_FLAGS, CORTEX_M4F
-from codegen.metrics import measure_code
-from codegen.source import emit_c_files
-from codegen.tool import ARM_COMPILER, EMULATOR
+from codegen.emit.c_module import emit_c_files
+from codegen.harness.instruction_count import count_instructions
+from codegen.harness.metrics import measure_code
+from codegen.toolchain.compiler import FLAGS
+from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
+from codegen.toolchain.machine import CORTEX_FLAGS, CORTEX_M4F
 from modewright.api import program
 from modewright.cli import app
 from modewright.exits import run_with_exit_code

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import check_contracts, prove_contracts, write_contracts
+from codegen.emit.c_module import emit_c_files
+from codegen.proofs.acsl.mode_contract import check_contracts, prove_contracts, write_contracts
+from codegen.proofs.acsl.wp import KERNEL
 from codegen.proofs.misra import check_misra
-from codegen.proofs.proof import ToolVerdict
-from codegen.proofs.sanitised import check_sanitizers
-from codegen.proofs.stack import check_stack
-from codegen.proofs.strict import check_compiler_warnings
-from codegen.proofs.wp import KERNEL
-from codegen.source import emit_c_files
-from codegen.tool import DEBIAN_PACKAGES, run_tool
+from codegen.proofs.sanitizer_run import check_sanitizers
+from codegen.proofs.stack_usage import check_stack
+from codegen.proofs.warnings import check_compiler_warnings
+from codegen.toolchain.external_tools import DEBIAN_PACKAGES, run_tool
+from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.program import Program
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
@@ -114,7 +114,9 @@ def test_a_mode_that_breaks_its_contract_is_found(
     made = emit_c_files(program("contactor"), by_magnitude=False)
     assert made["contactor.c"].count(right) == 1
     broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
-    monkeypatch.setattr("codegen.proofs.contract.emit_c_files", lambda program, by_amount: broken)
+    monkeypatch.setattr(
+        "codegen.proofs.acsl.mode_contract.emit_c_files", lambda program, by_amount: broken
+    )
     found = check_contracts(
         load_automaton("contactor", Project(Path())), program("contactor"), tmp_path
     )
@@ -198,7 +200,7 @@ def test_a_store_beyond_its_array_is_found(tmp_path: Path, monkeypatch: pytest.M
         assert place in text
         return {**files, "supervisor.c": text.replace(place, "self->log[self->count_of_log + 24]")}
 
-    monkeypatch.setattr("codegen.harness.emit_c_files", torn)
+    monkeypatch.setattr("codegen.harness.harness.emit_c_files", torn)
     (finding,) = check_sanitizers(program("supervisor"), tmp_path).findings
     assert "out of bounds" in finding
 
@@ -237,6 +239,6 @@ def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         text = text.replace(end, "w_em <= 1.7e308)").replace(product, f"{product}2.0 * ")
         return {**files, "estimator_simple.c": text}
 
-    monkeypatch.setattr("codegen.proofs.values.emit_c_files", loosened)
+    monkeypatch.setattr("codegen.proofs.eva.emit_c_files", loosened)
     (found,) = prove("estimator_simple", checks=("values",))
     assert any("estimator_simple.c" in finding for finding in found.findings), found

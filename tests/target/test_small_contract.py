@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import check_contracts
-from codegen.proofs.outline import function_of, move_scratch_to_parameter
-from codegen.source import emit_c_files
-from codegen.tool import DEBIAN_PACKAGES
+from codegen.emit.c_module import emit_c_files
+from codegen.proofs.acsl.function_outlining import function_of, move_scratch_to_parameter
+from codegen.proofs.acsl.mode_contract import check_contracts
+from codegen.toolchain.external_tools import DEBIAN_PACKAGES
 from language.loading.load import program_of
 from tests.language.making import automaton
 

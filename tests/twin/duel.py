@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, run_compiler
-from codegen.harness import LOCKSTEP, tick_inputs, write_harness
-from codegen.instructions import ICOUNT_OPTIONS, MAIN
-from codegen.machine import CORTEX_M4F, HOST, Machine, run_in_qemu
+from codegen.harness.harness import LOCKSTEP, tick_inputs, write_harness
+from codegen.harness.instruction_count import ICOUNT_OPTIONS, MAIN
+from codegen.toolchain.compiler import FLAGS, WARNINGS, run_compiler
+from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine, run_in_qemu
 from lockstep.compare import TickLog
 
 HERE = Path(__file__).parent

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.machine import CORTEX_M4F, HOST, MACHINES
-from codegen.tool import ARM_COMPILER, EMULATOR
+from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
+from codegen.toolchain.machine import CORTEX_M4F, HOST, MACHINES
 from lockstep.compare import TickLog
 from tests.target.closed_loop import record_driveline
 from tests.twin.duel import HERE, duel

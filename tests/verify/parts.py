@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from codegen.source import emit_c_files
+from codegen.emit.c_module import emit_c_files
 from language.ir.printer import digest
 from language.ir.program import Program
 from tests.lockstep.chance.spec import Spec

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
 
-from codegen.build import flags_at_level
-from codegen.machine import CORTEX_M4F, HOST, Machine
+from codegen.toolchain.compiler import flags_at_level
+from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.compare import TickLog, compare
 from tests.target.closed_loop import record_driveline, record_supervisor

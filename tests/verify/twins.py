@@ -10,7 +10,7 @@ import sys
 from fractions import Fraction
 from functools import partial
 
-from codegen.machine import CORTEX_M4F, HOST, Machine
+from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine
 from tests.target.closed_loop import record_driveline
 from tests.twin.duel import duel
 from tests.verify.store import ROOT, Figure, measure_figures

@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from codegen.build import compiler_version, find_compiler, flags_at_level
-from codegen.harness import write_harness
-from codegen.objects import is_shared, object_of
+from codegen.harness.harness import write_harness
+from codegen.toolchain.compiler import compiler_version, find_compiler, flags_at_level
+from codegen.toolchain.object_cache import is_shared, object_of
 from language.ir.program import Program
 from lockstep.compare import TickLog, Verdict, compare_output
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from codegen import expression as printed
-from codegen.statement import StatementEmitter
+from codegen.emit import c_expression as printed
+from codegen.emit.c_statement import StatementEmitter
 from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Compare, Expr
 from tests.lockstep.chance.mutant import Mutant, Patch, attribute, drop_lines
@@ -69,25 +69,27 @@ GENERATOR = (
     Mutant(
         "a division is a product",
         "generator",
-        attribute("codegen.expression._emit_binary", _reciprocal),
+        attribute("codegen.emit.c_expression._emit_binary", _reciprocal),
     ),
     Mutant(
         "literals have 15 digits",
         "generator",
-        attribute("codegen.expression.shortest_decimal", _rough(15)),
+        attribute("codegen.emit.c_expression.shortest_decimal", _rough(15)),
     ),
     Mutant(
         "literals have 16 digits",
         "generator",
-        attribute("codegen.expression.shortest_decimal", _rough(16)),
+        attribute("codegen.emit.c_expression.shortest_decimal", _rough(16)),
     ),
     Mutant(
-        "parentheses are missing", "generator", attribute("codegen.expression._emit_operand", _bare)
+        "parentheses are missing",
+        "generator",
+        attribute("codegen.emit.c_expression._emit_operand", _bare),
     ),
     Mutant(
         "float32 is computed in double",
         "generator",
-        attribute("codegen.expression.format_literal", _double),
+        attribute("codegen.emit.c_expression.format_literal", _double),
     ),
     Mutant(
         "the relation >= fails on equality",
@@ -98,13 +100,13 @@ GENERATOR = (
         "a case falls through",
         "generator",
         attribute(
-            "codegen.statement.StatementEmitter._emit_choose",
+            "codegen.emit.c_statement.StatementEmitter._emit_choose",
             drop_lines("break;")(StatementEmitter._emit_choose),
         ),
     ),
     Mutant(
         "a counter stops one short in C",
         "generator",
-        attribute("codegen.statement.StatementEmitter._emit_count", _short),
+        attribute("codegen.emit.c_statement.StatementEmitter._emit_count", _short),
     ),
 )

@@ -1,0 +1,158 @@
+"""Exploring: ways through generated C that libFuzzer finds, with any page and inputs that are held.
+
+A way is bytes: three for each number of the page that is another one, then groups of ticks - how
+many, and the word of each input (`words`). MC/DC counts what they show (`mcdc.py`).
+"""
+
+from __future__ import annotations
+
+import struct
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from codegen.coverage.libfuzzer import (
+    ABSOLUTE_WORDS,
+    FUZZER_COMPILER,
+    FUZZER_TIMEOUT,
+    SPREAD_WORDS,
+    Range,
+    decode_inputs,
+    format_word_table,
+    word_table,
+)
+from codegen.emit.c_module import restrict_to_step
+from codegen.emit.c_names import SOLVED_PREFIX_ON_PAGE, CNames, c_type
+from codegen.harness.harness import HarnessMain, tick_inputs, write_harness
+from codegen.harness.sanitizers import APP, run_sanitised
+from codegen.toolchain.compiler import FLAGS, BuildError
+from codegen.toolchain.external_tools import output_of
+from language.ir.program import Constant, Program
+from language.ir.traversal import walk_ops
+
+MAIN = HarnessMain("explore_main.c.jinja")
+MAX_PAGE_CHANGES, MAX_TICK_GROUPS = 4, 96
+"""Most numbers of a page that are others, and most groups of ticks."""
+FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)
+HOLD_TICKS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
+"""Ticks of a group: mostly one, and as many as a wait takes."""
+LARGE_PROGRAM, MAX_LARGE_TICKS = 1000, 1000
+"""Operations of a Program that is large, and most ticks of a way through it: else its ways, of
+thousands of ticks each, take most of the time and show nothing more.
+"""
+UNBOUNDED_RANGE = (-1e30, 1e30)
+SEED_FILE, WORDS_HEADER = "known", "words.h"
+
+
+def generate_corpus(
+    program: Program, ranges: Mapping[str, Range], runs: int, seeds: Sequence[int]
+) -> tuple[bytes, ...]:
+    """Return ways that together show all that libFuzzer found in so many runs from each seed.
+
+    Later seeds go on from what earlier ones found; what they are given has one order, so that they
+    find the same each time. `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        sources = write_explorer(program, ranges, folder)
+        flags = [flag for flag in FLAGS if flag != "-O2"]
+        command = [FUZZER_COMPILER, *flags, "-O1", "-fsanitize=fuzzer", *map(str, sources)]
+        output_of([*command, "-o", APP, "-lm"], folder)
+        limits = [
+            f"-runs={runs}",
+            f"-max_len={max_entry_bytes(program)}",
+            "-len_control=0",
+            "-reload=0",
+        ]
+        rest = [f"-timeout={FUZZER_TIMEOUT}", "-use_value_profile=1"]
+        corpus: list[Path] = []
+        for seed in seeds:
+            corpus_folder = folder / f"corpus_{seed}"
+            corpus_folder.mkdir()
+            (folder / SEED_FILE).write_text(",".join(map(str, corpus)))
+            known = [f"-seed_inputs=@{SEED_FILE}"] if corpus else []
+            done = run_sanitised(
+                folder / APP, [*limits, f"-seed={seed}", *rest, *known, corpus_folder.name]
+            )
+            if done.findings:
+                raise BuildError(done.findings[0])
+            corpus = sorted([*corpus, *corpus_folder.iterdir()], key=lambda path: path.name)
+        return tuple(path.read_bytes() for path in corpus)
+
+
+def corpus_records(
+    program: Program, ranges: Mapping[str, Range], corpus: Sequence[bytes]
+) -> Iterator[list[bytes]]:
+    """Yield the records of ways that are gone with the page of the spec, as a `Tape` has them."""
+    most = max_entry_ticks(program)
+    table, size = word_table(program, ranges), 1 + len(tick_inputs(program))
+    record, first = struct.Struct(f"<{size}d"), 3 * MAX_PAGE_CHANGES if page_scalars(program) else 0
+    for entry in corpus:
+        groups = [entry[at : at + size] for at in range(first, len(entry) - size + 1, size)]
+        inputs = decode_inputs(program, table, b"".join(group[1:] for group in groups))
+        hold_ticks = [HOLD_TICKS[group[0] % len(HOLD_TICKS)] for group in groups]
+        pairs = zip(hold_ticks, inputs, strict=True)
+        entry_records = (
+            one for ticks, values in pairs for one in [record.pack(*values, 0.0)] * ticks
+        )
+        yield list(islice(entry_records, most))
+
+
+def max_entry_bytes(program: Program) -> int:
+    """Return the size of the longest way [bytes]."""
+    return 3 * MAX_PAGE_CHANGES + MAX_TICK_GROUPS * (1 + len(tick_inputs(program)))
+
+
+def max_entry_ticks(program: Program) -> int:
+    """Return the most ticks of a way."""
+    count = sum(1 for block in program.blocks.values() for _ in walk_ops(block))
+    return MAX_LARGE_TICKS if count > LARGE_PROGRAM else MAX_TICK_GROUPS * max(HOLD_TICKS)
+
+
+def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
+    """Write the C of a program and what goes its ways; return the sources to compile."""
+    sources = write_harness(
+        program, folder, main=MAIN, extra_context={"page": page_scalars(program)}
+    )
+    numbers = {
+        "ABSOLUTE": ABSOLUTE_WORDS,
+        "FIRST": SPREAD_WORDS // 2,
+        "CHANGES": f"{MAX_PAGE_CHANGES}U",
+        "FACTORS": f"{len(FACTORS)}U",
+        "HOLDS": f"{len(HOLD_TICKS)}U",
+        "LONGEST": max_entry_bytes(program),
+        "MOST": f"{max_entry_ticks(program)}U",
+    }
+    lines = [f"#define {name} {number}" for name, number in numbers.items()]
+    lines.append(_format_array("double", "factor", FACTORS))
+    lines.append(_format_array("uint16_t", "hold", HOLD_TICKS))
+    (folder / WORDS_HEADER).write_text(
+        "\n".join([*lines, format_word_table(word_table(program, ranges))])
+    )
+    return sources
+
+
+def page_scalars(program: Program) -> list[dict[str, Any]]:
+    """Return the single numbers of a page: their members, types and ranges."""
+    program = restrict_to_step(program)
+    c_names = CNames(program, solved_prefix=SOLVED_PREFIX_ON_PAGE)
+    scalars = []
+    for one in program.constants:
+        if one.kind in ("tunable", "solved") and not one.items and one.type != "truth":
+            low, high = _constant_range(one)
+            member, kind = c_names(one.name).removeprefix("cal->"), c_type(one, program.number_type)
+            scalars.append({"member": member, "type": kind, "low": low, "high": high})
+    return scalars
+
+
+def _constant_range(constant: Constant) -> Range:
+    """Return the range of a number of a page: one without may be any, a word one of its list."""
+    if constant.range:
+        return float(constant.range[0]), float(constant.range[1])
+    return (0.0, float(len(constant.values) - 1)) if constant.values else UNBOUNDED_RANGE
+
+
+def _format_array(kind: str, name: str, numbers: Sequence[float]) -> str:
+    return f"static const {kind} {name}[] = {{{', '.join(map(repr, numbers))}}};"

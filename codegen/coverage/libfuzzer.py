@@ -1,0 +1,148 @@
+"""Fuzzing: sequences of inputs by which libFuzzer looks for every way through generated C.
+
+A sequence is bytes, one for each input of each tick: the place of its value in a table (`words`).
+The C runs under sanitizers and writes down each sequence with a sum of all that it carried.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.emit.c_names import c_type
+from codegen.harness.harness import HarnessMain, tick_inputs, write_harness
+from codegen.harness.sanitizers import build_sanitised, run_sanitised
+from language.ir.number_type import MAX_FINITE
+from language.ir.program import Program, Variable, unqualified_name
+
+FUZZER_COMPILER = "clang-19"
+WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
+"""Words of an input; those that are values, and how many of these are spread over its range. The
+others are changes: half of them small and smaller steps, as many none."""
+DEFAULT_INPUT_RANGE = (-1000.0, 1000.0)
+MAIN = HarnessMain("fuzz_main.c.jinja")
+MAX_SEQUENCE_TICKS = 64
+"""Most ticks of a sequence that the C reads."""
+FUZZER_TIMEOUT = 60
+"""Seconds of one sequence after which libFuzzer takes it for one without end."""
+SEQUENCES_FILE = "sequences.bin"
+COVERAGE_LINE = re.compile(r"cov: (\d+)")
+SEQUENCE_HEADER = struct.Struct("<II")
+Range = tuple[float, float]
+WordValues = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FuzzerRun:
+    """What libFuzzer tried: each sequence with the CRC-32 of its records, `edges` of the C that it
+    came along, and what sanitizers said.
+    """
+
+    sequences: tuple[tuple[bytes, int], ...]
+    edges: int
+    findings: tuple[str, ...]
+
+
+def run_fuzzer(
+    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
+) -> FuzzerRun:
+    """Run libFuzzer on the C of a Program; `ranges` are those of inputs by name.
+
+    Raises ToolMissing, BuildError.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        table = word_table(program, ranges)
+        sources = write_harness(program, folder, main=MAIN)
+        (folder / "words.h").write_text(_format_header(table))
+        app = build_sanitised(FUZZER_COMPILER, sources, folder, "fuzzer,")
+        (folder / "corpus").mkdir()
+        return _run_libfuzzer(app, runs, ticks * len(table), seed)
+
+
+def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues]:
+    """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
+    return [
+        _input_words(v, program, ranges.get(unqualified_name(v.name))) for v in tick_inputs(program)
+    ]
+
+
+def decode_sequence(
+    program: Program, table: list[WordValues], sequence: bytes
+) -> Iterator[WordValues]:
+    """Yield the inputs of each tick of a sequence, as the C reads them."""
+    yield from decode_inputs(program, table, sequence[: MAX_SEQUENCE_TICKS * len(table)])
+
+
+def decode_inputs(program: Program, table: list[WordValues], data: bytes) -> Iterator[WordValues]:
+    """Yield the inputs that bytes choose, one for each, in turn: values, or changes of the last."""
+    real = [variable.type == "real" for variable in tick_inputs(program)]
+    last = [own[SPREAD_WORDS // 2] for own in table]
+    for at in range(0, len(data) - len(table) + 1, len(table)):
+        for k, byte in enumerate(data[at : at + len(table)]):
+            is_change = real[k] and byte >= ABSOLUTE_WORDS
+            last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
+        yield tuple(last)
+
+
+def _input_words(variable: Variable, program: Program, value_range: Range | None) -> WordValues:
+    """Return the words of an input: values first, then changes of a real."""
+    if variable.type == "truth":
+        return (0.0, 1.0) * (WORDS_PER_INPUT // 2)
+    if variable.type == "whole":
+        is_byte = c_type(variable, program.number_type) == "uint8_t"
+        count = len(variable.values) or 8
+        odd = (count, count + 1, 255) if is_byte else (-1, count, -(2**31), 2**31 - 1)
+        usual = [k % count for k in range(WORDS_PER_INPUT - len(odd))]
+        return tuple(float(k) for k in (*usual, *odd))
+    low, high = value_range or DEFAULT_INPUT_RANGE
+    span, most = high - low, MAX_FINITE[program.number_type]
+    spread = [low + span * k / (SPREAD_WORDS - 1) for k in range(SPREAD_WORDS)]
+    edges = [math.nextafter(end, to) for end in (low, high) for to in (-math.inf, math.inf)]
+    special = [*edges, low - span, high + span, 0.0, -0.0, 1.0, -1.0, 5e-324, -1e-40, 1e30]
+    special += [most, -most, math.nan, math.inf, -math.inf]
+    special += [0.0] * (ABSOLUTE_WORDS - SPREAD_WORDS - len(special))
+    steps = [sign * span * 2.0 ** (-k / 2) for k in range(40) for sign in (1.0, -1.0)]
+    return (*spread, *special, *steps, *[0.0] * (WORDS_PER_INPUT - ABSOLUTE_WORDS - len(steps)))
+
+
+def _run_libfuzzer(app: Path, runs: int, most: int, seed: int) -> FuzzerRun:
+    options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={FUZZER_TIMEOUT}"]
+    done = run_sanitised(app, [*options, "-len_control=0", "corpus"])
+    edges = max(
+        (int(found) for line in done.lines for found in COVERAGE_LINE.findall(line)), default=0
+    )
+    kept = app.parent / SEQUENCES_FILE
+    data = kept.read_bytes() if kept.exists() else b""  # none where the first one did not end
+    return FuzzerRun(tuple(_read_sequences(data)), edges, done.findings)
+
+
+def _read_sequences(data: bytes) -> Iterator[tuple[bytes, int]]:
+    at = 0
+    while at < len(data):
+        size, checksum = SEQUENCE_HEADER.unpack_from(data, at)
+        at += SEQUENCE_HEADER.size
+        yield data[at : at + size], checksum
+        at += size
+
+
+def _format_header(table: list[WordValues]) -> str:
+    sizes = f"#define ABSOLUTE {ABSOLUTE_WORDS}\n#define FIRST {SPREAD_WORDS // 2}\n#define LONGEST {MAX_SEQUENCE_TICKS}\n"
+    return sizes + format_word_table(table)
+
+
+def format_word_table(table: list[WordValues]) -> str:
+    """Return the table as C: hexadecimal digits of each double."""
+    rows = ",\n".join(f"    {{{', '.join(_format_double(word) for word in own)}}}" for own in table)
+    return f"static const double word[{len(table)}][{WORDS_PER_INPUT}] = {{\n{rows}\n}};\n"
+
+
+def _format_double(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    return value.hex() if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"

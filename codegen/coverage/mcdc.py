@@ -1,0 +1,250 @@
+"""MC/DC: which conditions of generated C were shown to matter, as clang counts them.
+
+A condition of a decision is shown where two runs of it are known that differ in that condition, as
+far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-6 2001; clang's
+-fcoverage-mcdc). A decision of one condition is shown where it was true once and false once.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from codegen.coverage.coverage_exploration import write_explorer
+from codegen.emit.c_module import STATIC_PATTERN, run_c_passes
+from codegen.harness.harness import write_harness
+from codegen.proofs.infeasible.float_terms import Range
+from codegen.proofs.infeasible.infeasible_conditions import (
+    DecisionSite,
+    decision_sites,
+    prove_infeasible,
+    unshare_expressions,
+)
+from codegen.toolchain.compiler import FLAGS, run_executable
+from codegen.toolchain.external_tools import output_of
+from codegen.toolchain.machine import HOST
+from language.ir.program import Program
+
+COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
+COVERAGE_FLAGS = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
+APP, EXPLORER, RAW_PROFILE, MERGED_PROFILE = (
+    "app",
+    "explorer",
+    "counts_%1m.profraw",
+    "counts.profdata",
+)
+FUNCTION = re.compile(rf"(?:{STATIC_PATTERN})?void (\w+)\(")
+CASE = re.compile(r"case\b|default\b")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A decision of the C: the block and line in which it is, its text, of each condition whether
+    it was `shown`, and the one outcome that it can `never` have, where that is proven.
+    """
+
+    block: str
+    line: int
+    text: str
+    shown: tuple[bool, ...]
+    never: tuple[bool | None, ...]
+
+    @property
+    def open(self) -> int:
+        """How many conditions are neither shown nor proven to be infeasible."""
+        pairs = zip(self.shown, self.never, strict=True)
+        return sum(not shown and outcome is None for shown, outcome in pairs)
+
+
+T = TypeVar("T", Decision, DecisionSite)
+
+
+@dataclass(frozen=True)
+class McdcCoverage:
+    """What `sequences` of inputs have shown of the C of a Program, over so many `steps`."""
+
+    file: str
+    sequences: int
+    steps: int
+    decisions: tuple[Decision, ...]
+
+    @property
+    def conditions(self) -> int:
+        """How many conditions there are."""
+        return sum(len(decision.shown) for decision in self.decisions)
+
+    @property
+    def shown(self) -> int:
+        """How many of them were shown to matter."""
+        return sum(sum(decision.shown) for decision in self.decisions)
+
+    @property
+    def open(self) -> int:
+        """How many of them are neither shown nor proven to be infeasible."""
+        return sum(decision.open for decision in self.decisions)
+
+    @property
+    def uncovered(self) -> tuple[Decision, ...]:
+        """The decisions of which a condition was not shown."""
+        return tuple(decision for decision in self.decisions if not all(decision.shown))
+
+
+def add_infeasibility_proofs(
+    coverage: McdcCoverage, program: Program, ranges: Mapping[str, Range]
+) -> McdcCoverage:
+    """Return what was covered with a proof of what no input can show of a sampled Program.
+
+    `ranges` are those of its variables between two steps, as far as they stay in them.
+    """
+    c_program = unshare_expressions(run_c_passes(program))
+    sites = _group_by_block(decision_sites(c_program))
+    decisions = _group_by_block(coverage.decisions)
+    missed = [block for block, of in decisions.items() if any(not all(d.shown) for d in of)]
+    matched = [p for block in missed for p in _match_sites(decisions[block], sites.get(block, []))]
+    proven = prove_infeasible(
+        c_program, ranges, list(dict.fromkeys(_uncovered_conditions(matched)))
+    )
+    outcomes = {id(decision): _proven_outcomes(at, proven, decision) for decision, at in matched}
+    replaced = (replace(d, never=outcomes.get(id(d)) or d.never) for d in coverage.decisions)
+    return replace(coverage, decisions=tuple(replaced))
+
+
+def _uncovered_conditions(matched: Iterable[tuple[Decision, list[DecisionSite]]]) -> Iterator[int]:
+    """Yield the numbers of the conditions that were not shown, at all places where they may be."""
+    for decision, places in matched:
+        for place in places:
+            if len(place.conditions) == len(decision.shown):
+                pairs = zip(place.conditions, decision.shown, strict=True)
+                yield from (number for number, shown in pairs if not shown)
+
+
+def _group_by_block(items: Iterable[T]) -> dict[str, list[T]]:
+    groups: dict[str, list[T]] = {}
+    for thing in items:
+        groups.setdefault(thing.block, []).append(thing)
+    return groups
+
+
+def _match_sites(
+    decisions: Sequence[Decision], sites: Sequence[DecisionSite]
+) -> Iterator[tuple[Decision, list[DecisionSite]]]:
+    """Yield the decisions of a block with their places: where both are the same in the same order,
+    each has one, else all that have its text, unless there are fewer of these than of decisions.
+    """
+    if [d.text for d in decisions] == [place.text for place in sites]:
+        yield from ((d, [place]) for d, place in zip(decisions, sites, strict=True))
+        return
+    counts = Counter(d.text for d in decisions)
+    for decision in decisions:
+        found = [place for place in sites if place.text == decision.text]
+        yield decision, found if len(found) >= counts[decision.text] else []
+
+
+def _proven_outcomes(
+    sites: Sequence[DecisionSite], proven: Mapping[int, bool], decision: Decision
+) -> tuple[bool | None, ...]:
+    """Return what is proven of each condition at all places where it may stand."""
+    found: list[bool | None] = []
+    for position, shown in enumerate(decision.shown):
+        of = [place.conditions for place in sites if len(place.conditions) == len(decision.shown)]
+        outcomes = {proven.get(conditions[position]) for conditions in of}
+        found.append(outcomes.pop() if len(outcomes) == 1 and not shown else None)
+    return tuple(found)
+
+
+def measure_mcdc(
+    program: Program,
+    sequences: Sequence[Sequence[bytes]],
+    corpus: Sequence[bytes] = (),
+    ranges: Mapping[str, Range] | None = None,
+) -> McdcCoverage:
+    """Run the C of a Program on sequences of input records, and on ways through it, and tell what
+    they show of it.
+
+    Records are those of a `Tape`, ways those of `explored` with the same `ranges` of inputs.
+    Raises ToolMissing, BuildError.
+    """
+    file = f"{program.name}.c"
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        environment = {
+            "LLVM_PROFILE_FILE": str(folder / RAW_PROFILE)
+        }  # a run adds to what is there
+        app = _build(write_harness(program, folder), folder, HOST.link(folder))
+        for sequence in sequences:
+            run_executable(app, b"".join(sequence), environment)
+        steps = sum(map(len, sequences))
+        if corpus:
+            steps += _run_corpus(corpus, program, ranges or {}, folder, environment)
+        profiles = sorted(path.name for path in folder.glob("counts_*.profraw"))
+        output_of([MERGER, "merge", "-sparse", *profiles, "-o", MERGED_PROFILE], folder)
+        command = [EXPORTER, "export", APP, f"-instr-profile={MERGED_PROFILE}", str(folder / file)]
+        found = json.loads(output_of(command, folder))
+        text = (folder / file).read_text().split("\n")
+    (coverage,) = found["data"][0]["files"]
+    decisions = tuple(_parse_decisions(program.name, coverage, text))
+    return McdcCoverage(file, len(sequences) + len(corpus), steps, decisions)
+
+
+def _build(sources: Sequence[Path], folder: Path, link: Sequence[str], app: str = APP) -> Path:
+    flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERAGE_FLAGS]
+    output_of([COMPILER, *flags, *map(str, sources), "-o", app, *link], folder)
+    return folder / app
+
+
+def _run_corpus(
+    corpus: Sequence[bytes],
+    program: Program,
+    ranges: Mapping[str, Range],
+    folder: Path,
+    environment: Mapping[str, str],
+) -> int:
+    """Go some ways through the C of a Program; return how many steps these are."""
+    sources = write_explorer(program, ranges, folder)
+    app = _build(sources, folder, ("-DALONE", "-lm"), EXPLORER)
+    names = []
+    for number, entry in enumerate(corpus):
+        names.append(str(folder / f"{number}.way"))
+        Path(names[-1]).write_bytes(entry)
+    (done,) = output_of([str(app), *names], folder, environment).split()
+    return int(done)
+
+
+def _parse_decisions(
+    name: str, coverage: dict[str, Any], text: Sequence[str]
+) -> Iterator[Decision]:
+    """Yield decisions in the order of the file: several conditions, then one alone."""
+    found = []
+    spans = []
+    for record in coverage["mcdc_records"]:
+        begin, end = tuple(record[:2]), tuple(record[2:4])
+        spans.append((begin, end))
+        found.append((begin, end, tuple(record[-1])))
+    for branch in coverage["branches"]:
+        begin, end, (true, false) = tuple(branch[:2]), tuple(branch[2:4]), branch[4:6]
+        is_inside = any(first <= begin and end <= last for first, last in spans)
+        if not is_inside and not CASE.match(_source_text(text, begin, end)):
+            found.append((begin, end, (bool(true and false),)))
+    for begin, end, shown in sorted(found):
+        block = _enclosing_block(name, text[: begin[0]])
+        yield Decision(block, begin[0], _source_text(text, begin, end), shown, (None,) * len(shown))
+
+
+def _enclosing_block(name: str, lines: Sequence[str]) -> str:
+    """Return the block whose function begins last in some lines."""
+    begun = next(found[1] for line in reversed(lines) if (found := FUNCTION.match(line)))
+    return begun.removeprefix(f"{name}_").lower() if begun.startswith(f"{name}_") else begun
+
+
+def _source_text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:
+    """Return the text from one place to another, lines and columns counted from 1."""
+    inside = list(lines[begin[0] - 1 : end[0]])
+    inside[-1] = inside[-1][: end[1] - 1]
+    inside[0] = inside[0][begin[1] - 1 :]
+    return " ".join(" ".join(inside).split())

@@ -1,0 +1,1 @@
+"""Printing of a Program as C: names, expressions, statements, structures, modules."""

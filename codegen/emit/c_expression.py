@@ -1,0 +1,114 @@
+"""Expression: an expression of a Program as C99, in the same order of operations (rule C2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from codegen.emit.c_names import C_REAL_TYPE
+from language.ir.number_type import NumberType, shortest_decimal
+from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
+
+
+class CNameMap(Protocol):
+    """Where the variables of a Program live in C, and the type of its reals."""
+
+    @property
+    def number(self) -> NumberType:
+        """The type of the reals."""
+
+    def __call__(self, name: str) -> str:
+        """Return the C text for a variable or constant."""
+
+    def integer_constant(self, name: str, number: int) -> str:
+        """Return a number as it is written beside a whole-number variable: a mode by its name."""
+
+    def is_unsigned(self, name: str) -> bool:
+        """Tell whether a variable is a whole number without a sign."""
+
+
+LIBM_FUNCTIONS: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
+"""Operations that C gives exactly; all others are in ha_math."""
+MATH_SUFFIX: Mapping[NumberType, str] = {"float64": "", "float32": "f"}
+"""What C adds to the name of a function for its form in a type: sqrt, sqrtf."""
+LOGICAL_OPERATORS: Mapping[str, str] = {"and": "&&", "or": "||"}
+LEFT_ASSOCIATIVE: Mapping[str, str] = {
+    **{"+": "+-", "-": "+-", "*": "*/", "/": "*/"},
+    **{"and": "and", "or": "or"},
+}
+"""Operators of the left operand that C evaluates first without parentheses: (a + b) - c."""
+
+
+def emit_expression(expr: Expr, c_names: CNameMap) -> str:
+    """Return the C text: parentheses around every operand but those that C takes first anyway."""
+    match expr:
+        case Value(value):
+            return format_literal(value, c_names.number)
+        case Ref(name):
+            return c_names(name)
+        case Item(name, index):
+            return f"{c_names(name)}[{emit_expression(index, c_names)}]"
+        case Unary("-", operand):
+            return f"-{_emit_operand(operand, c_names)}"
+        case Unary(_, operand):
+            return f"!{_emit_operand(operand, c_names)}"
+        case Binary(operator, left, right):
+            return _emit_binary(
+                expr, LOGICAL_OPERATORS.get(operator, operator), left, right, c_names
+            )
+        case Compare(operator, left, right):
+            if isinstance(left, Ref) and isinstance(right, Value) and type(right.value) is int:
+                return f"{c_names(left.name)} {operator} {c_names.integer_constant(left.name, right.value)}"
+            if isinstance(left, Ref) and isinstance(right, Ref):
+                first, second = _match_signedness(left.name, right.name, c_names)
+                return f"{first} {operator} {second}"
+            return f"{_emit_operand(left, c_names)} {operator} {_emit_operand(right, c_names)}"
+        case Select(condition, then, other):
+            parts = [_emit_operand(part, c_names) for part in (condition, then, other)]
+            return f"{parts[0]} ? {parts[1]} : {parts[2]}"
+        case Call(function, arguments):
+            texts = [emit_expression(argument, c_names) for argument in arguments]
+            return _emit_call(function, texts, c_names.number)
+
+
+def format_literal(value: float | int | bool, number: NumberType) -> str:
+    """Return a literal: the shortest decimal that reads back as the same bits (rule C4)."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return repr(value)
+    return shortest_decimal(value, number) + MATH_SUFFIX[number].upper()
+
+
+def _match_signedness(left: str, right: str, c_names: CNameMap) -> list[str]:
+    """Return two variables for a comparison: one without a sign as a number with one, beside such
+    a one.
+    """
+    names = (left, right)
+    unsigned = [c_names.is_unsigned(name) for name in names]
+    mixed = len(set(unsigned)) == 2
+    return [
+        f"(int32_t){c_names(name)}" if mixed and is_unsigned else c_names(name)
+        for name, is_unsigned in zip(names, unsigned, strict=True)
+    ]
+
+
+def _emit_operand(expr: Expr, c_names: CNameMap) -> str:
+    text = emit_expression(expr, c_names)
+    simple = isinstance(expr, Ref | Item | Call) or (isinstance(expr, Value) and text[0] != "-")
+    return text if simple else f"({text})"
+
+
+def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names: CNameMap) -> str:
+    chained = isinstance(left, Binary) and left.operator in LEFT_ASSOCIATIVE.get(
+        binary.operator, ""
+    )
+    first = emit_expression(left, c_names) if chained else _emit_operand(left, c_names)
+    return f"{first} {operator} {_emit_operand(right, c_names)}"
+
+
+def _emit_call(function: str, arguments: list[str], number: NumberType) -> str:
+    if function == "real":
+        return f"({C_REAL_TYPE[number]})({arguments[0]})"
+    name = LIBM_FUNCTIONS.get(function, f"ha_{function}") + MATH_SUFFIX[number]
+    return f"{name}({', '.join(arguments)})"

@@ -1,0 +1,104 @@
+"""Mathematics: ha_math as C99 - functions whose bits do not depend on a library (rule C6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from codegen.emit.c_expression import MATH_SUFFIX, emit_expression, format_literal
+from codegen.emit.c_names import C_REAL_TYPE
+from codegen.emit.c_statement import (
+    INDENT,
+    MAX_LINE_WIDTH,
+    emit_select,
+    emit_wrapped_statement,
+    is_nested,
+)
+from codegen.toolchain.templates import product_version, render
+from language.ir.number_type import NumberType
+from language.ir.ops import Assign, Select
+from language.ir.program import Function, unqualified_name
+from language.numerics.function_table import FUNCTIONS_BY_TYPE
+
+
+@dataclass(frozen=True)
+class FloatFormat:
+    """How IEEE 754 keeps a real: `bits` in all, `digits` after the point, exponents of 2."""
+
+    bits: int
+    digits: int
+    lowest: int
+    highest: int
+
+
+FLOAT_FORMATS: Mapping[NumberType, FloatFormat] = {
+    "float64": FloatFormat(64, 52, -1022, 1023),
+    "float32": FloatFormat(32, 23, -126, 127),
+}
+
+
+def emit_math_files(number: NumberType) -> dict[str, str]:
+    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule C6)."""
+    suffix = MATH_SUFFIX[number]
+    context = {
+        "functions": [
+            _function_context(function, number) for function in FUNCTIONS_BY_TYPE[number].values()
+        ],
+        "version": product_version(),
+        "real": C_REAL_TYPE[number],
+        "suffix": suffix,
+        "zero": format_literal(0.0, number),
+        "one": format_literal(1.0, number),
+        "layout": FLOAT_FORMATS[number],
+        "lowest": format_literal(float(FLOAT_FORMATS[number].lowest), number),
+        "highest": format_literal(float(FLOAT_FORMATS[number].highest), number),
+    }
+    return {
+        f"ha_math{suffix}.h": render("ha_math.h.jinja", context),
+        f"ha_math{suffix}.c": render("ha_math.c.jinja", context),
+    }
+
+
+@dataclass(frozen=True)
+class _LocalNameMap:
+    """Inside a function of ha_math every variable is a local."""
+
+    number: NumberType
+
+    def __call__(self, name: str) -> str:
+        return unqualified_name(name)
+
+    def integer_constant(self, name: str, number: int) -> str:
+        return str(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        return False
+
+
+def _function_context(function: Function, number: NumberType) -> dict[str, Any]:
+    c_names = _LocalNameMap(number)
+    lines: list[str] = []
+    for op in function.body:
+        assert isinstance(op, Assign)
+        left = (
+            "return "
+            if op.target == "work.y"
+            else f"const {C_REAL_TYPE[number]} {c_names(op.target)} = "
+        )
+        if isinstance(op.value, Select) and is_nested(op.value):
+            lines += emit_select(
+                C_REAL_TYPE[number],
+                c_names(op.target),
+                op.value,
+                c_names,
+                MAX_LINE_WIDTH - len(INDENT),
+            )
+            lines += ["return y;"] if op.target == "work.y" else []
+        else:
+            lines += emit_wrapped_statement(
+                left, emit_expression(op.value, c_names), "", MAX_LINE_WIDTH - len(INDENT)
+            )
+    parameters = ", ".join(f"{C_REAL_TYPE[number]} {name}" for name in function.parameters)
+    about = function.about
+    return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

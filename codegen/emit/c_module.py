@@ -1,0 +1,365 @@
+"""Source: a Program as C99 - header, source, mathematics (rules C12 and C13)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from codegen.emit.c_expression import MATH_SUFFIX, format_literal
+from codegen.emit.c_math import emit_math_files
+from codegen.emit.c_names import (
+    C_REAL_TYPE,
+    SOLVED_PREFIX_CONSTANT,
+    SOLVED_PREFIX_ON_PAGE,
+    CNames,
+    c_member,
+    c_type,
+    enumerations,
+    mode_constant,
+    run_mode_constant,
+    transition_constants,
+    value_constant,
+)
+from codegen.emit.c_statement import INDENT, MAX_LINE_WIDTH, StatementEmitter
+from codegen.emit.c_struct import ECU_PAGE, HOST_PAGE, PageLayout, member_of, struct_members
+from codegen.emit.function_comments import describe_function
+from codegen.emit.scratch import STEP, Scratch, adjust_usages, scratch_of
+from codegen.passes.block_usage import Usage, block_usages, locals_of, loop_locals
+from codegen.passes.dead_stores import remove_dead_stores
+from codegen.passes.fast_path import EVENT_PATH, FastPathMode, add_fast_path
+from codegen.passes.inline_policy import select_noinline_blocks
+from codegen.passes.range_check_merging import LATCH_EACH, merge_range_checks
+from codegen.toolchain.templates import product_version, render
+from language.ir.ops import FaultBit, RunBlock
+from language.ir.printer import digest
+from language.ir.program import Program, Variable
+from language.ir.traversal import names_used, walk_ops
+from language.lowering.calibration_stamp import STALE_CALIBRATION
+from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
+from language.lowering.program_builder import finalise_program
+from language.model.declaration import MICRO_STEP_LIMIT_FAULT
+from language.numerics.function_table import FUNCTIONS_BY_TYPE
+from language.observers.covariance_update import COVARIANCE_RANGE
+from language.programs.major_step import LIVELOCK, ZENO
+from language.programs.model_run import EVENT_LIMIT
+from language.programs.rewind import REWIND_LIMIT
+
+FAULT_REASONS = {
+    COVARIANCE_RANGE: "a variance was outside its range",
+    EVENT_LIMIT: "more transitions in a tick than `events`: the rest is dropped",
+    LIVELOCK: "transitions at an instant did not end: no more are taken",
+    MICRO_STEP_LIMIT_FAULT: "transitions of a tick did not end: no more are taken",
+    REWIND_LIMIT: "a rewind would go back further than ticks are kept",
+    STALE_CALIBRATION: "solved numbers belong to another calibration",
+    ZENO: "more transitions than a step may have: its rest is dropped",
+}
+
+RANGE_REASON = "{} was outside its range"
+
+
+def fault_reason(program: Program, fault: str) -> str:
+    """Return why a fault bit is set; nothing where only the spec knows."""
+    if fault in FAULT_REASONS:
+        return FAULT_REASONS[fault]
+    ops = (op for block in program.blocks.values() for op in walk_ops(block))
+    set_by = (
+        op.signal for op in ops if isinstance(op, FaultBit) and op.fault == fault and op.value
+    )
+    names = dict.fromkeys(name for name in set_by if name)
+    return RANGE_REASON.format(" or ".join(names)) if names else ""
+
+
+ENTRIES = ("init", "derive", "step")
+
+COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")
+"""Blocks that are kept out of the way of what a step does nearly always."""
+
+NOT_INLINED = {
+    "RARELY": "Runs rarely: not inlined",
+    "NOT_INLINED": "Computes much: its values are on the stack only while it runs",
+}
+"""Keywords of functions of a module, with why."""
+
+STATIC_PATTERN = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
+"""How the definition of such a function begins, as a pattern."""
+
+INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
+
+
+def emit_c_files(
+    program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
+) -> dict[str, str]:
+    """Return the generated files of a Program by name: one that has a `step`.
+
+    `by_magnitude` as in `gated`, `fast_path` as in `leaping`. A continuous automaton has none where an
+    input varies inside a step: then ValueError.
+    """
+    if "step" not in program.blocks:
+        raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
+    context = {
+        **module_context(run_c_passes(program, by_magnitude, fast_path), ECU_PAGE),
+        "digest": digest(program),
+    }
+    files = {
+        f"{program.name}.h": render("module.h.jinja", context),
+        f"{program.name}_MemMap.h": render("memory_map.h.jinja", context),
+        f"{program.name}.c": render("module.c.jinja", context),
+    }
+    if context["uses_math"]:
+        files.update(emit_math_files(program.number_type))
+    return files
+
+
+def run_c_passes(
+    program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
+) -> Program:
+    """Return the Program that C is printed of: the same bits, in the way that suits C."""
+    return add_fast_path(
+        merge_range_checks(remove_dead_stores(restrict_to_step(program), ("work.",)), by_magnitude),
+        fast_path,
+    )
+
+
+def restrict_to_step(program: Program) -> Program:
+    """Return a Program with only what its `step` runs, as the C has it: no invariants."""
+    if program.period is None:
+        return finalise_program(program, ENTRIES)
+    blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
+    variables = tuple(v for v in program.variables if not v.name.startswith(INVARIANT_PREFIX))
+    return dataclasses.replace(program, blocks=blocks, variables=variables)
+
+
+def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dict[str, Any]:
+    """Return what the templates of a Program's files read."""
+    number = program.number_type
+    loop_variables = loop_locals(program)
+    local = locals_of(program, loop_variables)
+    usage_by_block = block_usages(program, local, page_layout.groups)
+    kinds = {variable.name: c_type(variable, program.number_type) for variable in program.variables}
+    called_functions = {
+        name.removeprefix("call ") for name in names_used(program.blocks.values()) if " " in name
+    }
+    shared = _shared_work_variables(program, local)
+    scratch = scratch_of(program, shared, usage_by_block, page_layout.holds_solved)
+    if scratch and scratch.block != STEP:
+        usage_by_block = adjust_usages(program, usage_by_block, scratch)
+    blocks = _emit_functions(
+        program, local, loop_variables, usage_by_block, kinds, page_layout, scratch
+    )
+    return {
+        **_name_context(program),
+        **struct_members(program, page_layout),
+        "work": [member_of(variable, number) for variable in shared],
+        "scratch": scratch and _scratch_context(program, scratch, kinds),
+        "work_type": _work_type(program, page_layout, scratch),
+        "calls": {
+            block: f"{block}({', '.join(usage_by_block[block].parameters)})"
+            for block in usage_by_block
+        },
+        "blocks": [block for block in blocks if block["name"] not in ENTRIES],
+        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "keywords": [
+            (word, why)
+            for word, why in NOT_INLINED.items()
+            if any(block["keyword"] == word for block in blocks)
+        ],
+        "has_stamps": "compare_stamps" in program.blocks,
+        "uses_math": bool(called_functions & {*FUNCTIONS_BY_TYPE[number], *INLINE_FUNCTIONS}),
+        "uses_libm": bool(called_functions & {"abs", "sqrt", "floor"}),
+    }
+
+
+def _name_context(program: Program) -> dict[str, Any]:
+    """What the files are called, and the numbers that have names."""
+    return {
+        "name": program.name,
+        "guard": f"{program.name.upper()}_H",
+        "version": product_version(),
+        "pace": _format_pace(program),
+        "step": _describe_step(program),
+        "modes": [(mode_constant(program, mode.number), mode.number) for mode in program.modes],
+        "regions": [
+            (
+                info.name,
+                [(mode_constant(program, m.number, info.name), m.number) for m in info.modes],
+            )
+            for info in program.regions
+        ],
+        "numbered": [(c, number) for number, c in transition_constants(program).items()],
+        "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
+        "enumerations": [
+            (name, [(value_constant(program, values, n), n) for n in range(len(values))])
+            for name, values in enumerations(program)
+        ],
+        "faults": [
+            (bit, fault, fault_reason(program, fault)) for bit, fault in enumerate(program.faults)
+        ],
+        "transitions": program.transitions,
+        "real": C_REAL_TYPE[program.number_type],
+        "suffix": MATH_SUFFIX[program.number_type],
+    }
+
+
+def _format_pace(program: Program) -> str:
+    if program.period is None:
+        return f"Major step: {program.major_step} s"
+    return f"Period: {program.period} s"
+
+
+def _describe_step(program: Program) -> str:
+    if program.period is None:
+        return (
+            f"{program.major_step} s of flow under the inputs of the step before, then those of now"
+        )
+    return f"One tick of {program.period} s"
+
+
+def _shared_work_variables(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
+    inside = {name for names in local.values() for name in names}
+    return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
+
+
+def _work_type(program: Program, page_layout: PageLayout, scratch: Scratch | None) -> str:
+    """Return the type of a step's values: where others see it, with the name of the module."""
+    is_seen = page_layout.holds_solved and scratch is not None and scratch.is_in_instance
+    return f"{program.name}_Work" if is_seen else "Work"
+
+
+def _scratch_context(
+    program: Program, scratch: Scratch, kinds: Mapping[str, str]
+) -> dict[str, Any]:
+    return {
+        "block": scratch.block,
+        "begun": _initial_assignments(program, scratch, kinds),
+        "is_in_instance": scratch.is_in_instance,
+    }
+
+
+def _initial_assignments(
+    program: Program, scratch: Scratch, kinds: Mapping[str, str]
+) -> list[tuple[str, str]] | None:
+    """Return what is set when a step begins, and to what; None where all of it is."""
+    if scratch.is_zeroed:
+        return None
+    zero = {
+        "bool": "false",
+        C_REAL_TYPE[program.number_type]: format_literal(0.0, program.number_type),
+    }
+    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in scratch.initialised]
+
+
+def _emit_functions(
+    program: Program,
+    local: Mapping[str, frozenset[str]],
+    loop_variables: Mapping[str, frozenset[str]],
+    usage_by_block: Mapping[str, Usage],
+    kinds: Mapping[str, str],
+    page_layout: PageLayout,
+    scratch: Scratch | None,
+) -> list[dict[str, Any]]:
+    """Return the functions of a module, those that are called first."""
+    noinline = select_noinline_blocks(program)
+    modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
+    functions = []
+    for name in _order_callees_first(program):
+        keyword = _inline_keyword(name, noinline)
+        function = _emit_function(
+            program,
+            name,
+            local[name],
+            loop_variables[name],
+            usage_by_block,
+            kinds,
+            page_layout,
+            scratch,
+            keyword,
+        )
+        functions.append(
+            {**function, "purpose": describe_function(name, modes, run_modes), "keyword": keyword}
+        )
+    return functions
+
+
+def _emit_function(
+    program: Program,
+    name: str,
+    local: frozenset[str],
+    loop_variables: frozenset[str],
+    usage_by_block: Mapping[str, Usage],
+    kinds: Mapping[str, str],
+    page_layout: PageLayout,
+    scratch: Scratch | None,
+    keyword: str,
+) -> dict[str, Any]:
+    c_names = CNames(
+        program,
+        local,
+        SOLVED_PREFIX_ON_PAGE if page_layout.holds_solved else SOLVED_PREFIX_CONSTANT,
+    )
+    writer = StatementEmitter(program, usage_by_block, local - loop_variables, c_names, kinds)
+    declared = [f"{INDENT}{kinds[n]} {c_member(n)};" for n in sorted(loop_variables)]
+    types = {
+        "self": f"{program.name}_Self",
+        "cal": f"{program.name}_Cal",
+        "in": f"{program.name}_In",
+        "work": _work_type(program, page_layout, scratch),
+    }
+    qualifiers = dict.fromkeys(types, "const ") | {"cal": f"{page_layout.qualifiers} "}
+    usage = usage_by_block[name]
+    parameters = [
+        f"{'' if pointer in usage.writes else qualifiers[pointer]}{types[pointer]} *{pointer}"
+        for pointer in usage.parameters
+    ]
+    return {
+        "name": name,
+        "parameters": _format_parameters(f"static {keyword} void {name}(", parameters),
+        "needs": usage.needs,
+        "lines": [
+            *(declared and [*declared, ""]),
+            *(_redirect_derived(name, line) for line in writer.emit_block(program.blocks[name])),
+        ],
+    }
+
+
+def _inline_keyword(name: str, noinline: frozenset[str]) -> str:
+    if name.startswith(COLD_BLOCKS):
+        return "RARELY"
+    return "NOT_INLINED" if name in noinline else "inline"
+
+
+def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
+    """Return what stands between the parentheses of a function, in lines that are not too long."""
+    lines = [""]
+    for place, parameter in enumerate(parameters):
+        text = parameter + ("," if place + 1 < len(parameters) else "")
+        start = opening if len(lines) == 1 else INDENT
+        if lines[-1] and len(start) + len(lines[-1]) + len(text) + 2 > MAX_LINE_WIDTH:
+            lines.append("")
+        lines[-1] += f" {text}" if lines[-1] else text
+    return f"\n{INDENT}".join(lines) if parameters else "void"
+
+
+def _redirect_derived(block: str, line: str) -> str:
+    """`X_Derive` writes through its own pointer, not through an instance."""
+    return line.replace("self->derived.", "derived->") if block == "derive" else line
+
+
+def _order_callees_first(program: Program) -> list[str]:
+    """Return the blocks so that each comes after those that it runs: no prototypes needed."""
+    done: dict[str, None] = {}
+
+    def visit(name: str) -> None:
+        if name in done:
+            return
+        for called in _called_blocks(program, name):
+            visit(called)
+        done[name] = None
+
+    for name in program.blocks:
+        visit(name)
+    return list(done)
+
+
+def _called_blocks(program: Program, name: str) -> list[str]:
+    return [op.block for op in walk_ops(program.blocks[name]) if isinstance(op, RunBlock)]

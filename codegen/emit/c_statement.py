@@ -1,0 +1,271 @@
+"""Statement: the operations of a block as lines of C99 (rules C19 and C20)."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from codegen.emit.c_comment import sanitise_comment as safe
+from codegen.emit.c_expression import CNameMap, emit_expression
+from codegen.passes.block_usage import Usage
+from language.ir.ops import (
+    Assign,
+    Block,
+    Branch,
+    Count,
+    Expr,
+    FaultBit,
+    Loop,
+    Op,
+    RunBlock,
+    Select,
+    Store,
+    Switch,
+    Value,
+)
+from language.ir.program import Program, TransitionInfo, unqualified_name
+from language.ir.traversal import expr_names, negate_condition
+
+INDENT = "    "
+
+EMPTY_BODY = f"{INDENT}/* nothing to do */"
+
+EMPTY_ELSE = ("} else {", EMPTY_BODY)
+"""The end of a chain of conditions none of which has to be true (MISRA C:2012, rule 15.7)."""
+
+MAX_LINE_WIDTH = 100
+"""Longest line of generated C; longer expressions are broken at a sum or a blank."""
+
+
+@dataclass(frozen=True)
+class StatementEmitter:
+    """What is needed to print one block."""
+
+    program: Program
+    usages: Mapping[str, Usage]
+    local: frozenset[str]
+    c_names: CNameMap
+    types: Mapping[str, str]
+    width: int = MAX_LINE_WIDTH
+
+    def emit_block(self, block: Block) -> Iterator[str]:
+        """Yield the lines of a block, no longer than there is `room`."""
+        inner = dataclasses.replace(self, width=self.width - len(INDENT))
+        if not block:
+            yield EMPTY_BODY
+        for op in block:
+            for line in inner._emit_op(op):
+                yield (INDENT + line) if line else ""
+
+    def _emit_op(self, op: Op) -> Iterator[str]:
+        match op:
+            case Assign(target, value, key):
+                yield from self._emit_assign(
+                    target, emit_expression(value, self.c_names), value, key
+                )
+            case Store(array, index, value):
+                left = f"{self.c_names(array)}[{emit_expression(index, self.c_names)}]"
+                yield from emit_wrapped_statement(
+                    f"{left} = ", emit_expression(value, self.c_names), "", self.width
+                )
+            case Branch(condition, then, other):
+                yield from self._emit_branch(condition, then, other)
+            case Switch(selector, cases):
+                yield from self._emit_choose(selector, cases)
+            case Loop(count, index, body):
+                yield from self._emit_loop(count, index, body)
+            case Count(timer, condition, limit, key):
+                yield from self._emit_count(
+                    self.c_names(timer), condition, limit, key, self._wait_comment(timer)
+                )
+            case FaultBit(fault, _, True):
+                yield f"self->faults |= {self.program.name}_FAULT_{fault};"
+            case FaultBit(fault, _, _):
+                yield f"self->faults &= (uint32_t)~{self.program.name}_FAULT_{fault};"
+            case RunBlock(name):
+                yield f"{name}({', '.join(self.usages[name].parameters)});"
+
+    def _emit_assign(self, target: str, text: str, value: object, key: str) -> Iterator[str]:
+        if isinstance(value, Value) and type(value.value) is int:
+            text = self.c_names.integer_constant(target, value.value)
+        kind = self.types[target] if target in self.local else ""
+        if isinstance(value, Select) and is_nested(value):
+            yield from _emit_key_comment(key)
+            yield from emit_select(kind, self.c_names(target), value, self.c_names, self.width)
+        else:
+            declared = f"const {kind} " if kind else ""
+            yield from emit_wrapped_statement(
+                f"{declared}{self.c_names(target)} = ", text, key, self.width
+            )
+
+    def _emit_branch(self, condition: Expr, then: Block, other: Block) -> Iterator[str]:
+        yield from emit_condition("if", emit_expression(condition, self.c_names), "", self.width)
+        yield from self.emit_block(then)
+        chained = len(other) == 1 and isinstance(other[0], Branch)
+        while len(other) == 1 and isinstance(other[0], Branch):
+            inner = other[0]
+            yield from emit_condition(
+                "} else if", emit_expression(inner.condition, self.c_names), "", self.width
+            )
+            yield from self.emit_block(inner.then)
+            other = inner.other
+        if other:
+            yield "} else {"
+            yield from self.emit_block(other)
+        elif chained:
+            yield from EMPTY_ELSE
+        yield "}"
+
+    def _emit_choose(self, selector: str, cases: tuple[tuple[int, Block], ...]) -> Iterator[str]:
+        yield f"switch ({self.c_names(selector)}) {{"
+        for number, block in cases:
+            yield f"case {self.c_names.integer_constant(selector, number)}:"
+            yield from self.emit_block(block)
+            yield f"{INDENT}break;"
+        yield "default:"
+        yield f"{INDENT}/* there is no other */"
+        yield f"{INDENT}break;"
+        yield "}"
+
+    def _emit_loop(self, count: int, index: str, body: Block) -> Iterator[str]:
+        name = unqualified_name(index)
+        yield f"for (int32_t {name} = 0; {name} < {count}; {name}++) {{"
+        condition, inner = split_loop_guard(index, body)
+        if condition is not None:
+            test = emit_expression(negate_condition(condition), self.c_names)
+            yield from (
+                INDENT + line for line in emit_condition("if", test, "", self.width - len(INDENT))
+            )
+            yield f"{2 * INDENT}break;"
+            yield f"{INDENT}}}"
+        yield from self.emit_block(inner)
+        yield "}"
+
+    def _wait_comment(self, timer: str) -> str:
+        """Return when the transition of a timer is due; nothing for other counters."""
+        return next(
+            (_format_due(info) for info in self.program.transitions if info.timer == timer), ""
+        )
+
+    def _emit_count(
+        self, timer: str, condition: Expr, limit: int, key: str, wait_comment: str
+    ) -> Iterator[str]:
+        yield from emit_condition(
+            "if", emit_expression(negate_condition(condition), self.c_names), key, self.width
+        )
+        yield f"{INDENT}{timer} = 0U;"
+        yield f"}} else if ({timer} < {limit}U) {{"
+        counted = emit_wrapped_statement(timer, "++", wait_comment, self.width - len(INDENT))
+        yield from (INDENT + line for line in counted)
+        yield from EMPTY_ELSE
+        yield "}"
+
+
+def _format_due(info: TransitionInfo) -> str:
+    """Return when a transition is due, with the key of its wait."""
+    if info.tunable_wait:
+        return f"due after more in a row than {info.key}.wait"
+    return f"due at {info.ticks + 1} in a row: {info.key}.wait, {float(1000 * info.wait):g} ms"
+
+
+def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
+    """Return the condition under which a body does anything, where it has one, and what it does.
+
+    Once that is false it stays so, for nothing else is done: the loop may end.
+    """
+    if len(body) == 1 and isinstance(body[0], Branch) and not body[0].other:
+        inner = body[0]
+        if index not in expr_names(inner.condition):
+            return inner.condition, inner.then
+    return None, body
+
+
+def is_nested(choice: Select) -> bool:
+    """Tell whether a choice leads to another one: it is read better as a chain of `if`."""
+    return isinstance(choice.then, Select) or isinstance(choice.other, Select)
+
+
+def emit_select(
+    declared_type: str, target: str, value: Expr, c_names: CNameMap, width: int = MAX_LINE_WIDTH
+) -> Iterator[str]:
+    """Yield what sets a target, of a `declared_type` if it is declared here, to the one chosen of many."""
+    if declared_type:
+        yield f"{declared_type} {target};"
+    if not isinstance(value, Select):
+        yield from emit_wrapped_statement(
+            f"{target} = ", emit_expression(value, c_names), "", width
+        )
+        return
+    opening = "if"
+    while isinstance(value, Select):
+        yield from emit_condition(opening, emit_expression(value.condition, c_names), "", width)
+        inner = emit_select("", target, value.then, c_names, width - len(INDENT))
+        yield from (INDENT + line for line in inner)
+        opening, value = "} else if", value.other
+    yield "} else {"
+    inner = emit_select("", target, value, c_names, width - len(INDENT))
+    yield from (INDENT + line for line in inner)
+    yield "}"
+
+
+def _emit_key_comment(key: str) -> Iterator[str]:
+    if key:
+        yield f"/* {safe(key)} */"
+
+
+def _key_comment(key: str) -> str:
+    return f" /* {safe(key)} */" if key else ""
+
+
+def emit_wrapped_statement(
+    left: str, text: str, key: str, width: int = MAX_LINE_WIDTH
+) -> Iterator[str]:
+    """Yield `left text;` with the key path cited, broken before operators where it is too long."""
+    comment = _key_comment(key)
+    if len(left) + len(text) + len(comment) < width:
+        yield f"{left}{text};{comment}"
+        return
+    if key:
+        yield f"/* {safe(key)} */"
+    if len(left) + len(text) < width:
+        yield f"{left}{text};"
+        return
+    pieces = textwrap.wrap(
+        re.sub(r" ([*/]|[<>=!]=?|&&) ", "\1\\g<1>\1", text)
+        .replace(" + ", " +\1")
+        .replace(" - ", " -\1"),
+        width=width - 2 * len(INDENT),
+        initial_indent="",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    joined = "\n".join(pieces).replace("\1", " ")
+    first, *rest = joined.split("\n")
+    lines = (
+        [f"{left}{first}"] if len(left) + len(first) < width else [left.rstrip(), INDENT + first]
+    )
+    lines += [INDENT + line for line in rest]
+    lines[-1] += ";"
+    yield from (line.rstrip() for line in lines)
+
+
+def emit_condition(opening: str, test: str, key: str, width: int) -> Iterator[str]:
+    """Yield `opening (test) {` with the key path cited, broken before `&&` where it is too long."""
+    line, comment = f"{opening} ({test}) {{", _key_comment(key)
+    if len(line) + len(comment) <= width:
+        yield line + comment
+        return
+    if key:
+        yield f"/* {safe(key)} */"
+    glued = re.sub("\1(&&|\\|\\|)\1", " \\1\1", line.replace(" ", "\1"))
+    pieces = textwrap.wrap(
+        glued,
+        width=width - 2 * len(INDENT),
+        subsequent_indent=INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    yield from (piece.replace("\1", " ") for piece in pieces)

@@ -1,0 +1,1 @@
+"""Exchange: calibration pages in the formats of measurement and calibration tools."""

@@ -1,0 +1,71 @@
+"""Exact: the number that a cell of a file is, and the unit that stands beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+
+from codegen.exchange.calibration.characteristic import Cell
+from language.expressions.unit_symbols import MISSPELLED_UNITS
+from language.expressions.units import Unit, UnitError, are_compatible, parse_unit, unit_hint
+from language.text.diagnostic import Problems
+from language.text.sanitise import truncate
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+MAX_EXPONENT = 400
+"""Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
+MAX_LENGTH, MAX_SHOWN = 400, 60
+"""Most characters of a number that is read, and of a text that is quoted."""
+UNIT_SYNONYMS: Mapping[str, str] = {
+    **dict.fromkeys(("-", "--", "[-]"), "1"),
+    **dict.fromkeys(("\N{DEGREE SIGN}C", "\N{DEGREE CELSIUS}", "deg C"), "degC"),
+    **dict.fromkeys(("\N{GREEK CAPITAL LETTER OMEGA}", "\N{OHM SIGN}"), "ohm"),
+    "%": "percent",
+    "\N{DEGREE SIGN}": "deg",
+}
+"""Units as calibration tools write them, and how the language does."""
+SUPERSCRIPTS = str.maketrans(
+    {"\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3", "\N{MIDDLE DOT}": "*"}
+)
+
+
+def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
+    """Return the number of a cell, or None with the problem reported."""
+    text = cell.text
+    shown = truncate(text, MAX_SHOWN)
+    label = f"`{shown}` is not a number"
+    hint = "a number is written like `0.05` or `1.0e-3`"
+    if NUMBER.fullmatch(text) and len(text) <= MAX_LENGTH:
+        exponent = re.split("[eE]", text)[1:]
+        if not exponent or (len(exponent[0]) < 8 and abs(int(exponent[0])) <= MAX_EXPONENT):
+            return Fraction(text)
+        label, hint = f"`{shown}` is out of the range of a double", ""
+    elif re.fullmatch(r"[+-]?\d+,\d+", text):
+        hint = f"a decimal point is a point: `{shown.replace(',', '.')}`"
+    elif text.lower().lstrip("+-") in ("nan", "inf", "infinity", "1.#inf", "1.#qnan"):
+        label, hint = f"`{text}` is no finite number", ""
+    problems.error("number", cell.span, label, hint)
+    return None
+
+
+def parse_unit_cell(cell: Cell | None, declared_unit: Unit, problems: Problems) -> Unit | None:
+    """Return the unit that a file tells; SI where it tells none, None with a problem reported.
+
+    `declared_unit` is what the values are declared in: the unit has to fit it.
+    """
+    si = Unit(str(declared_unit.dimension), Fraction(1), declared_unit.dimension)
+    if cell is None or not cell.text.strip() or cell.text == si.text:
+        return si
+    text = cell.text.strip().translate(SUPERSCRIPTS)
+    text = UNIT_SYNONYMS.get(text) or MISSPELLED_UNITS.get(text, text)
+    try:
+        unit = parse_unit(text)
+    except UnitError as error:
+        problems.error("unit", cell.span, str(error), unit_hint(text))
+        return None
+    if are_compatible(unit.dimension, declared_unit.dimension):
+        return unit
+    label = f"`{cell.text}` does not fit the unit `{declared_unit.text}`"
+    problems.error("dimension", cell.span, label)
+    return None

@@ -1,0 +1,86 @@
+"""DCM block: what stands between the head of a characteristic and its END."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from codegen.exchange.calibration.characteristic import (
+    Cell,
+    FileAxis,
+    FileCharacteristic,
+    transpose_map,
+)
+from language.text.diagnostic import Problems
+
+SHARED_AXIS = "STUETZSTELLENVERTEILUNG"
+CURVE_KINDS = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")
+MAP_KINDS = ("KENNFELD", "FESTKENNFELD", "GRUPPENKENNFELD")
+SIZES: Mapping[str, tuple[int, ...]] = {
+    "FESTWERT": (0,),
+    "TEXTSTRING": (0,),
+    "FESTWERTEBLOCK": (1, 2),
+    SHARED_AXIS: (1,),
+    **dict.fromkeys(CURVE_KINDS, (1,)),
+    **dict.fromkeys(MAP_KINDS, (2,)),
+}
+"""How many sizes stand behind the name of each kind."""
+MAX_VALUES = 1_000_000
+
+
+@dataclass(frozen=True)
+class DcmBlock:
+    """The lines of a block, by what they hold, in their order."""
+
+    head: Cell
+    name: Cell
+    sizes: tuple[int, ...] | None
+    numbers: list[Cell] = field(default_factory=list)
+    texts: list[Cell] = field(default_factory=list)
+    points_x: list[Cell] = field(default_factory=list)
+    points_y: list[Cell] = field(default_factory=list)
+    units: dict[str, Cell] = field(default_factory=dict)
+    about: list[str] = field(default_factory=list)
+
+
+def is_count(text: str) -> bool:
+    """Tell whether a text is a number of values."""
+    return text.isascii() and text.isdecimal() and len(text) < 8 and 0 < int(text) <= MAX_VALUES
+
+
+def characteristic_of(block: DcmBlock, problems: Problems) -> FileCharacteristic | None:
+    """Return what a block is, or None with the problem reported."""
+    sizes = block.sizes or ()
+    values = block.numbers or block.texts
+    if block.numbers and block.texts:
+        label = f"`{block.name.text}` has both `WERT` and `TEXT`"
+        problems.error("form", block.texts[0].span, label)
+        return None
+    kind = block.head.text
+    if kind == SHARED_AXIS:
+        values = block.points_x
+    is_complete = _has_count(values, math.prod(sizes), "values", block, problems)
+    axes = []
+    if kind in CURVE_KINDS or kind in MAP_KINDS:
+        is_complete &= _has_count(block.points_x, sizes[0], "points `ST/X`", block, problems)
+        axes.append(FileAxis(tuple(block.points_x), block.units.get("X")))
+    if kind in MAP_KINDS:
+        is_complete &= _has_count(block.points_y, sizes[1], "points `ST/Y`", block, problems)
+        axes.append(FileAxis(tuple(block.points_y), block.units.get("Y")))
+    if not is_complete:
+        return None
+    ordered = transpose_map(values, sizes[0]) if len(sizes) == 2 else tuple(values)
+    unit, about = block.units.get("W"), " ".join(block.about)
+    return FileCharacteristic(block.name, ordered, unit, tuple(axes), bool(block.texts), about)
+
+
+def _has_count(
+    cells: list[Cell], count: int, what: str, block: DcmBlock, problems: Problems
+) -> bool:
+    if len(cells) == count:
+        return True
+    place = cells[count].span if len(cells) > count else block.name.span
+    label = f"`{block.name.text}` has {len(cells)} {what}, its head says {count}"
+    problems.error("form", place, label)
+    return False

@@ -1,0 +1,206 @@
+"""DCM reader: a DCM 2.0 file line by line, as INCA, CANape and others write it.
+
+Lines that begin with `*`, `!` or `.` are comments. What says nothing about values (FUNKTION,
+DISPLAYNAME, VAR ...) is passed over, and so are points that several maps share
+(STUETZSTELLENVERTEILUNG): each map repeats those that it uses.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from codegen.exchange.calibration.characteristic import (
+    MAX_PROBLEMS,
+    Cell,
+    FileCharacteristic,
+    PageFile,
+    stop_if_many,
+)
+from codegen.exchange.calibration.dcm_block import (
+    SHARED_AXIS,
+    SIZES,
+    DcmBlock,
+    characteristic_of,
+    is_count,
+)
+from codegen.exchange.calibration.name_filter import NameFilter
+from language.text.diagnostic import Problems, Source, Span, suggest_name
+
+COMMENTS = ("*", "!", ".")
+WORD = re.compile(r'"[^"]*"|"?[^\s"]+|"')
+SECTIONS = ("FUNKTIONEN", "VARIANTENKODIERUNG")
+"""Sections that end with END and hold no values."""
+HEADS = ("KONSERVIERUNG_FORMAT", "MODULKOPF", *SECTIONS, *SIZES)
+VERSIONS = ("1.0", "2.0")
+VALUE_WORDS = ("ST/X", "ST/Y", "WERT", "TEXT", "EINHEIT_X", "EINHEIT_Y", "EINHEIT_W")
+IGNORED_WORDS = ("LANGNAME", "DISPLAYNAME", "FUNKTION", "VAR")
+"""Words of a block that say nothing about its values."""
+
+Words = list[Cell]
+Lines = Iterator[Words]
+
+
+@dataclass(frozen=True)
+class _ReadContext:
+    """`passed` are the unknown words that were told of: each once, and not more than a few."""
+
+    source: Source
+    problems: Problems
+    reported_words: set[str] = field(default_factory=set)
+
+
+def read_dcm(source: Source, problems: Problems, name_filter: NameFilter) -> PageFile:
+    """Read what is `name_filter` of a DCM file; problems are reported, at last with SpecError."""
+    context = _ReadContext(_blank_other_blocks(source, name_filter), problems)
+    lines = _word_lines(context)
+    characteristics: list[FileCharacteristic] = []
+    _require_format(next(lines, []), context)
+    problems.raise_if_errors()
+    for words in lines:
+        head = words[0].text
+        if head in SECTIONS:
+            _skip_section(words[0], lines, problems)
+        elif head in SIZES:
+            block = _read_block(words, lines, context)
+            one = characteristic_of(block, problems) if block else None
+            if one and head != SHARED_AXIS:
+                characteristics.append(one)
+        elif head == "KONSERVIERUNG_FORMAT":
+            problems.error("duplicate", words[0].span, "`KONSERVIERUNG_FORMAT` stands here twice")
+        elif head != "MODULKOPF":
+            label = f"`{head}` does not begin anything in a DCM file"
+            problems.error("form", words[0].span, label, suggest_name(head, HEADS))
+        stop_if_many(problems)
+    problems.raise_if_errors()
+    return PageFile(source, tuple(characteristics))
+
+
+def _blank_other_blocks(source: Source, name_filter: NameFilter) -> Source:
+    """Return a file in which the lines of blocks that are not `name_filter` are blank: up to their END,
+    or to the next head where one has none.
+    """
+    lines, is_inside = [], False
+    for number, line in enumerate(source.lines, start=1):
+        head, name, *_ = (*WORD.findall(line), "", "")
+        if head in HEADS:
+            place = Span(source, number, line.find(name) + 1, len(name))
+            is_inside = head in SIZES and bool(name) and not name_filter.accepts(Cell(name, place))
+        lines.append("" if is_inside else line)
+        is_inside = is_inside and head != "END"
+    return dataclasses.replace(source, lines=tuple(lines))
+
+
+def _require_format(words: Words, context: _ReadContext) -> None:
+    start = Span(context.source, 1, 1)
+    if not words or words[0].text != "KONSERVIERUNG_FORMAT":
+        place = words[0].span if words else start
+        label = "this is no DCM file: it does not begin with `KONSERVIERUNG_FORMAT`"
+        context.problems.error("form", place, label, "`KONSERVIERUNG_FORMAT 2.0`")
+    elif len(words) != 2 or words[1].text not in VERSIONS:
+        version = " ".join(word.text for word in words[1:])
+        label = f"the format `{version}` of DCM is not known: 2.0 is"
+        context.problems.error("version", words[0].span, label)
+
+
+def _word_lines(context: _ReadContext) -> Lines:
+    """Yield the words of each line that holds some and is no comment."""
+    for number, line in enumerate(context.source.lines, start=1):
+        text = line.strip()
+        if not text or text.startswith(COMMENTS):
+            continue
+        words = []
+        for match in WORD.finditer(line):
+            span = Span(context.source, number, match.start() + 1, len(match[0]))
+            if match[0].startswith('"') and (len(match[0]) < 2 or not match[0].endswith('"')):
+                context.problems.error("form", span, "a quote is opened and not closed")
+            words.append(Cell(match[0], span))
+        yield words
+
+
+def _skip_section(head: Cell, lines: Lines, problems: Problems) -> None:
+    if all(words[0].text != "END" for words in lines):
+        problems.error("form", head.span, f"`{head.text}` has no `END`")
+
+
+def _read_block(words: Words, lines: Lines, context: _ReadContext) -> DcmBlock | None:
+    """Return a block up to its END; None where its head is no name with its sizes."""
+    head, *rest = words
+    problems = context.problems
+    block = DcmBlock(head, rest[0] if rest else head, _read_sizes(head, rest[1:], problems))
+    if not rest:
+        problems.error("form", head.span, f"`{head.text}` is followed by a name")
+    for line in lines:
+        if line[0].text == "END":
+            return block if rest and block.sizes is not None else None
+        if line[0].text in SIZES:
+            break
+        _read_line(block, line, context)
+        stop_if_many(problems)
+    problems.error("form", head.span, f"`{head.text} {block.name.text}` has no `END`")
+    problems.raise_if_errors()
+    return None
+
+
+def _read_sizes(head: Cell, words: Words, problems: Problems) -> tuple[int, ...] | None:
+    """Return the numbers behind a name: `4`, `4 3`, or `4 @ 3` of a block of values."""
+    texts = [word.text for word in words]
+    if head.text == "FESTWERTEBLOCK" and len(texts) == 3 and texts[1] == "@":
+        texts = [texts[0], texts[2]]
+    if len(texts) in SIZES[head.text] and all(map(is_count, texts)):
+        return tuple(map(int, texts))
+    place = words[0].span if words else head.span
+    expected = " or ".join(map(str, SIZES[head.text]))
+    label = f"behind its name `{head.text}` has {expected} whole numbers, how many values it has"
+    if SIZES[head.text] == (0,):
+        label = f"`{head.text}` has nothing behind its name"
+    problems.error("form", place, label)
+    return None
+
+
+def _unquote(cell: Cell) -> Cell:
+    return Cell(cell.text.strip('"'), cell.span)
+
+
+def _read_line(block: DcmBlock, words: Words, context: _ReadContext) -> None:
+    """Take a line of a block."""
+    word, *rest = words
+    cells = [_unquote(cell) for cell in rest]
+    target = _target_list(block, word.text)
+    if target is not None:
+        if not cells:
+            label = f"behind `{word.text}` there is no value"
+            context.problems.error("missing", word.span, label)
+        target.extend(cells)
+    elif word.text.startswith("EINHEIT_") and len(cells) > 0:
+        block.units[word.text.removeprefix("EINHEIT_")] = cells[0]
+    elif word.text == "LANGNAME" and cells:
+        block.about.append(cells[0].text)
+    elif word.text not in IGNORED_WORDS and not word.text.startswith("EINHEIT_"):
+        _warn_unknown_word(word, block, context)
+
+
+def _target_list(block: DcmBlock, word: str) -> list[Cell] | None:
+    """Return where the values behind a word are kept; None for a word that has none."""
+    match word:
+        case "ST/X" | "ST_TX/X":
+            return block.points_x
+        case "ST/Y" | "ST_TX/Y":
+            return block.points_y
+        case "WERT":
+            return block.numbers
+        case "TEXT":
+            return block.texts
+        case _:
+            return None
+
+
+def _warn_unknown_word(word: Cell, block: DcmBlock, context: _ReadContext) -> None:
+    """Warn of a word that is not known; the first few are told, each where it stands first."""
+    if word.text in context.reported_words or len(context.reported_words) >= MAX_PROBLEMS:
+        return
+    context.reported_words.add(word.text)
+    label = f"`{word.text}` is not known in `{block.head.text}`: it is passed over"
+    context.problems.warning("unknown-key", word.span, label, suggest_name(word.text, VALUE_WORDS))

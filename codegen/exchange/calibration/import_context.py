@@ -1,0 +1,98 @@
+"""Desk: a value of a file beside the parameter that it is for, and what is told of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from codegen.exchange.calibration.cell_parser import parse_cell_number, parse_unit_cell
+from codegen.exchange.calibration.characteristic import Cell, FileCharacteristic
+from language.expressions.units import Unit
+from language.ir.number_type import NumberType, round_to_type, shortest_decimal
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.text.diagnostic import Problems, Span
+
+RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What is worth knowing of a name of the file: its place (None where it is absent), a text."""
+
+    kind: RemarkKind
+    name: str
+    text: str
+    span: Span | None = None
+
+
+@dataclass(frozen=True)
+class ImportContext:
+    """What is compared with, and what was found until now."""
+
+    automaton: Automaton
+    number: NumberType
+    problems: Problems
+    remarks: list[Remark] = field(default_factory=list)
+
+    def add_remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
+        """Tell what is worth knowing of a cell."""
+        self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
+
+
+def convert_real(
+    characteristic: FileCharacteristic,
+    cell: Cell,
+    unit: Unit,
+    parameter: Parameter,
+    context: ImportContext,
+) -> float | None:
+    """Return a value of a parameter, single or of a table, that is in a unit."""
+    number = parse_cell_number(cell, context.problems)
+    value = None if number is None else convert_to_si(number, unit, cell, context)
+    if number is None or value is None:
+        return None
+    shown = shortest_decimal(value, context.number)
+    if unit.factor != 1 or unit.offset:
+        si = f"{shown} {unit.dimension}".removesuffix(" 1")
+        text = f"`{cell.text} {characteristic.unit.text if characteristic.unit else ''}` is {si}"
+        context.add_remark("converted", characteristic.name, text, cell.span)
+    elif number not in (Fraction(shown), Fraction(value)):
+        text = f"`{cell.text}` is rounded to {shown}, its {context.number}"
+        context.add_remark("rounded", characteristic.name, text, cell.span)
+    limits = parameter.range
+    if limits:
+        low, high = (round_to_type(limit, context.number) for limit in limits)
+        if not low <= value <= high:
+            ends = f"{shortest_decimal(low, context.number)} to {shortest_decimal(high, context.number)}"
+            label = f"`{characteristic.name.text}` = {shown} is outside its range, {ends} in SI"
+            context.problems.error("range", cell.span, label)
+            return None
+    return value
+
+
+def resolve_unit(
+    characteristic: FileCharacteristic,
+    declared_unit: Unit,
+    cell: Cell | None,
+    context: ImportContext,
+) -> Unit | None:
+    """Return the unit that stands beside values, a parameter's `declared_unit` where none does."""
+    unit = parse_unit_cell(cell, declared_unit, context.problems)
+    if unit and (cell is None or not cell.text.strip()) and not declared_unit.dimension.is_number:
+        context.add_remark(
+            "no unit", characteristic.name, f"has no unit beside it: taken in {unit.text}"
+        )
+    return unit
+
+
+def convert_to_si(number: Fraction, unit: Unit, cell: Cell, context: ImportContext) -> float | None:
+    """Return the value in SI of a number in a unit, None for one that is past the type."""
+    value = round_to_type(number * unit.factor + unit.offset, context.number)
+    if abs(value) != float("inf"):
+        return value
+    context.problems.error(
+        "number", cell.span, f"`{cell.text}` is out of the range of {context.number}"
+    )
+    return None

@@ -1,0 +1,223 @@
+"""Taking: what a file says of the tunable parameters of an automaton, checked against its spec.
+
+A value is taken where its name, type, unit and range are those of the spec, values of a table where
+its points are. Solved numbers are never taken.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from codegen.exchange.calibration.calibration_page import page_constants, page_name
+from codegen.exchange.calibration.cell_parser import parse_cell_number
+from codegen.exchange.calibration.characteristic import (
+    MAX_PROBLEMS,
+    Cell,
+    FileCharacteristic,
+    PageFile,
+)
+from codegen.exchange.calibration.import_context import (
+    ImportContext,
+    Remark,
+    convert_real,
+    convert_to_si,
+    resolve_unit,
+)
+from codegen.exchange.calibration.name_filter import NameFilter
+from codegen.exchange.calibration.table_import import read_table
+from language.expressions.units import NO_UNIT, parse_unit
+from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.model.automaton import Automaton
+from language.model.declaration import Parameter
+from language.overlays.literal_format import (
+    format_exact,
+    format_exact_in_unit,
+    format_value_in_unit,
+)
+from language.text.diagnostic import Problems, suggest_name
+from language.text.document import ScalarNode, YamlNode
+from language.typecheck.types import MAX_INT
+
+SECOND_UNIT = parse_unit("s")
+TICK_TOLERANCE = Fraction(1, 10**6)
+"""Part by which the time of a tool may miss whole ticks: it has multiplied float32."""
+ENUM_INDEX = re.compile(r"\d{1,4}(\.0*)?", re.ASCII)
+"""The number of a word in its list, as tools without words write it: `1`, `1.0000`."""
+
+
+@dataclass(frozen=True)
+class ImportedValues:
+    """Values of the language by parameter, in the order of the page, and what is told of them.
+
+    `solved` are the solved numbers of the file, in the working type, by the names of constants.
+    """
+
+    values: Mapping[str, YamlNode]
+    solved: Mapping[str, float]
+    remarks: tuple[Remark, ...]
+
+
+def import_values(
+    file: PageFile,
+    automaton: Automaton,
+    program: Program,
+    problems: Problems,
+    name_filter: NameFilter,
+) -> ImportedValues:
+    """Return what a file says of an automaton's page. Raises SpecError with all problems.
+
+    What was passed over, since it is not `name_filter`, is told.
+    """
+    constants = {page_name(program, constant): constant for constant in page_constants(program)}
+    context = ImportContext(automaton, program.number_type, problems)
+    for other in name_filter.skipped.values():
+        context.add_remark("passed over", other, "is of another function")
+    if name_filter.skipped and not file.characteristics:
+        label = f"no name of this file begins with `{program.name}.`"
+        problems.error("name", next(iter(name_filter.skipped.values())).span, label)
+    characteristics = _match_names(file, constants, program.name, problems)
+    values: dict[str, YamlNode] = {}
+    solved: dict[str, float] = {}
+    for name, constant in constants.items():
+        if name not in characteristics:
+            stays = "" if constant.kind == "solved" else ": it stays as in the spec"
+            context.remarks.append(Remark("missing", name, f"is not in the file{stays}"))
+        elif constant.kind == "solved":
+            solved.update(_read_solved(characteristics[name], constant, context))
+        else:
+            node = _read_value(characteristics[name], constant, context)
+            if node is not None:
+                values[unqualified_name(constant.name)] = node
+    problems.raise_if_errors()
+    return ImportedValues(values, solved, tuple(context.remarks))
+
+
+def _match_names(
+    file: PageFile, constants: Mapping[str, Constant], owner: str, problems: Problems
+) -> dict[str, FileCharacteristic]:
+    """Return what has a name of the page; the first of the others are told with a name near it."""
+    characteristics: dict[str, FileCharacteristic] = {}
+    others = 0
+    for one in file.characteristics:
+        if one.name.text in constants:
+            characteristics[one.name.text] = one
+            continue
+        others += 1
+        hint = suggest_name(one.name.text, constants) if others <= MAX_PROBLEMS else ""
+        label = f"`{owner}` has no tunable parameter or solved number `{one.name.text}`"
+        problems.error("name", one.name.span, label, hint)
+    return characteristics
+
+
+def _read_solved(
+    characteristic: FileCharacteristic, constant: Constant, context: ImportContext
+) -> dict[str, float]:
+    cell = _require_single(characteristic, context.problems)
+    number = parse_cell_number(cell, context.problems) if cell else None
+    if cell is None or number is None:
+        return {}
+    value = convert_to_si(number, NO_UNIT, cell, context)
+    return {} if value is None else {constant.name: value}
+
+
+def _read_value(
+    characteristic: FileCharacteristic, constant: Constant, context: ImportContext
+) -> YamlNode | None:
+    """Return the value of a parameter as a calibration file has it, None where it is not taken."""
+    parameter = context.automaton.parameters[unqualified_name(constant.name)]
+    if parameter.table:
+        return read_table(characteristic, constant, parameter, context)
+    cell = _require_single(characteristic, context.problems)
+    if cell is None:
+        return None
+    if constant.unit == TICK_UNIT:
+        return _read_ticks(characteristic, cell, constant, context)
+    if parameter.type == "real":
+        value = _read_real(characteristic, cell, parameter, context)
+    elif parameter.type == "int":
+        value = _read_integer(cell, parameter, context.problems)
+    else:
+        value = _read_word(cell, parameter, context.problems)
+    if value is None:
+        return None
+    return ScalarNode(format_value_in_unit(parameter, value, context.number), cell.span)
+
+
+def _require_single(characteristic: FileCharacteristic, problems: Problems) -> Cell | None:
+    if len(characteristic.values) == 1 and not characteristic.axes:
+        return characteristic.values[0]
+    problems.error(
+        "form", characteristic.name.span, f"`{characteristic.name.text}` is a single value"
+    )
+    return None
+
+
+def _read_real(
+    characteristic: FileCharacteristic, cell: Cell, parameter: Parameter, context: ImportContext
+) -> float | None:
+    """Return a real in SI, in the working type and in its range; what was done to it is told."""
+    unit = resolve_unit(characteristic, parameter.unit, characteristic.unit, context)
+    return convert_real(characteristic, cell, unit, parameter, context) if unit else None
+
+
+def _read_ticks(
+    characteristic: FileCharacteristic, cell: Cell, constant: Constant, context: ImportContext
+) -> YamlNode | None:
+    """Return a tunable wait, a time of whole ticks; what is none is rounded up, and told."""
+    assert context.automaton.period and constant.range
+    unit = resolve_unit(characteristic, SECOND_UNIT, characteristic.unit, context)
+    number = parse_cell_number(cell, context.problems)
+    if unit is None or number is None:
+        return None
+    exact_ticks = number * unit.factor / context.automaton.period
+    nearest_ticks = round(exact_ticks)
+    is_whole = abs(exact_ticks - nearest_ticks) <= TICK_TOLERANCE * max(nearest_ticks, 1)
+    ticks = nearest_ticks if is_whole else math.ceil(exact_ticks)
+    time = ticks * context.automaton.period
+    if not is_whole:
+        text = f"`{cell.text}` is rounded up to {format_exact(time)} s, {ticks} ticks"
+        context.add_remark("rounded", characteristic.name, text, cell.span)
+    elif unit.factor != 1:
+        told = f"`{cell.text} {characteristic.unit.text if characteristic.unit else ''}` is {format_exact(time)} s"
+        context.add_remark("converted", characteristic.name, told, cell.span)
+    low, high = constant.range
+    if not low <= ticks <= high or exact_ticks < -TICK_TOLERANCE:
+        ends = " to ".join(format_exact(int(end) * context.automaton.period) for end in (low, high))
+        label = (
+            f"`{characteristic.name.text}` = {cell.text} {unit.text} is outside its range, {ends} s"
+        )
+        context.problems.error("range", cell.span, label)
+        return None
+    own = context.automaton.parameters[unqualified_name(constant.name)].unit
+    return ScalarNode(format_exact_in_unit(time, own), cell.span)
+
+
+def _read_integer(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
+    number = parse_cell_number(cell, problems)
+    if number is None:
+        return None
+    if number.denominator != 1:
+        problems.error("type", cell.span, f"`{cell.text}` is not whole, `{parameter.name}` is")
+        return None
+    limits = parameter.range or (-MAX_INT, MAX_INT)
+    if not limits[0] <= number <= limits[1]:
+        label = f"`{parameter.name}` = {number} is outside its range, {limits[0]} to {limits[1]}"
+        problems.error("range", cell.span, label)
+        return None
+    return int(number)
+
+
+def _read_word(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
+    """Return the place of a word in its list; a tool without words writes the place itself."""
+    words = ("false", "true") if parameter.type == "bool" else parameter.values
+    if cell.text in words:
+        return words.index(cell.text)
+    if ENUM_INDEX.fullmatch(cell.text) and Fraction(cell.text) < len(words):
+        return int(Fraction(cell.text))
+    label = f"`{cell.text}` is not one of {', '.join(words)}"
+    problems.error("choice", cell.span, label, suggest_name(cell.text, words))
+    return None

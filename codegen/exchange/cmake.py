@@ -1,0 +1,30 @@
+"""CMake: a file by which CMake builds the C of a Program as a library, with the flags it needs."""
+
+from __future__ import annotations
+
+from codegen.emit.c_module import emit_c_files
+from codegen.toolchain.compiler import FLAGS
+from codegen.toolchain.templates import product_version, render
+from language.ir.printer import digest
+from language.ir.program import Program
+
+SET_BY_CMAKE = ("-std=c99", "-O2")
+"""What CMake sets by its own properties, and by the kind of a build."""
+FILE = "CMakeLists.txt"
+
+
+def emit_cmake_file(program: Program) -> dict[str, str]:
+    """Return the file by its name: a static library, and its header to install.
+
+    Raises ValueError where a Program has no C.
+    """
+    files = sorted(emit_c_files(program))
+    context = {
+        "name": program.name,
+        "version": product_version(),
+        "digest": digest(program),
+        "sources": [file for file in files if file.endswith(".c")],
+        "headers": [file for file in files if file.endswith(".h")],
+        "flags": [flag for flag in FLAGS if flag not in SET_BY_CMAKE],
+    }
+    return {FILE: render("cmake_lists.txt.jinja", context)}

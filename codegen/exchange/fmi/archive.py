@@ -1,0 +1,109 @@
+"""Archive: an FMU as the bytes of a zip file, the same bytes whenever it is made."""
+
+from __future__ import annotations
+
+import io
+import platform
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.exchange.fmi.content import emit_fmu_files, read_headers
+from codegen.exchange.fmi.variable import Version
+from codegen.toolchain.compiler import (
+    FLAGS,
+    WARNINGS,
+    BuildError,
+    compiler_version,
+    find_compiler,
+    run_compiler,
+)
+from codegen.toolchain.object_cache import substitute_objects
+from language.ir.program import Program
+
+SHARED_LIBRARY_FLAGS = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
+"""Only what the standard names is seen; without symbols, so that bytes do not tell of folders."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A machine as FMI names it: its folder in each version, and how its libraries end."""
+
+    folders: Mapping[int, str]
+    suffix: str
+
+
+PLATFORMS: Mapping[tuple[str, str], Platform] = {
+    ("Linux", "x86_64"): Platform({2: "linux64", 3: "x86_64-linux"}, ".so"),
+    ("Linux", "aarch64"): Platform({2: "aarch64-linux", 3: "aarch64-linux"}, ".so"),
+    ("Darwin", "x86_64"): Platform({2: "darwin64", 3: "x86_64-darwin"}, ".dylib"),
+    ("Darwin", "arm64"): Platform({2: "darwin64", 3: "aarch64-darwin"}, ".dylib"),
+}
+
+
+def binary_path(name: str, version: Version) -> str:
+    """Return the path in an FMU of what is compiled for this machine. Raises BuildError."""
+    machine = (platform.system(), platform.machine())
+    if machine not in PLATFORMS:
+        raise BuildError(f"FMI has no name for this machine ({' '.join(machine)}): pack sources")
+    found = PLATFORMS[machine]
+    return f"binaries/{found.folders[version]}/{name}{found.suffix}"
+
+
+def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
+    """Return the library made of the sources of an FMU. Raises ToolMissing, BuildError.
+
+    Headers of the standard are not ours to change: they are read without warnings.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        ours, standard = Path(name) / "sources", Path(name) / "standard"
+        ours.mkdir()
+        standard.mkdir()
+        for path, data in files.items():
+            folder = standard if Path(path).name in headers else ours
+            (folder / Path(path).name).write_bytes(data)
+        compile_command = [*find_compiler(), *FLAGS, *WARNINGS, *SHARED_LIBRARY_FLAGS]
+        object_folder = Path(name) / "objects"
+        parts = substitute_objects(
+            sorted(ours.glob("*.c")), compile_command, compiler_version(), object_folder
+        )
+        target = Path(name) / "library"
+        run_compiler([*compile_command, "-isystem", str(standard), *map(str, parts), "-lm"], target)
+        return target.read_bytes()
+
+
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The earliest time that a zip file can tell: no file in it has another."""
+
+FILE_MODE, EXECUTABLE_MODE = 0o644, 0o755
+
+UNIX = 3
+"""Who made an entry, for the permissions that it has."""
+
+
+def build_fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
+    """Return an FMU of a Program, with a binary for this machine or with sources alone.
+
+    Raises ValueError as `fmu_files` does; ToolMissing, BuildError where there is a binary to make.
+    """
+    files = emit_fmu_files(program, version)
+    if not is_source_only:
+        where = binary_path(program.name, version)
+        sources = {path: data for path, data in files.items() if path.endswith((".c", ".h"))}
+        files[where] = build_binary(sources, read_headers(version))
+    return _zip_files(files)
+
+
+def _zip_files(files: Mapping[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for path in sorted(files):
+            entry = zipfile.ZipInfo(path, ZIP_EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = UNIX
+            mode = EXECUTABLE_MODE if path.startswith("binaries/") else FILE_MODE
+            entry.external_attr = mode << 16
+            archive.writestr(entry, files[path])
+    return buffer.getvalue()

@@ -1,0 +1,68 @@
+"""Standard: the functions that FMI wants of every FMU, read from its headers; which we refuse."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import resources
+
+from codegen.exchange.fmi.variable import FMI_TYPES, Version
+
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+FUNCTION = re.compile(r"typedef\s+fmi\dStatus\s+(fmi\d\w+?)TYPE\s*\((.*?)\);", re.DOTALL)
+IMPLEMENTED: Mapping[Version, str] = {
+    2: "SetDebugLogging SetupExperiment EnterInitializationMode ExitInitializationMode Terminate "
+    "Reset GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate "
+    "DeSerializeFMUstate DoStep GetRealStatus GetBooleanStatus",
+    3: "SetDebugLogging EnterInitializationMode ExitInitializationMode Terminate Reset "
+    "GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState "
+    "DeserializeFMUState DoStep",
+}
+"""Functions that return a status and have a template of their own."""
+REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
+    ("String$", "no variable is a text"),
+    ("Binary", "no variable is binary"),
+    ("Clock|Interval|Shift", "there are no clocks"),
+    ("Dependenc", "dependencies are not told"),
+    ("InputDerivatives|OutputDerivatives|Directional|Adjoint", "derivatives are not told or taken"),
+    ("Configuration", "there are no structural parameters"),
+    ("ModelPartition", "there is no scheduled execution"),
+    ("Status$|CancelStep", "a step is done when DoStep returns"),
+    ("StepMode|EvaluateDiscrete|UpdateDiscrete", "there is no event mode"),
+    ("", "this is co-simulation, not model exchange"),
+)
+"""Why a function is refused: that of the first pattern found in its name."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A function that is there, as FMI wants it, and refuses each call: its C, and why."""
+
+    name: str
+    parameters: tuple[str, ...]
+    why: str
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Return the names of the parameters."""
+        return tuple(parameter.split()[-1].strip("*[]") for parameter in self.parameters)
+
+
+def refusals(version: Version) -> Iterator[Refusal]:
+    """Yield the functions of a version that no template makes, in the order of its header."""
+    file = resources.files("codegen").joinpath("fmi", "headers", f"fmi{version}FunctionTypes.h")
+    implemented = {f"fmi{version}{name}" for name in IMPLEMENTED[version].split()}
+    implemented |= {
+        f"fmi{version}{what}{kind}" for kind in FMI_TYPES[version] for what in ("Get", "Set")
+    }
+    for name, parameters in FUNCTION.findall(COMMENT.sub("", file.read_text("ascii"))):
+        if name not in implemented:
+            parameter_texts = tuple(_format_parameter(text) for text in parameters.split(","))
+            why = next(why for pattern, why in REFUSAL_REASONS if re.search(pattern, name))
+            yield Refusal(name, parameter_texts, why)
+
+
+def _format_parameter(parameter: str) -> str:
+    """Return a parameter in one line, the star of a pointer beside its name."""
+    return " ".join(parameter.split()).replace("* ", " *")

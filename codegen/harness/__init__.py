@@ -1,0 +1,1 @@
+"""Executables around generated C: lock-step records, sanitizers, instruction counts, size."""

@@ -1,0 +1,147 @@
+"""Harness: a main around the C of a Program - records of inputs in, all that it carries out."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.emit.c_names import C_REAL_TYPE, CNames, c_member, c_type
+from codegen.toolchain.build_cache import get_or_build, key_of
+from codegen.toolchain.compiler import FLAGS, WARNINGS, compiler_version, run_compiler
+from codegen.toolchain.machine import HOST, Machine, harness_file
+from codegen.toolchain.object_cache import substitute_objects
+from codegen.toolchain.templates import render
+from language.ir.program import Constant, Program, Variable
+
+HARNESS_HEADERS = ("harness.h", "cortex_m4f.h")
+
+
+@dataclass(frozen=True)
+class HarnessMain:
+    """A main around a program: its template, and the files of the harness that only it needs."""
+
+    template: str
+    files: tuple[str, ...] = ()
+
+
+LOCKSTEP = HarnessMain("lockstep_main.c.jinja")
+"""Writes all that the program carries after each tick."""
+
+
+@dataclass(frozen=True)
+class ComparedVariable:
+    """A variable that the executable writes after each tick: its name and its kind."""
+
+    name: str
+    kind: str
+
+
+def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
+    """Return what is compared after a tick: all that the instance carries in C.
+
+    What is in a ring is compared when it comes out of it.
+    """
+    program = restrict_to_step(program)
+    kinds = {"real": "real", "truth": "whole", "whole": "whole"}
+    return tuple(
+        ComparedVariable(variable.name, kinds[variable.type])
+        for variable in program.variables
+        if variable.name.partition(".")[0] not in ("work", "input", "is_new", "check")
+        and not variable.size
+    )
+
+
+def tick_inputs(program: Program) -> tuple[Variable, ...]:
+    """Return the inputs of a tick, the flags of new values among them."""
+    return tuple(
+        variable
+        for variable in program.variables
+        if variable.name.partition(".")[0] in ("input", "is_new")
+    )
+
+
+def tunable_constants(program: Program) -> tuple[Constant, ...]:
+    """Return the parameters that a calibration page may change, in the order of its members."""
+    program = restrict_to_step(program)
+    return tuple(
+        constant
+        for constant in program.constants
+        if constant.kind == "tunable" and constant.type == "real" and not constant.items
+    )
+
+
+def write_harness(
+    program: Program,
+    folder: Path,
+    machine: Machine = HOST,
+    main: HarnessMain = LOCKSTEP,
+    extra_context: Mapping[str, object] | None = None,
+) -> list[Path]:
+    """Write the C files of a program and a main around them; return the sources to compile.
+
+    `extra_context` is what the template of that main reads beside what each one does.
+    """
+    (folder / "harness").mkdir(exist_ok=True)
+    own = (*machine.files, *main.files)
+    for name in (*HARNESS_HEADERS, *own):
+        shutil.copyfile(harness_file(name), folder / "harness" / name)
+    files = emit_c_files(program)
+    files["main.c"] = render(main.template, {**_main_context(program), **(extra_context or {})})
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    names = (*files, *(f"harness/{name}" for name in own))
+    return [folder / name for name in names if name.endswith(".c")]
+
+
+@contextmanager
+def build_executable(
+    program: Program,
+    flags: Sequence[str] = FLAGS,
+    compiler_name: str | None = None,
+    machine: Machine = HOST,
+    main: HarnessMain = LOCKSTEP,
+) -> Iterator[Path]:
+    """Give the compiled harness of a program, kept from an earlier run if there was one."""
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        sources = write_harness(program, folder, machine, main)
+        command, link = machine.command(compiler_name), machine.link(folder / "harness")
+        version = compiler_version(command[0])
+        compile_command = [*command, *flags, *WARNINGS]
+        key = key_of(sources, [*compile_command, *machine.link(Path())], version)
+
+        def make(target: Path) -> None:
+            parts = substitute_objects(sources, compile_command, version, folder / "objects")
+            run_compiler([*compile_command, *map(str, parts), *link], target)
+
+        yield get_or_build(key, make, folder)
+
+
+def _main_context(program: Program) -> Mapping[str, object]:
+    """Return what a main around a program needs to know: inputs, tunables and what is compared."""
+    program = restrict_to_step(program)
+    c_names, real = CNames(program), C_REAL_TYPE[program.number_type]
+    inputs = [
+        {"place": c_names(v.name).replace("in->", "in."), "type": c_type(v, program.number_type)}
+        for v in tick_inputs(program)
+    ]
+    fields = [
+        {
+            "place": c_names(o.name).replace("self->", "self."),
+            "type": real if o.kind == "real" else "int64_t",
+        }
+        for o in compared_variables(program)
+    ]
+    return {
+        "name": program.name,
+        "cast": ("uint8_t", "int32_t", "float"),
+        "inputs": inputs,
+        "fields": fields,
+        "page": [c_member(constant.name) for constant in tunable_constants(program)],
+        "real": real,
+    }

@@ -1,0 +1,107 @@
+"""Metrics: what generated C takes of a Cortex-M4F - ROM, RAM, stack, the longest step."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.emit.c_module import emit_c_files
+from codegen.harness.worst_case_instructions import Unbounded, worst_case_instructions
+from codegen.proofs.stack_usage import stack_usage
+from codegen.toolchain.compiler import FLAGS
+from codegen.toolchain.external_tools import ARM_COMPILER, ARM_SIZE, output_of
+from codegen.toolchain.machine import CORTEX_FLAGS
+from language.ir.program import Program
+
+STRUCTURES = ("Self", "In", "Out")
+SIZE_PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
+SECTION = re.compile(r"^(\.[\w.]+)\s+(\d+)\s+\d+", re.MULTILINE)
+SECTION_KINDS = {".text": "code", ".rodata": "constants", ".data": "data", ".bss": "data"}
+"""What a section holds, by the first word of its name."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Bytes: of `code` and its `constants`, of the calibration `page` (both ROM), of `data` that
+    is no one's instance, of one `instance` (RAM), of the structures of inputs and outputs, and of
+    the `stack` of a step; `beside` are functions whose stack the compiler does not tell.
+
+    `longest` are the most instructions of a step; where there is no bound, `unbounded` says why.
+    """
+
+    name: str
+    number: str
+    code: int
+    constants: int
+    page: int
+    data: int
+    instance: int
+    inputs: int
+    outputs: int
+    stack: int
+    beside: tuple[str, ...]
+    longest: int | None
+    unbounded: str
+
+    @property
+    def rom(self) -> int:
+        """Code, constants and the default page."""
+        return self.code + self.constants + self.page
+
+
+def measure_code(program: Program) -> Metrics:
+    """Compile the C of a Program for a Cortex-M4F, `-O2`, and measure it.
+
+    Raises ToolMissing, BuildError.
+    """
+    name = program.name
+    with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:
+        folder, files = Path(folder_name), emit_c_files(program)
+        probes = "".join(SIZE_PROBE.format(structure=one, name=name) for one in STRUCTURES)
+        for file, text in {**files, "probe.c": f'#include "{name}.h"\n{probes}'}.items():
+            (folder / file).write_text(text)
+        sources = [file for file in files if file.endswith(".c")]
+        section_sizes = _section_sizes(folder, sources)
+        sizes = _section_sizes(folder, ["probe.c"])
+        stack = stack_usage(folder, sources, f"{name}_Step")
+        longest, unbounded = _worst_case(folder, sources, f"{name}_Step")
+    kinds: Counter[str] = Counter()
+    for section, size in section_sizes.items():
+        kinds[SECTION_KINDS.get("." + section.split(".")[1], "")] += size
+    return Metrics(
+        name,
+        program.number_type,
+        code=kinds["code"],
+        constants=kinds["constants"],
+        page=section_sizes[f".calibration.{name}"],
+        data=kinds["data"],
+        instance=sizes[".rodata.of_Self"],
+        inputs=sizes[".rodata.of_In"],
+        outputs=sizes[".rodata.of_Out"],
+        stack=stack.most,
+        beside=stack.beside,
+        longest=longest,
+        unbounded=unbounded,
+    )
+
+
+def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
+    """Return the most instructions of a step, or None and why there is no bound."""
+    try:
+        return worst_case_instructions(folder, sources, entry), ""
+    except Unbounded as error:
+        return None, str(error)
+
+
+def _section_sizes(folder: Path, sources: Sequence[str]) -> Counter[str]:
+    """Return the bytes of each section of all sources together."""
+    output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fdata-sections", "-c", *sources], folder)
+    objects = [f"{Path(source).stem}.o" for source in sources]
+    sizes: Counter[str] = Counter()
+    for line in SECTION.finditer(output_of([ARM_SIZE, "-A", "-d", *objects], folder)):
+        sizes[line[1]] += int(line[2])
+    return sizes

@@ -1,0 +1,162 @@
+"""Usage: what each block of a Program reads and writes, directly and through the blocks it runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from codegen.passes.definite_assignment import find_unassigned_reads
+from language.ir.ops import Assign, Block, Branch, Loop, RunBlock, Switch
+from language.ir.program import Program
+from language.ir.traversal import block_reads, block_writes, reachable_blocks, walk_ops
+from language.programs.major_step import STEP_INTERFACE
+
+POINTER_OF_GROUP = {
+    "input": "in",
+    "is_new": "in",
+    "work": "work",
+    "state": "self",
+    "discrete": "self",
+    "latched": "self",
+    "equation": "self",
+    "before": "self",
+    "innovation": "self",
+    "check": "self",
+    "timer": "self",
+    "memory": "self",
+    "derived": "self",
+}
+PAGE_GROUPS = frozenset({"calibration"})
+POINTER_ORDER = ("self", "cal", "in", "work")
+
+
+@dataclass(frozen=True)
+class Usage:
+    """The pointers that a block needs, and those through which it writes."""
+
+    needs: frozenset[str]
+    writes: frozenset[str]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The pointers in the order in which functions take them."""
+        return tuple(name for name in POINTER_ORDER if name in self.needs)
+
+
+def block_usages(
+    program: Program, local: Mapping[str, frozenset[str]], page_groups: frozenset[str] = PAGE_GROUPS
+) -> dict[str, Usage]:
+    """Return the usage of every block; `local` are the variables that live inside a block,
+    `page_groups` the groups of constants that the calibration page has.
+    """
+    groups = {**POINTER_OF_GROUP, **dict.fromkeys(page_groups, "cal")}
+    usage_by_block: dict[str, Usage] = {}
+
+    def visit(name: str) -> Usage:
+        if name not in usage_by_block:
+            read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
+            written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
+            needs = {groups.get(n.partition(".")[0], "") for n in read | written} - {""}
+            writes = {groups.get(n.partition(".")[0], "") for n in written} - {""}
+            for op in walk_ops(program.blocks[name]):
+                if isinstance(op, RunBlock):
+                    inner = visit(op.block)
+                    needs |= inner.needs
+                    writes |= inner.writes
+            usage_by_block[name] = Usage(frozenset(needs), frozenset(writes))
+        return usage_by_block[name]
+
+    for name in program.blocks:
+        visit(name)
+    return usage_by_block
+
+
+def locals_of(
+    program: Program, loop_variables: Mapping[str, frozenset[str]] | None = None
+) -> dict[str, frozenset[str]]:
+    """Return, per block, the work variables that live inside it: set once, then read there, or
+    those that have `loop_variables` (see `turning`).
+
+    A variable that some block reads without having set it is shared by the blocks.
+    """
+    assigned_once = {name: _assigned_once(block) for name, block in program.blocks.items()}
+    shared = {variable.name for variable in program.variables if variable.size}
+    for name, block in program.blocks.items():
+        used = {n for n in (*block_reads(block), *block_writes(block)) if n.startswith("work.")}
+        shared |= used - assigned_once[name]
+    local_variables, loop_variables = (
+        {},
+        loop_locals(program) if loop_variables is None else loop_variables,
+    )
+    for name, block in program.blocks.items():
+        loops = {op.index for op in walk_ops(block) if isinstance(op, Loop)}
+        local_variables[name] = frozenset(
+            (assigned_once[name] - shared) | loops | loop_variables[name]
+        )
+    return local_variables
+
+
+def loop_locals(program: Program) -> dict[str, frozenset[str]]:
+    """Return, per block, the work variables that live inside it, and that its loops set.
+
+    Every block that has one sets it before it reads it, and runs none that has it too.
+    """
+    loops = [
+        op for block in program.blocks.values() for op in walk_ops(block) if isinstance(op, Loop)
+    ]
+    candidates = {n for op in loops for n in block_writes(op.body) if n.startswith("work.")}
+    candidates -= {
+        *STEP_INTERFACE,
+        *(op.index for op in loops),
+        *(v.name for v in program.variables if v.size),
+    }
+    if not candidates:
+        return dict.fromkeys(program.blocks, frozenset())
+    accesses = {
+        name: (candidates & set(block_reads(block)), candidates & set(block_writes(block)))
+        for name, block in program.blocks.items()
+    }
+    for name, (read, written) in accesses.items():
+        candidates -= read ^ written
+        below = reachable_blocks(name, program.blocks) - {name}
+        candidates -= read & {n for other in below for names in accesses[other] for n in names}
+        candidates -= (
+            find_unassigned_reads(program, name, frozenset(read & candidates))
+            if read & candidates
+            else set()
+        )
+    return {name: frozenset(read & candidates) for name, (read, _) in accesses.items()}
+
+
+def _assigned_once(block: Block) -> set[str]:
+    """Work variables assigned exactly once, and read only in the same list of operations."""
+    counts = Counter(op.target for op in walk_ops(block) if isinstance(op, Assign))
+    outside = Counter(block_reads(block))
+    names: set[str] = set()
+    for ops in _nested_blocks(block):
+        inside: Counter[str] = Counter()
+        assigned: set[str] = set()
+        for op in ops:
+            fresh = Counter(block_reads((op,)))
+            inside.update(fresh)
+            if isinstance(op, Assign) and counts[op.target] == 1 and not inside[op.target]:
+                assigned.add(op.target)
+        names |= {n for n in assigned if n.startswith("work.") and 0 < inside[n] == outside[n]}
+    return names
+
+
+def _nested_blocks(block: Block) -> Iterator[Block]:
+    yield block
+    for op in block:
+        match op:
+            case Branch(_, then, other):
+                yield from _nested_blocks(then)
+                yield from _nested_blocks(other)
+            case Switch(_, cases):
+                for _, case_block in cases:
+                    yield from _nested_blocks(case_block)
+            case Loop(_, _, body):
+                yield from _nested_blocks(body)
+            case _:
+                pass

@@ -1,0 +1,342 @@
+"""Leap: a step in which nothing happens, as one block of C; bits stay (rule C18).
+
+In nearly all steps of a continuous automaton no guard changes, nor in nearly all ticks that run
+one. `leap_<mode>` is what is done then, followed with all that is known of such a step: its length,
+its mode, that it is one piece. Each value has a name of its own, so that a compiler keeps it in a
+register, and what the equations were when the step before ended is not computed again. Where a
+guard changed, the step is gone through from where it began.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from codegen.passes.path_specialisation import (
+    POINT_STATE_PREFIX,
+    TIME_LEFT,
+    ExecutionPath,
+    NotSpecialisable,
+)
+from language.ir.ops import (
+    Assign,
+    Block,
+    Branch,
+    Expr,
+    Loop,
+    Op,
+    Ref,
+    RunBlock,
+    Switch,
+    Unary,
+    Value,
+)
+from language.ir.program import MODE_VARIABLE, ModeInfo, Program, Variable
+from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands
+from language.ir.traversal import block_writes, expr_names, names_used
+from language.lowering.program_builder import finalise_program
+from language.programs.model_run import RUN_MODE
+
+FastPathMode = Literal["on", "anew", "off"]
+"""Whether there are leaps; `anew` computes all equations, for one whose states are set between its
+steps, as those of a predictor are: what they were when the step before ended does not count."""
+ENTRIES = ("init", "derive", "step")
+FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
+    "leap",
+    "memory.is_leapt",
+    "record",
+    "memory.started",
+)
+EVENT_PATH = "through_events"
+STEP_END_PREFIX = "work.end_"
+ModeNumbers = tuple[tuple[str, int], ...]
+MAX_CONFIGURATIONS = 12
+"""Modes of chart and regions together that have a leap each: more are too much C."""
+CLEAR_TAKEN = (Assign(FAST_PATH_TAKEN, Value(False)),)
+
+
+@dataclass(frozen=True)
+class ModeConfiguration:
+    """Where an automaton stays in a step: its modes, as the `numbers` of the variables that hold
+    them; `title` is the block of such a step.
+    """
+
+    block_name: str
+    mode_numbers: ModeNumbers
+
+    @property
+    def known_values(self) -> dict[str, Expr]:
+        """What the variables are."""
+        return {variable: Value(number) for variable, number in self.mode_numbers}
+
+
+def add_fast_path(program: Program, fast_path: FastPathMode = "on") -> Program:
+    """Return a Program that takes a whole step at once where nothing happens in it: its own one if
+    it is continuous, else that of a model that it runs; the Program itself where `fast_path` are off.
+
+    Modes that wait take the general path always; modes without a guard never do. A run in float64,
+    which is software on an ECU that has float32 in hardware, stays as it is: its values would be
+    on the stack.
+    """
+    if fast_path == "off":
+        return program
+    if program.period is None:
+        return _add_step_fast_path(program, fast_path)
+    return _add_run_fast_path(program) if program.number_type == "float32" else program
+
+
+def _add_step_fast_path(program: Program, fast_path: FastPathMode) -> Program:
+    match program.blocks["step"]:
+        case (Branch(started, flow, enter), *rest):
+            pass
+        case _:
+            return program
+    first = tuple(op for op in flow if op == RunBlock(RECORD_BLOCK))
+    flow = tuple(op for op in flow if op != RunBlock(RECORD_BLOCK))
+    configurations = (
+        list(mode_configurations(program, FAST_PATH))
+        if fast_path == "anew"
+        else _region_configurations(program.modes, FAST_PATH)
+    )
+    paths = dict(_step_paths(program, flow, fast_path, configurations))
+    once = (*first, RunBlock(FAST_PATH))
+    if _are_unconditional(paths, configurations):
+        step: Block = (Branch(started, once, (*enter, *rest)),)
+    else:
+        step = (*CLEAR_TAKEN, Branch(started, once), *_fallback(EVENT_PATH))
+    whole = (Branch(started, flow, enter), *rest)
+    return _insert_fast_path(program, FAST_PATH, paths, {"step": step, EVENT_PATH: whole})
+
+
+def _add_run_fast_path(program: Program) -> Program:
+    """Return a Program whose runs of a model take a whole tick at once where nothing happens."""
+    made = program
+    for name, block in program.blocks.items():
+        if _is_event_loop(block):
+            mode = name.removeprefix("run_")
+            block_name, event_path = f"{FAST_PATH}_{mode}", f"{EVENT_PATH}_{mode}"
+            configurations = _region_configurations(program.run_modes, block_name, RUN_MODE)
+            equations = program.blocks.get(f"equations_{mode}", ())
+            paths = dict(_run_paths(program, block, equations, configurations))
+            once: Block = (RunBlock(block_name),)
+            if not _are_unconditional(paths, configurations):
+                once = (*CLEAR_TAKEN, *once, *_fallback(event_path))
+            made = _insert_fast_path(made, block_name, paths, {name: once, event_path: block})
+    return made
+
+
+def _fallback(event_path: str) -> Block:
+    return (Branch(Unary("not", Ref(FAST_PATH_TAKEN)), (RunBlock(event_path),)),)
+
+
+def mode_configurations(program: Program, prefix: str) -> Iterator[ModeConfiguration]:
+    """Yield the modes of a chart; with regions beside it each with each, unless these are many."""
+    names = program.mode_variables()
+    by_region = [
+        _region_configurations(program.modes_of(region), "", names[region]) for region in names
+    ]
+    if program.regions and math.prod(map(len, by_region)) > MAX_CONFIGURATIONS:
+        return
+    for combination in itertools.product(*by_region):
+        numbers = tuple(
+            pair for configuration in combination for pair in configuration.mode_numbers
+        )
+        yield ModeConfiguration(
+            prefix + "".join(configuration.block_name for configuration in combination), numbers
+        )
+
+
+def _region_configurations(
+    modes: Sequence[ModeInfo], prefix: str, variable: str = MODE_VARIABLE
+) -> list[ModeConfiguration]:
+    return [
+        ModeConfiguration(f"{prefix}_{mode.name}", ((variable, mode.number),)) for mode in modes
+    ]
+
+
+def _are_unconditional(
+    paths: Mapping[ModeConfiguration, ExecutionPath], configurations: Sequence[ModeConfiguration]
+) -> bool:
+    """Tell whether nothing has a guard, wherever it stays."""
+    return all(stay in paths and paths[stay].is_unconditional for stay in configurations)
+
+
+def _is_event_loop(block: Block) -> bool:
+    """Tell whether a block goes through a tick from event to event."""
+    match block:
+        case (Assign(target), Loop(), *_):
+            return target == TIME_LEFT
+    return False
+
+
+def _run_paths(
+    program: Program, flow: Block, equations: Block, configurations: Sequence[ModeConfiguration]
+) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
+    """Yield the way through a tick without a crossing of each mode of the model.
+
+    What updates does not count yet when equations are made: then these are computed again.
+    """
+    updates = [block for name, block in program.blocks.items() if name.startswith("update")]
+    is_fixed = not any(name.startswith("state.") for b in updates for name in block_writes(b))
+    for configuration in configurations:
+        path = ExecutionPath(program, configuration.known_values)
+        try:
+            path.reuse_equations(equations if is_fixed else (), ("state.", "constant."))
+            path.follow(flow)
+        except NotSpecialisable:
+            continue
+        yield configuration, path
+
+
+def _step_paths(
+    program: Program,
+    flow: Block,
+    fast_path: FastPathMode,
+    configurations: Sequence[ModeConfiguration],
+) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
+    """Yield the way through a step without a crossing of each stay that has one."""
+    for configuration in configurations:
+        path = ExecutionPath(program, configuration.known_values | {STARTED: Value(True)})
+        mode = configuration.block_name.removeprefix(f"{FAST_PATH}_")
+        known = program.blocks.get(f"equations_{mode}", ()) if fast_path == "on" else ()
+        try:
+            path.reuse_equations(known, ("state.", "constant.", "before."))
+            path.follow(flow)
+            path.follow_step_end()
+        except NotSpecialisable:
+            continue
+        yield configuration, path
+
+
+def _insert_fast_path(
+    program: Program,
+    block_name: str,
+    paths: Mapping[ModeConfiguration, ExecutionPath],
+    changed: Mapping[str, Block],
+) -> Program:
+    """Return a Program with a block `block_name` by the modes that variables tell, and changed blocks.
+
+    The same Program where nothing has a way, or where a block is called like that already.
+    """
+    if not paths or {block_name, *(stay.block_name for stay in paths)} & set(program.blocks):
+        return program
+    sets_taken = FAST_PATH_TAKEN in names_used(changed.values())
+    done = {
+        stay: _remove_dead_assignments(_fast_path_block(path, sets_taken))
+        for stay, path in paths.items()
+    }
+    blocks = {stay.block_name: _rename_values(done[stay], path) for stay, path in paths.items()}
+    chosen = _dispatch_on_modes([(stay.mode_numbers, stay.block_name) for stay in paths])
+    made: dict[str, Variable] = {}
+    used = names_used(blocks.values())
+    for path in paths.values():
+        names = ((old, name) for old, name in _value_names(path).items() if name in used)
+        made |= {n: dataclasses.replace(path.values[old].variable, name=n) for old, n in names}
+    made[FAST_PATH_TAKEN] = Variable(
+        FAST_PATH_TAKEN, "truth", about="the whole step is taken: nothing happened in it"
+    )
+    variables = (
+        *(v for v in program.variables if v.name not in made),
+        *made.values(),
+    )
+    blocks = {**program.blocks, **blocks, block_name: chosen, **changed}
+    return finalise_program(
+        dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES
+    )
+
+
+def _dispatch_on_modes(titles: Sequence[tuple[ModeNumbers, str]]) -> Block:
+    """Return what runs the block of the modes that variables tell, one variable in another."""
+    ((numbers, title), *_) = titles
+    if not numbers:
+        return (RunBlock(title),)
+    inner: dict[int, list[tuple[ModeNumbers, str]]] = {}
+    for ((_, number), *rest), one in titles:
+        inner.setdefault(number, []).append((tuple(rest), one))
+    cases = tuple((number, _dispatch_on_modes(some)) for number, some in inner.items())
+    return (Switch(numbers[0][0], cases),)
+
+
+def _fast_path_block(path: ExecutionPath, sets_taken: bool) -> Block:
+    """Return what is done on a way: what comes after the guards if none of them changed; the end
+    `sets_taken` that it is done.
+    """
+    last = (*path.ops, Assign(FAST_PATH_TAKEN, Value(True))) if sets_taken else tuple(path.ops)
+    return (
+        (*path.prologue, *last)
+        if path.is_unconditional
+        else (*path.prologue, Branch(path.is_event_free, last))
+    )
+
+
+def _value_names(path: ExecutionPath) -> dict[str, str]:
+    """Return what each value is called: as its variable is, with the point of the step."""
+    names = {}
+    for name, made in path.values.items():
+        variable, point = made.variable.name, made.point
+        if variable.startswith(STEP_END_PREFIX):
+            variable, point = variable.replace(STEP_END_PREFIX, POINT_STATE_PREFIX), path.points
+        names[name] = f"{variable}_{_point_name(point, path.points)}"
+    count = Counter(names.values())
+    return {
+        n: f"{title}{n[n.rindex('_') :]}" if count[title] > 1 else title
+        for n, title in names.items()
+    }
+
+
+def _point_name(point: int, points: int) -> str:
+    """Return what a point of a step is called: start, middle, end, or by its number."""
+    if point in (1, points):
+        return "start" if point == 1 else "end"
+    return "middle" if points == 3 else str(point)
+
+
+def _rename_values(block: Block, path: ExecutionPath) -> Block:
+    """Return a block whose values are called by their names."""
+    names = _value_names(path)
+
+    def called(expr: Expr) -> Expr:
+        if isinstance(expr, Ref):
+            return dataclasses.replace(expr, name=names.get(expr.name, expr.name))
+        return map_operands(expr, called)
+
+    def setting(ops: Block) -> Iterator[Op]:
+        for op in ops:
+            match op:
+                case Assign(target):
+                    yield dataclasses.replace(op, target=names.get(target, target))
+                case Branch(condition, then, other):
+                    yield Branch(condition, tuple(setting(then)), tuple(setting(other)))
+                case _:
+                    yield op
+
+    return map_expressions(tuple(setting(block)), called)
+
+
+def _remove_dead_assignments(block: Block) -> Block:
+    """Leave out the values of a step that nothing reads."""
+    return tuple(reversed(list(_live_operations(block, set()))))
+
+
+def _live_operations(block: Block, live_names: set[str]) -> Iterator[Op]:
+    """Yield, from the last to the first, the operations of a block whose values are read."""
+    for op in reversed(block):
+        kept = op
+        if isinstance(op, Branch):
+            arms = [
+                tuple(reversed(list(_live_operations(arm, live_names))))
+                for arm in (op.then, op.other)
+            ]
+            kept = Branch(op.condition, *arms)
+        elif (
+            isinstance(op, Assign) and op.target.startswith("work.") and op.target not in live_names
+        ):
+            continue
+        for expr in direct_expressions(op):
+            live_names.update(expr_names(expr))
+        yield kept

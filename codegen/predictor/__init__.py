@@ -1,0 +1,1 @@
+"""Compiled one-step predictors: a model that follows recordings, with Kalman gains."""

@@ -1,0 +1,72 @@
+"""Kalman gains of a linear model, sample by sample, in C that is compiled for its size."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.toolchain.build_cache import get_or_build, key_of
+from codegen.toolchain.compiler import (
+    compile_program,
+    compiler_version,
+    find_compiler,
+    flags_at_level,
+)
+from codegen.toolchain.templates import render
+
+Reals = NDArray[np.float64]
+MAX_SAMPLES = 5000
+"""Samples after which a gain that still changes is taken for the steady one."""
+STEADY_TOLERANCE = 1e-6
+"""A gain that changes by less from sample to sample, of its largest entry, is steady."""
+FLAGS = (*flags_at_level("Og"), "-shared", "-fPIC", "-w")
+
+
+def compute_kalman_gains(
+    phi: Reals,
+    c: Reals,
+    q: Reals,
+    r: Reals,
+    initial_covariance: Reals,
+    transient_samples: int,
+    max_samples: int = MAX_SAMPLES,
+) -> tuple[Reals, Reals, Reals] | None:
+    """Return the gains of the `transient_samples` samples (first, states, seen), the one that stays, and the
+    covariance then.
+
+    Of x(k+1) = phi x(k) + w, y = c x + v with covariance `q` of w, variances `r` (seen,) of v,
+    from a covariance `initial_covariance`. One that still changes after `max_samples` samples is taken as it is then.
+    None where they grow beyond all bounds. Raises ToolMissing, BuildError.
+    """
+    outputs, states = c.shape
+    transient, steady = np.empty((transient_samples, states, outputs)), np.empty((states, outputs))
+    covariance = np.ascontiguousarray(initial_covariance, dtype=np.float64).copy()
+    arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (phi, c, q, r)]
+    results = (transient, steady)
+    done = _compile_recursion(states, outputs)(
+        *(a.ctypes.data for a in (*arrays, covariance)),
+        *(transient_samples, max_samples, STEADY_TOLERANCE),
+        *(a.ctypes.data for a in results),
+    )
+    return (transient, steady, covariance) if done >= 0 else None
+
+
+@cache
+def _compile_recursion(states: int, outputs: int) -> Any:
+    """Return the compiled recursion for a size, kept from an earlier run if there was one."""
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        source = Path(name) / "kalman_gains.c"
+        source.write_text(render("kalman_gains.c.jinja", {"states": states, "seen": outputs}))
+        key = key_of([source], [*find_compiler(), *FLAGS], compiler_version())
+        path = get_or_build(key, lambda made: compile_program([source], made, FLAGS), source.parent)
+        function = ctypes.CDLL(str(path)).modewright_gains
+    pointer, whole = ctypes.c_void_p, ctypes.c_long
+    function.argtypes = [*[pointer] * 5, whole, whole, ctypes.c_double, pointer, pointer]
+    function.restype = whole
+    return function

@@ -1,0 +1,87 @@
+"""ACSL: expressions of a Program in the language of Frama-C's contracts, as numbers or predicates.
+
+Its reals are numbers without rounding, as are those of WP's model of memory that they are proven
+in. What a function of `ha_math` gives is not said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from codegen.emit.c_expression import format_literal
+from language.ir.number_type import NumberType
+from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
+
+Look = Callable[[str], str]
+"""The text of a variable: of a truth value a predicate, of anything else a term."""
+LOGIC = {"and": "&&", "or": "||"}
+
+
+class Unsaid(Exception):
+    """An expression that is not said in ACSL."""
+
+
+@dataclass(frozen=True)
+class Speech:
+    """How expressions are said: the type of reals, and the variables that are `truths`."""
+
+    number: NumberType
+    truths: Collection[str]
+
+    def predicate(self, expr: Expr, look: Look) -> str:
+        """Return a truth value. Raises Unsaid."""
+        match expr:
+            case Value(value):
+                return "\\true" if value else "\\false"
+            case Ref(name):
+                return look(name)
+            case Unary("not", operand):
+                return f"!({self.predicate(operand, look)})"
+            case Binary(operator, left, right):
+                first, second = (self.predicate(side, look) for side in (left, right))
+                return f"(({first}) {LOGIC[operator]} ({second}))"
+            case Compare(operator, left, right) if self.is_truth(left) or self.is_truth(right):
+                first, second = (self.predicate(side, look) for side in (left, right))
+                same = f"(({first}) <==> ({second}))"
+                return same if operator == "==" else f"!{same}"
+            case Compare(operator, left, right):
+                return f"({self.term(left, look)} {operator} {self.term(right, look)})"
+            case Select(condition, then, other):
+                parts = [self.predicate(part, look) for part in (condition, then, other)]
+                return "(({}) ? ({}) : ({}))".format(*parts)
+        raise Unsaid(expr)
+
+    def term(self, expr: Expr, look: Look) -> str:
+        """Return a number. Raises Unsaid."""
+        match expr:
+            case Value():
+                text = format_literal(expr.round_to_type(self.number).value, self.number)
+                return f"({text})" if text[0] == "-" else text
+            case Ref(name):
+                return look(name)
+            case Item(name, index):
+                return f"{look(name)}[{self.term(index, look)}]"
+            case Unary("-", operand):
+                return f"(-{self.term(operand, look)})"
+            case Binary(operator, left, right):
+                return f"({self.term(left, look)} {operator} {self.term(right, look)})"
+            case Select(condition, then, other):
+                test = self.predicate(condition, look)
+                return f"(({test}) ? {self.term(then, look)} : {self.term(other, look)})"
+            case Call("real", (argument,)):
+                return self.term(argument, look)
+        raise Unsaid(expr)
+
+    def is_truth(self, expr: Expr) -> bool:
+        """Tell whether an expression is a truth value."""
+        match expr:
+            case Value(value):
+                return isinstance(value, bool)
+            case Ref(name):
+                return name in self.truths
+            case Unary(operator, _) | Binary(operator, _, _):
+                return operator in ("not", "and", "or")
+            case Select(_, then, _):
+                return self.is_truth(then)
+        return isinstance(expr, Compare)

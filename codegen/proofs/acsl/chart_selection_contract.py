@@ -1,0 +1,199 @@
+"""Chart choice: what a chart says of its counters, and of which transition each region wishes for.
+
+A region wishes for the first enabled transition, by priority, of the outermost or innermost of its
+active modes that has one; a wait is over when its guard was true in one tick more than it takes.
+When a fault happened it wishes for the fault mode, or for nothing (`chart_fault.py`).
+"""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from codegen.proofs.acsl.chart_fault_contract import ChartFault, is_of_fault
+from codegen.proofs.acsl.chart_predicates import Configuration, all_of, any_of
+from language.charts.chart_context import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED, request_variable
+from language.ir.ops import Expr
+from language.ir.program import TransitionInfo
+from language.lowering.chart_activity import is_complete
+from language.lowering.edge_detection import (
+    EdgeDetector,
+    edge_detectors_by_mode,
+    edge_value_ref,
+    guard_memory_bindings,
+)
+from language.lowering.event_queue import CURRENT_EVENT
+from language.lowering.expressions import lower_expression
+from language.lowering.transition_infos import wait_ticks
+from language.model.automaton import Mode, Transition
+from language.model.statechart import ChartNode
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is asked of counting and choosing; guards are said of the values of now."""
+
+    words: Configuration
+
+    def of_mode(self, node: ChartNode) -> Iterator[str]:
+        """Yield what `choose_<mode>` leaves. Raises Unsaid."""
+        name = request_variable(node.region)
+        found = self._first(self._ordered([node]), self.words.before(name))
+        yield f"ensures {self.words.now(name)} == {found};"
+
+    def counted(self, node: ChartNode) -> Iterator[str]:
+        """Yield what `count_<mode>` leaves. Raises Unsaid."""
+        yield from self._counts(node, "")
+
+    def of_region(self, region: ChartNode) -> Iterator[str]:
+        """Yield what is wished for in a region, and what its modes count. Raises Unsaid."""
+        words = self.words
+        name, mode = request_variable(region.region), words.mode(region.region)
+        leaves = words.charting.chart.leaves(region.region)
+        for leaf in leaves:
+            assert leaf.number is not None
+            here = f"{words.now(mode)} == {words.place.integer_constant(mode, leaf.number)}"
+            yield f"ensures ({here} ==> {self._wished(region, leaf)});"
+        known = " || ".join(f"{words.now(mode)} == {leaf.number}" for leaf in leaves)
+        yield f"ensures ({known}) || {words.now(name)} == 0;"
+        sources = [f"{words.now(name)} == 0"]
+        for transition, way in words.charting.transitions_in(region.region):
+            own = words.is_one(name, [words.number(transition)], words.now)
+            source = words.is_active(words.charting.chart.nodes[way.source], words.now)
+            sources.append(f"({own} && {source})")
+        yield f"ensures {any_of(sources)};"
+        for node in words.charting.chart.nodes:
+            if node.region == region.region and words.charting.transitions_of(node):
+                active = words.is_active(node, words.now)
+                yield from self._counts(node, self._unless_left(region, active))
+
+    def _wished(self, region: ChartNode, leaf: ChartNode) -> str:
+        """Return what a region wishes for in an innermost mode, or that a fault decides it."""
+        charting, fault = self.words.charting, self._fault
+        name = self.words.now(request_variable(region.region))
+        chain = [n for n in charting.chart.region_ancestors(leaf) if charting.transitions_of(n)]
+        ordered = chain if charting.chart.order == "inner_first" else chain[::-1]
+        ways = [(n, way) for n, way in self._ordered(ordered) if not is_of_fault(way)]
+        usual = f"{name} == {self._first(ways, '0')}"
+        if leaf in fault.outside:
+            asked = self.words.is_one(
+                request_variable(region.region), fault.numbers(leaf), self.words.now
+            )
+        elif fault.leaves(region):
+            asked = f"{name} == 0"
+        else:
+            return usual
+        return f"({fault.happened} ? {asked} : {usual})"
+
+    def _unless_left(self, region: ChartNode, active: str) -> str:
+        """Return when a mode counts: while it is active, and no fault leaves what is around it."""
+        if not self._fault.leaves(region):
+            return active
+        return all_of([active, f"!{self._fault.happened}"])
+
+    @property
+    def _fault(self) -> ChartFault:
+        return ChartFault(self.words)
+
+    def _ordered(self, nodes: Iterable[ChartNode]) -> Iterator[tuple[ChartNode, Transition]]:
+        """Yield the transitions of some modes, each mode's by priority."""
+        for node in nodes:
+            ways = enumerate(self.words.charting.transitions_of(node))
+            ordered = sorted(ways, key=lambda pair: (pair[1].priority or 0, pair[0]))
+            yield from ((node, transition) for _, transition in ordered)
+
+    def _first(self, ways: Iterable[tuple[ChartNode, Transition]], none: str) -> str:
+        """Return the number of the first transition that is enabled."""
+        found = none
+        for node, transition in reversed(list(ways)):
+            info = self.words.charting.info_of(transition)
+            test = self._due(info) if info.timer else self._enabled(node, transition)
+            number = self.words.place.integer_constant(request_variable(node.region), info.number)
+            found = f"(({test}) ? {number} : {found})"
+        return found
+
+    def _due(self, info: TransitionInfo) -> str:
+        assert info.timer
+        ticks = self.words.speech.term(wait_ticks(info), self.words.now)
+        return f"{self.words.now(info.timer)} > {ticks}"
+
+    def _enabled(self, node: ChartNode, transition: Transition) -> str:
+        """Return that the event of a transition is heard and its guard is true."""
+        words, chart = self.words, self.words.charting.chart
+        if transition.is_completion:
+            return words.speech.predicate(is_complete(chart, node, "memory.mode"), words.now)
+        said = words.speech.predicate(self._guard(node, transition), words.now)
+        if not transition.events:
+            return said
+        numbers = (chart.events[name].number for name in transition.events)
+        return all_of([words.is_one(CURRENT_EVENT.name, numbers, words.now), said])
+
+    def _guard(self, node: ChartNode, transition: Transition) -> Expr:
+        return lower_expression(transition.when.tree, self._known(node))
+
+    def _known(self, node: ChartNode) -> Mapping[str, Expr]:
+        charting = self.words.charting
+        return ChainMap(guard_memory_bindings(charting.automaton, self._mode(node)), self._names)
+
+    @property
+    def _names(self) -> dict[str, Expr]:
+        return dict(self.words.charting.bindings)
+
+    def _mode(self, node: ChartNode) -> Mode:
+        mode = self.words.charting.mode_of(node)
+        assert mode
+        return mode
+
+    def _counts(self, node: ChartNode, active: str) -> Iterator[str]:
+        """Yield what the counters and edges of a mode are, if that is `active`; else the same."""
+        for transition in self.words.charting.transitions_of(node):
+            info = self.words.charting.info_of(transition)
+            if info.timer:
+                old, new = self.words.before(info.timer), self.words.now(info.timer)
+                value = self._count(info, self._enabled(node, transition), old)
+                yield f"ensures {new} == {f'({active} ? {value} : {old})' if active else value};"
+        automaton = self.words.charting.automaton
+        for edge in edge_detectors_by_mode(automaton).get(self._mode(node).key, ()):
+            said = self._edge(edge, node)
+            same = f"({self._same(edge.armed_variable)})"
+            yield f"ensures {f'({active} ? {said} : {same})' if active else said};"
+
+    def _count(self, info: TransitionInfo, enabled: str, old: str) -> str:
+        """A tick counts once; a wait that begins in a later micro-step begins there (rule 4)."""
+        first = f"({enabled} ? ({old} < {info.timer_limit} ? {old} + 1 : {old}) : 0)"
+        if not self.words.charting.has_several_micro_steps:
+            return first
+        later = f"({enabled} ? ({old} == 0 ? 1 : {old}) : 0)"
+        over = f"({self.words.now(IS_STEP_LIMIT_REACHED.name)} ? {old} : {later})"
+        return f"({self.words.now(IS_FIRST_STEP.name)} ? {first} : {over})"
+
+    def _edge(self, edge: EdgeDetector, node: ChartNode) -> str:
+        """An edge is seen where its argument turned since the last look (rule 8)."""
+        words = self.words
+        level = lower_expression(edge.call.arguments[0], self._names)
+        seen, old = words.now(f"work.edge_{edge.number}"), words.before(edge.armed_variable)
+        if edge.is_change:
+            last = edge_value_ref(words.charting.automaton, edge, f"memory.last_{edge.number}")
+            text = self._text(level)
+            relation = "<==>" if last.name in words.speech.truths else "=="
+            turned = f"({old} && !({text} {relation} {words.before(last.name)}))"
+            left = [words.now(edge.armed_variable), f"({words.now(last.name)} {relation} {text})"]
+        else:
+            wanted = words.speech.predicate(level, words.now)
+            wanted = f"!({wanted})" if edge.call.function == "falling" else wanted
+            turned = f"(({wanted}) && {old})"
+            left = [f"({words.now(edge.armed_variable)} <==> !({wanted}))"]
+        looked = all_of([f"({seen} <==> {turned})", *left])
+        if not words.charting.has_several_micro_steps:
+            return looked
+        past = f"({words.now(IS_STEP_LIMIT_REACHED.name)} && !{words.now(IS_FIRST_STEP.name)})"
+        return f"({past} ? (!{seen} && {self._same(edge.armed_variable)}) : {looked})"
+
+    def _text(self, expr: Expr) -> str:
+        speech = self.words.speech
+        say = speech.predicate if speech.is_truth(expr) else speech.term
+        return say(expr, self.words.now)
+
+    def _same(self, name: str) -> str:
+        return f"({self.words.now(name)} <==> {self.words.before(name)})"

@@ -1,0 +1,1 @@
+"""Proofs that no input makes a condition matter: invariants, cutpoints, reachability."""

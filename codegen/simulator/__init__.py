@@ -1,0 +1,1 @@
+"""Compiled simulations of whole systems, and of a Program block by block."""

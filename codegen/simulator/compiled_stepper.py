@@ -1,0 +1,184 @@
+"""Stepper: a Program compiled for this machine, run block by block through ctypes.
+
+It has the methods that the engine asks of what runs a Program (engine/interpreter/interpreter.py), and its
+bits. For whole runs in one call see codegen/simulator/simulator_library.py.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from codegen.emit.c_math import emit_math_files
+from codegen.emit.c_module import module_context
+from codegen.emit.c_names import CNames, c_type
+from codegen.passes.block_usage import block_usages, locals_of
+from codegen.passes.range_violation_flags import (
+    RANGE_MARK,
+    add_range_marks as marked_program,
+    ranged_signals,
+)
+from codegen.simulator.simulator_library import SHARED_LIBRARY_FLAGS, build_library
+from codegen.toolchain.build_cache import get_or_build, key_of
+from codegen.toolchain.compiler import FLAGS, compiler_version, find_compiler
+from codegen.toolchain.templates import render
+from language.ir.printer import digest
+from language.ir.program import Program
+
+MODULE_NAME = "stepper"
+CTYPES: Mapping[str, Any] = {
+    "double": ctypes.c_double,
+    "float": ctypes.c_float,
+    "bool": ctypes.c_bool,
+    "uint8_t": ctypes.c_uint8,
+    "int16_t": ctypes.c_int16,
+    "uint16_t": ctypes.c_uint16,
+    "int32_t": ctypes.c_int32,
+    "uint32_t": ctypes.c_uint32,
+}
+INLINED_ENTRIES = ("init", "step")
+"""Blocks that are no functions of their own where C is printed."""
+
+
+class CompiledStepper:
+    """A Program in compiled C with its values. Variables start at 0 or false, `init` has run."""
+
+    def __init__(self, program: Program, flags: Sequence[str] = FLAGS) -> None:
+        """Compile, or take what was compiled before. Raises ToolMissing, BuildError."""
+        self.program = program
+        marked = marked_program(program)
+        library, self._blocks, places = _load_stepper(
+            _StepperKey(digest(marked), marked), tuple(flags)
+        )
+        self._run = library.stepper_run
+        self._buffer = ctypes.create_string_buffer(int(library.stepper_size()))
+        self._address = ctypes.addressof(self._buffer)
+        sizes = {v.name: v.size for v in program.variables if v.size}
+        self._values = {
+            name: CTYPES[kind].from_buffer(self._buffer, offset)
+            for name, (kind, offset) in places.items()
+            if name not in sizes
+        }
+        self._arrays_and_constants: dict[str, Any] = {
+            c.name: c.items or c.value for c in program.constants
+        }
+        for name, size in sizes.items():
+            kind, offset = places[name]
+            self._arrays_and_constants[name] = (CTYPES[kind] * size).from_buffer(
+                self._buffer, offset
+            )
+        self._range_marks = {
+            signal: RANGE_MARK.format(k) for k, signal in enumerate(ranged_signals(program))
+        }
+        for entry in ("default_page", "derive", "init"):
+            self.run(entry)
+
+    def get(self, name: str) -> Any:
+        """Return the value of a variable or constant, `group.name`; of an array all of them."""
+        value = self._values.get(name)
+        return self._arrays_and_constants[name] if value is None else value.value
+
+    def set(self, name: str, value: float | int | bool) -> None:
+        """Set a variable; a real is rounded to the number type, once."""
+        self._values[name].value = value
+
+    def has(self, name: str) -> bool:
+        """Tell whether the Program has a variable or constant."""
+        return name in self._values or name in self._arrays_and_constants
+
+    def run(self, block: str) -> None:
+        """Run a block."""
+        self._run(self._address, self._blocks[block])
+
+    def snapshot(self) -> bytes:
+        """Return all values as they are now, for `restore`."""
+        return self._buffer.raw
+
+    def restore(self, values: bytes) -> None:
+        """Make all values what they were at a `snapshot`."""
+        ctypes.memmove(self._address, values, len(values))
+
+    def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+        """Return a function that returns the values of some variables."""
+        values = [self._values[name] for name in names]
+        return lambda: tuple([value.value for value in values])
+
+    def pop_range_violations(self) -> tuple[str, ...]:
+        """Return the signals that left their range since this was asked last."""
+        violated = tuple(
+            signal for signal, name in self._range_marks.items() if self._values[name].value
+        )
+        for signal in violated:
+            self._values[self._range_marks[signal]].value = False
+        return violated
+
+
+@dataclasses.dataclass(frozen=True)
+class _StepperKey:
+    digest: str
+    program: Program = dataclasses.field(compare=False)
+
+
+LoadedStepper = tuple[ctypes.CDLL, dict[str, int], dict[str, tuple[str, int]]]
+
+
+@lru_cache(maxsize=64)
+def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedStepper:
+    """Return a library, the numbers of its blocks, and kind and offset of its variables."""
+    program = dataclasses.replace(stepper_key.program, name=MODULE_NAME)
+    files, blocks, names = _emit_files(program)
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        for file, text in files.items():
+            (folder / file).write_text(text)
+        sources = sorted(folder.glob("*.c"))
+        key = key_of(sources, [*find_compiler(), *flags, *SHARED_LIBRARY_FLAGS], compiler_version())
+        path = get_or_build(key, lambda target: build_library(sources, target, flags, None), folder)
+        library = ctypes.CDLL(str(path))
+    library.stepper_run.argtypes = [ctypes.c_void_p, ctypes.c_int32]
+    library.stepper_run.restype = None
+    library.stepper_size.restype = ctypes.c_int64
+    offsets = (ctypes.c_int64 * len(names)).in_dll(library, "stepper_places")
+    places = {n: (kind, o) for (n, kind), o in zip(names.items(), offsets, strict=True)}
+    return library, blocks, places
+
+
+def _emit_files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, str]]:
+    """Return the C of a Program, the numbers of its blocks, and the C types of its variables."""
+    context = module_context(program)
+    local = locals_of(program)
+    usage_by_block, c_names = block_usages(program, local), CNames(program)
+    hidden = {name for names in local.values() for name in names}
+    names = {
+        v.name: c_type(v, program.number_type) for v in program.variables if v.name not in hidden
+    }
+    names |= {
+        c.name: c_type(c, program.number_type)
+        for c in program.constants
+        if c.kind in ("tunable", "derived") and not c.items
+    }
+    own = [name for name in program.blocks if name not in (*INLINED_ENTRIES, "derive")]
+    calls = [f"{name}({', '.join(usage_by_block[name].parameters)})" for name in own]
+    entries = [name for name in INLINED_ENTRIES if name in program.blocks]
+    inline = [(name, context["entries"][name]["lines"]) for name in entries]
+    files = {
+        f"{MODULE_NAME}.h": render("module.h.jinja", {**context, "digest": ""}),
+        f"{MODULE_NAME}_stepper.c": render(
+            "stepper.c.jinja",
+            {
+                **context,
+                "calls": calls,
+                "inline": inline,
+                "places": [c_names(name).replace("->", ".") for name in names],
+            },
+        ),
+    }
+    if context["uses_math"]:
+        files.update(emit_math_files(program.number_type))
+    numbered = [*own, "derive", "default_page", *entries]
+    return files, {name: number for number, name in enumerate(numbered)}, names

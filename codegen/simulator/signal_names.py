@@ -1,0 +1,103 @@
+"""Run places: where the signals of a system are in the C of its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from codegen.emit.c_expression import CNameMap, emit_expression
+from codegen.emit.c_names import CNames
+from language.ir.number_type import NumberType
+from language.ir.ops import Assign
+from language.ir.program import Program, unqualified_name
+from language.programs.simulation_assembly import SimulationAssembly, output_variables
+
+INSTANCE_NAME = "i_{}"
+"""What an instance is called in C: its name may be any that the language takes."""
+
+
+@dataclass(frozen=True)
+class SignalNameMap:
+    """Where signals are in the driver."""
+
+    assembly: SimulationAssembly
+    programs: Mapping[str, Program]
+    is_row: bool = False
+    is_timed: bool = False
+    number: NumberType = "float64"
+
+    def __call__(self, name: str) -> str:
+        """Return the C text of `signal.<name>`."""
+        signal = unqualified_name(name)
+        if self.is_row:
+            return f"out[{self.assembly.row_signals.index(signal)}]"
+        return self.emit_signal(signal)
+
+    def integer_constant(self, name: str, number: int) -> str:
+        """Return a whole number beside a signal."""
+        return repr(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        """Signals are reals."""
+        return False
+
+    def emit_signal(self, name: str) -> str:
+        """Return the C text of a signal."""
+        courses = [course.name for course in self.assembly.input_trajectories]
+        if self.is_timed and name in courses:
+            return f"course_{courses.index(name)}(run, time)"
+        if name in self.assembly.inputs:
+            return f"run->inputs[{self.assembly.inputs.index(name)}]"
+        if name in self.assembly.sensors:
+            return f"run->{INSTANCE_NAME.format(name)}.value"
+        owner, _, wire = name.partition(".")
+        program = self.programs[owner]
+        place = CNames(program)(output_variables(program)[wire])
+        return place.replace("self->", f"(double)run->{program.name}.self.")
+
+    def emit_formula(self, block: str) -> str:
+        """Return the C text of a block of the wires."""
+        return emit_wire_formula(self.assembly, block, self)
+
+
+def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMap) -> str:
+    """Return the C text of a block of the wires, whose signals are at a place."""
+    (op,) = assembly.wires.blocks[block]
+    assert isinstance(op, Assign)
+    return f"(double)({emit_expression(op.value, c_names)})"
+
+
+@dataclass(frozen=True)
+class TimeNameMap:
+    """Where a formula of time reads it, whatever it is called there."""
+
+    number: NumberType = "float64"
+
+    def __call__(self, name: str) -> str:
+        """Return the C text of the time."""
+        return "now"
+
+    def integer_constant(self, name: str, number: int) -> str:
+        """Return a whole number beside it."""
+        return repr(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        """Time is a real."""
+        return False
+
+
+def column_positions(assembly: SimulationAssembly) -> list[int]:
+    """Return where each recorded column stands among the numbers of a row."""
+    positions, formulas = [], len(assembly.row_signals)
+    for column in assembly.columns:
+        if column.block:
+            positions.append(formulas)
+            formulas += 1
+        else:
+            positions.append(assembly.row_signals.index(column.source))
+    return positions
+
+
+def row_width(assembly: SimulationAssembly) -> int:
+    """Return how many numbers a row has."""
+    return max(1, len(assembly.row_signals) + sum(1 for c in assembly.columns if c.block))

@@ -1,0 +1,277 @@
+"""Abreast: steps of several variants side by side, in the vectors of the processor.
+
+Where nothing happens in a step of a continuous automaton, it is arithmetic of reals alone, the same
+for all variants in one mode: that part of the Program's blocks is printed once more, over vectors.
+Each lane has the bits of the step of one variant; a lane in which something happens takes that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from codegen.emit.c_expression import LIBM_FUNCTIONS, format_literal
+from codegen.emit.c_names import CNames
+from codegen.emit.c_statement import emit_wrapped_statement
+from language.ir.ops import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    Op,
+    Ref,
+    RunBlock,
+    Select,
+    Switch,
+    Unary,
+    Value,
+)
+from language.ir.program import MODE_VARIABLE, Program
+from language.programs.simulation_assembly import range_event_variables
+
+LANES = 4
+"""Variants side by side: reals in a vector of 32 bytes."""
+LaneKind = Literal["real", "truth"]
+FULL_STEP_LIMIT = {"work.h": Ref("work.left"), "work.is_wait": Value(False)}
+"""What the limit of a step is where no wait ends inside it."""
+PAGE_PREFIXES = ("derived.", "calibration.")
+READ_PREFIXES = ("state.", "discrete.", "before.", "memory.armed", "memory.time")
+WRITTEN_PREFIXES = ("state.", "memory.time")
+"""What a step without an event may read of an instance, and write; the page is the same for all."""
+
+
+class NotVectorisable(Exception):
+    """A block that is not arithmetic of reals."""
+
+
+@dataclass
+class VectorEmitter:
+    """The blocks of a Program over vectors; `touched` are the names that they read and write."""
+
+    program: Program
+    kinds: Mapping[str, LaneKind]
+    fixed: frozenset[str]
+    blocks: dict[str, list[str]] = field(default_factory=dict)
+    accessed: dict[str, LaneKind] = field(default_factory=dict)
+    called_functions: dict[str, int] = field(default_factory=dict)
+    named_values: dict[str, tuple[str, LaneKind]] = field(default_factory=dict)
+    """What stands for values that have been made, with their kinds."""
+
+    def emit_block(self, name: str, ops: Block) -> None:
+        """Print a block, after those that it runs."""
+        if name not in self.blocks:
+            self.blocks[name] = [f"    {line}" for op in ops for line in self._emit_op(op)]
+
+    def _emit_op(self, op: Op) -> Iterator[str]:
+        match op:
+            case Assign(target, value, _) if self.kind_of(Ref(target)) == self.kind_of(value):
+                yield from emit_wrapped_statement(
+                    f"{self.vector_member(target)} = ", self.emit_expression(value), "", 96
+                )
+            case RunBlock(inner):
+                self.emit_block(inner, self.program.blocks[inner])
+                yield f"abreast_{inner}(all);"
+            case _:
+                raise NotVectorisable
+
+    def vector_member(self, name: str) -> str:
+        """Return where a vector of a name is."""
+        self.accessed.setdefault(name, self.kind_of(Ref(name)))
+        return f"all->{flatten_name(name)}"
+
+    def kind_of(self, expr: Expr) -> LaneKind:
+        """Return what an expression is. Raises NotAbreast for whole numbers and tables."""
+        match expr:
+            case Value(value) if isinstance(value, bool):
+                return "truth"
+            case Value(value) if isinstance(value, float):
+                return "real"
+            case Ref(name) if name in self.named_values:
+                return self.named_values[name][1]
+            case Ref(name) if name in self.kinds:
+                return self.kinds[name]
+            case Unary("not", _) | Binary("and" | "or", _, _) | Compare():
+                return "truth"
+            case Unary("-", operand) | Binary(_, operand, _) | Select(_, operand, _):
+                return self.kind_of(operand)
+            case Call(function, arguments) if function not in ("real", "whole"):
+                if all(self.kind_of(argument) == "real" for argument in arguments):
+                    return "real"
+        raise NotVectorisable
+
+    def emit_expression(self, expr: Expr) -> str:
+        """Return the C text of an expression over vectors."""
+        match expr:
+            case Value(value) if isinstance(value, bool):
+                return "EVERY_LANE" if value else "NO_LANE"
+            case Value(value):
+                return f"EACH({format_literal(value, 'float64')})"
+            case Ref(name) if name in self.named_values:
+                return self.named_values[name][0]
+            case Ref(name) if name in self.fixed:
+                return f"EACH({CNames(self.program)(name)})"
+            case Ref(name):
+                return self.vector_member(name)
+            case Unary(operator, operand):
+                return f"({'-' if operator == '-' else '~'}{self.emit_expression(operand)})"
+            case Binary(operator, left, right):
+                sign = {"and": "&", "or": "|"}.get(operator, operator)
+                return f"({self.emit_expression(left)} {sign} {self.emit_expression(right)})"
+            case Compare(operator, left, right):
+                return self._emit_comparison(operator, left, right)
+            case Select(condition, then, other):
+                parts = ", ".join(self.emit_expression(part) for part in (condition, then, other))
+                return f"CHOSEN{'_TRUTH' if self.kind_of(then) == 'truth' else ''}({parts})"
+            case Call(function, arguments):
+                self.called_functions[function] = len(arguments)
+                parts = ", ".join(self.emit_expression(argument) for argument in arguments)
+                return f"each_{function}({parts})"
+        raise NotVectorisable
+
+    def _emit_comparison(self, operator: str, left: Expr, right: Expr) -> str:
+        kinds = self.kind_of(left), self.kind_of(right)
+        if kinds == ("real", "real"):
+            return (
+                f"(Truths)({self.emit_expression(left)} {operator} {self.emit_expression(right)})"
+            )
+        if kinds != ("truth", "truth") or operator not in ("==", "!="):
+            raise NotVectorisable
+        differs = f"({self.emit_expression(left)} ^ {self.emit_expression(right)})"
+        return differs if operator == "!=" else f"(~{differs})"
+
+
+def flatten_name(name: str) -> str:
+    """Return the member of a name: its group and itself."""
+    return name.replace(".", "_").replace(" ", "_")
+
+
+def simd_batch_context(program: Program, row_slots: list[tuple[int, str]]) -> dict[str, Any] | None:
+    """Return what the template of steps side by side reads; None where a step is not arithmetic.
+
+    `row_slots` are the slots of a row with the variables that they show.
+    """
+    try:
+        return _BatchBuilder(program, row_slots).context()
+    except (NotVectorisable, KeyError):
+        return None
+
+
+class _BatchBuilder:
+    """Steps side by side of one Program."""
+
+    def __init__(self, program: Program, row_slots: list[tuple[int, str]]) -> None:
+        if (
+            program.number_type != "float64"
+            or program.invariants
+            or len(program.mode_variables()) != 1
+        ):
+            raise NotVectorisable
+        if "record" in program.blocks or program.blocks["load"]:
+            raise NotVectorisable
+        if not all(
+            one.name.startswith(("state.", "discrete.")) for one in range_event_variables(program)
+        ):
+            raise NotVectorisable
+        self.program, self.row_slots = program, row_slots
+        variables = {one.name: one.type for one in program.variables}
+        constants = {one.name: one.type for one in program.constants if not one.items}
+        kinds: dict[str, LaneKind] = {
+            name: "real" if kind == "real" else "truth"
+            for name, kind in {**variables, **constants}.items()
+            if kind in ("real", "truth")
+        }
+        groups = ("constant", "solved")
+        fixed = frozenset(name for name in kinds if name.partition(".")[0] in groups)
+        self.emitter = VectorEmitter(program, kinds, fixed)
+
+    def context(self) -> dict[str, Any]:
+        self._require_full_step()
+        modes = [self._mode_context(number, block) for number, block in self._mode_blocks("flow")]
+        equations = dict(self._mode_blocks("equations"))
+        for mode in modes:
+            name = mode["equations"] = equations[mode["number"]]
+            self.emitter.emit_block(name, self.program.blocks[name])
+        looks = [(k, self._row_value(name)) for k, name in self.row_slots]
+        accessed = {**self.emitter.accessed, "work.h": "real", "memory.time": "real"}
+        if not all(
+            name.startswith(("work.", "equation.", *PAGE_PREFIXES, *READ_PREFIXES))
+            for name in accessed
+        ):
+            raise NotVectorisable
+        return {
+            "lanes": LANES,
+            "members": [(flatten_name(name), kind) for name, kind in accessed.items()],
+            "page": self._select_members(accessed, PAGE_PREFIXES),
+            "read": self._select_members(accessed, READ_PREFIXES),
+            "written": self._select_members(accessed, WRITTEN_PREFIXES),
+            "states": [flatten_name(name) for name in accessed if name.startswith("state.")],
+            "blocks": [(name, lines) for name, lines in self.emitter.blocks.items()],
+            "called": [
+                (name, count, LIBM_FUNCTIONS.get(name, f"ha_{name}"))
+                for name, count in self.emitter.called_functions.items()
+            ],
+            "modes": modes,
+            "looks": looks,
+        }
+
+    def _select_members(
+        self, accessed: Mapping[str, LaneKind], groups: tuple[str, ...]
+    ) -> list[tuple[str, LaneKind, str]]:
+        """Return the members of some groups, with what they are and their places in an instance."""
+        c_names = CNames(self.program)
+        return [
+            (flatten_name(name), kind, c_names(name).replace("->", "."))
+            for name, kind in accessed.items()
+            if name.startswith(groups)
+        ]
+
+    def _require_full_step(self) -> None:
+        """A step goes to its end: no wait ends inside it, and nothing counts its time."""
+        values = {
+            op.target: op.value for op in self.program.blocks["limit"] if isinstance(op, Assign)
+        }
+        if (
+            any(values.get(name) != value for name, value in FULL_STEP_LIMIT.items())
+            or len(values) != 3
+        ):
+            raise NotVectorisable
+
+    def _mode_blocks(self, name: str) -> Iterator[tuple[int, str]]:
+        (chosen,) = self.program.blocks[name]
+        if not isinstance(chosen, Switch) or chosen.selector != MODE_VARIABLE:
+            raise NotVectorisable
+        for number, (run,) in chosen.cases:
+            if not isinstance(run, RunBlock):
+                raise NotVectorisable
+            yield number, run.block
+
+    def _mode_context(self, number: int, name: str) -> dict[str, Any]:
+        """Return a step of a mode up to where something may happen, and what it then commits."""
+        ops = self.program.blocks[name]
+        (place,) = [k for k, op in enumerate(ops) if isinstance(op, Branch)]
+        event_branch, rest = ops[place], ops[place + 1 :]
+        if not isinstance(event_branch, Branch) or event_branch.condition != Ref("work.crossed"):
+            raise NotVectorisable
+        self.emitter.emit_block(name, ops[:place])
+        commits = []
+        for op in rest:
+            if not (isinstance(op, Assign) and op.target.startswith("state.")):
+                raise NotVectorisable
+            commits.append((flatten_name(op.target), self.emitter.emit_expression(op.value)))
+        self.emitter.vector_member("work.crossed")
+        return {"number": number, "block": name, "commits": commits}
+
+    def _row_value(self, name: str) -> str:
+        """Return what is written to a row of a lane."""
+        if name == MODE_VARIABLE:
+            return "(double)all->mode[lane]"
+        member = self.emitter.vector_member(name)
+        return (
+            f"{member}[lane]"
+            if self.emitter.kind_of(Ref(name)) == "real"
+            else f"({member}[lane] != 0 ? 1.0 : 0.0)"
+        )

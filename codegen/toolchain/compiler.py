@@ -1,0 +1,134 @@
+"""Build: generated C compiled with the flags under which its bits are defined (rule C3)."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+from language.text.diagnostic import MissingToolError
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
+
+WARNINGS = [
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wfloat-conversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Wundef",
+    "-Wstrict-prototypes",
+    "-Wmissing-prototypes",
+    "-Wcast-qual",
+    "-Wswitch-default",
+    "-Wswitch-enum",
+    "-Wvla",
+]
+
+TIMEOUT = 120
+"""Longest compilation or run before it is given up."""
+
+
+class BuildError(Exception):
+    """Generated code does not compile or run: a defect of ours; the message is the compiler's."""
+
+
+def find_compiler(name: str | None = None) -> list[str]:
+    """Return the C compiler: the one named, else `CC`, else cc, gcc, clang. Raises ToolMissing."""
+    requested = shlex.split(name or os.environ.get("CC", ""))
+    for candidate in [requested] if requested else [["cc"], ["gcc"], ["clang"]]:
+        if shutil.which(candidate[0]):
+            return candidate
+    executable = requested[0] if requested else "cc"
+    raise MissingToolError(
+        f"the C compiler `{executable}` is missing: apt-get install gcc libc6-dev"
+    )
+
+
+def flags_at_level(level: str) -> tuple[str, ...]:
+    """Return the flags with another level of optimisation, like `O3`."""
+    return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
+
+
+def compiler_version(name: str | None = None) -> str:
+    """Return where the compiler is and the first line that it says of itself. Raises BuildError."""
+    command = find_compiler(name)
+    try:
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, timeout=TIMEOUT, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise BuildError(f"the C compiler `{command[0]}` does not run: {error}") from None
+    first = (done.stdout or done.stderr).strip().split("\n")[0]
+    return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
+
+
+def compile_program(
+    sources: Sequence[Path],
+    target: Path,
+    flags: Sequence[str] = FLAGS,
+    compiler_name: str | None = None,
+) -> None:
+    """Compile sources into an executable. Raises ToolMissing, BuildError."""
+    run_compiler(
+        [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
+    )
+
+
+def run_compiler(command: Sequence[str], target: Path) -> None:
+    """Let a compiler make an executable. Raises BuildError with its first error."""
+    try:
+        done = subprocess.run(
+            [*command, "-o", str(target)], capture_output=True, text=True, timeout=TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiler was not done after {TIMEOUT} s") from None
+    if done.returncode != 0:
+        raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
+
+
+def run_executable(
+    target: Path, records: bytes, extra_environment: Mapping[str, str] | None = None
+) -> bytes:
+    """Run a harness on input records, with `extra_environment` in its environment, and return its output
+    records. Raises BuildError.
+    """
+    environment = {**os.environ, **(extra_environment or {})}
+    try:
+        done = subprocess.run(
+            [str(target)], input=records, capture_output=True, env=environment, timeout=TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiled program was not done after {TIMEOUT} s") from None
+    if done.returncode != 0:
+        raise BuildError(f"the compiled program ended with {done.returncode}")
+    return done.stdout
+
+
+def _first_error(text: str) -> str:
+    """Return what a compiler said, from its first error on."""
+    lines = text.strip().splitlines()
+    first = next((k for k, line in enumerate(lines) if "error:" in line), 0)
+    return "\n".join(lines[first:])
+
+
+def has_gcc_vectors() -> bool:
+    """Tell whether the compiler is a GCC for x86-64: tracks use its vectors. Raises ToolMissing."""
+    return _has_gcc_vectors(tuple(find_compiler()))
+
+
+@cache
+def _has_gcc_vectors(command: tuple[str, ...]) -> bool:
+    query = [*command, "-dM", "-E", "-x", "c", "-"]
+    try:
+        result = subprocess.run(query, input="", capture_output=True, text=True, timeout=TIMEOUT)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    macros = {line.split()[1] for line in result.stdout.splitlines() if line.startswith("#define ")}
+    return {"__GNUC__", "__x86_64__"} <= macros and "__clang__" not in macros

@@ -1,0 +1,73 @@
+"""Tool: programs of others that generated C is compiled, run and checked with; how to get them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from codegen.toolchain.compiler import BuildError
+from language.text.diagnostic import MissingToolError
+
+ARM_COMPILER = "arm-none-eabi-gcc"
+ARM_SIZE = "arm-none-eabi-size"
+ARM_OBJECTS = "arm-none-eabi-objdump"
+ARM_LINES = "arm-none-eabi-addr2line"
+EMULATOR = "qemu-system-arm"
+TOOL_TIMEOUT = 900
+"""Longest run of a tool before it is given up."""
+DEBIAN_PACKAGES: Mapping[str, str] = {
+    "gcc": "gcc libc6-dev",
+    "clang-19": "clang-19 libclang-rt-19-dev",
+    ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    **dict.fromkeys((ARM_SIZE, ARM_OBJECTS, ARM_LINES), "binutils-arm-none-eabi"),
+    EMULATOR: "qemu-system-arm",
+    "llvm-profdata-19": "llvm-19",
+    "llvm-cov-19": "llvm-19",
+    "cppcheck": "cppcheck",
+    "frama-c": "frama-c-base",
+    "why3": "why3",
+    "z3": "z3",
+}
+"""Their Debian packages."""
+
+
+def require_tool(tool: str) -> str:
+    """Return the name of a tool that is installed. Raises ToolMissing."""
+    if shutil.which(tool) is None:
+        package = DEBIAN_PACKAGES.get(tool, tool)
+        raise MissingToolError(f"`{tool}` is missing: apt-get install {package}")
+    return tool
+
+
+def run_tool(
+    command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a tool in a folder, with `extra_environment` in its environment. Raises ToolMissing, BuildError."""
+    tool, *words = command
+    try:
+        return subprocess.run(
+            [require_tool(tool), *words],
+            cwd=folder,
+            env={**os.environ, "PWD": str(folder), **(extra_environment or {})},
+            capture_output=True,
+            text=True,
+            timeout=TOOL_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"{tool} was not done after {TOOL_TIMEOUT} s") from None
+
+
+def output_of(
+    command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
+) -> str:
+    """Return what a tool prints, with `extra_environment` in its environment. Raises ToolMissing; BuildError
+    with what it said.
+    """
+    done = run_tool(command, folder, extra_environment)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
+    return done.stdout

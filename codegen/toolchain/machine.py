@@ -1,0 +1,85 @@
+"""Machine: where generated C is compiled for, and how what was compiled is run there."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from codegen.toolchain.compiler import TIMEOUT, BuildError, find_compiler, run_executable
+from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR, require_tool
+
+CORTEX_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+CORTEX_LINK_FLAGS = (
+    "-nostartfiles",
+    "-Wl,--gc-sections",
+    "--specs=nano.specs",
+    "--specs=nosys.specs",
+)
+BOARD, LINKER_SCRIPT = "mps2-an386", "mps2_an386.ld"
+HARNESS_EXIT_CODES = {
+    3: "a file of records cannot be opened",
+    4: "records cannot be written",
+    6: "FPSCR is not 0",
+}
+"""What exit codes of the harness of a target mean."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """`files` are those of the harness that it needs; `command` and `link` are words of a compiler:
+    for the one that is named, and with the files in a folder. `run` is given records of inputs.
+    """
+
+    name: str
+    files: tuple[str, ...]
+    command: Callable[[str | None], list[str]]
+    link: Callable[[Path], tuple[str, ...]]
+    run: Callable[[Path, bytes], bytes]
+
+
+def harness_file(name: str) -> Path:
+    """Return the path of a file of the harness."""
+    return Path(str(resources.files("codegen"))) / "targets" / name
+
+
+def _find_cross_compiler(name: str | None) -> list[str]:
+    return [name or require_tool(ARM_COMPILER), *CORTEX_FLAGS]
+
+
+def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
+    """Run a program of a Cortex-M4F in QEMU on records. Raises ToolMissing, BuildError."""
+    emulator = require_tool(EMULATOR)
+    semihosting = ("-semihosting-config", "enable=on,target=native")
+    headless = ("-nographic", "-monitor", "none", "-serial", "none")
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        (folder / "records.in").write_bytes(records)
+        command = [emulator, "-M", BOARD, *headless, *semihosting, *options, "-kernel", str(target)]
+        try:
+            done = subprocess.run(
+                command, cwd=folder, capture_output=True, timeout=TIMEOUT, stdin=subprocess.DEVNULL
+            )
+        except subprocess.TimeoutExpired:
+            raise BuildError(f"the emulated program was not done after {TIMEOUT} s") from None
+        if done.returncode != 0:
+            reason = (
+                HARNESS_EXIT_CODES.get(done.returncode)
+                or done.stderr.decode(errors="replace").strip()
+            )
+            raise BuildError(f"the emulated program ended with {done.returncode}: {reason}")
+        return (folder / "records.out").read_bytes()
+
+
+HOST = Machine("host", ("stdio.c",), find_compiler, lambda folder: ("-lm",), run_executable)
+CORTEX_M4F = Machine(
+    "cortex-m4f",
+    ("semihosting.c", "cortex_m4f.c", LINKER_SCRIPT),
+    _find_cross_compiler,
+    lambda folder: (*CORTEX_LINK_FLAGS, "-T", str(folder / LINKER_SCRIPT), "-lm", "-lc", "-lgcc"),
+    run_in_qemu,
+)
+MACHINES = {machine.name: machine for machine in (HOST, CORTEX_M4F)}
