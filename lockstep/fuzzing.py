@@ -12,7 +12,8 @@ from codegen.harness.harness import tick_inputs
 from engine.interpreter.interpreter import Interpreter
 from engine.simulation.simulate import CONVERTER_OF_TYPE
 from language.ir.program import Program
-from lockstep.compare import Difference, TickLog, compare
+from lockstep.comparison import Difference, compare
+from lockstep.tick_log import TickLog
 
 RUNS, TICKS, SEED = 20_000, 24, 1
 MAX_COMPARED = 20

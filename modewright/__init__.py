@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from engine.results.run_comparison import RunDifference
     from engine.results.trajectory import Event, Trajectory
     from language.text.diagnostic import Problem, SpecError, render_all
-    from lockstep.compare import Verdict
+    from lockstep.comparison import Verdict
     from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
     from modewright.calibrations import (
         CalibrationPage,
@@ -109,7 +109,7 @@ PLACES = {
     "RunDifference": "engine.results.run_comparison",
     "SpecError": "language.text.diagnostic",
     "Trajectory": "engine.results.trajectory",
-    "Verdict": "lockstep.compare",
+    "Verdict": "lockstep.comparison",
     "a2l": "modewright.code",
     "dbc": "modewright.code",
     "fmu": "modewright.code",

@@ -32,9 +32,9 @@ from language.overlays.expand_document import (
 )
 from language.text.diagnostic import Problems, SpecError
 from language.text.document import require_kind
-from lockstep.compare import TickLog, Verdict, add_instruction_counts, compare
-from lockstep.coverage import add_notes
-from lockstep.taping import record_ticks
+from lockstep.comparison import Verdict, add_instruction_counts, compare
+from lockstep.comparison_notes import add_notes
+from lockstep.tick_log import TickLog, record_ticks
 from modewright.compiled import run_simulation as run_compiled
 from modewright.documents import Values, load_calibrated_document, parse_values
 

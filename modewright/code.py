@@ -28,9 +28,9 @@ from language.lowering.range_saturation import require_ranges
 from language.model.automaton import Automaton
 from language.model.declaration import Input, State
 from language.overlays.expand_document import Project
-from lockstep.compare import MAX_COUNTED_STEPS, TickLog
+from lockstep.comparison import MAX_COUNTED_STEPS
 from lockstep.fuzzing import RUNS, SEED, TICKS, FuzzReport, fuzz as fuzzed
-from lockstep.taping import record_ticks
+from lockstep.tick_log import TickLog, record_ticks
 from modewright.api import load
 from modewright.documents import Values, load_calibrated_document, parse_values
 from modewright.tests import find_tests, load_tests

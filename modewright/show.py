@@ -13,7 +13,7 @@ from rich.table import Table
 
 from engine.results.run_comparison import ModeSequence, RunDifference
 from engine.results.trajectory import Event, Trajectory
-from lockstep.compare import Verdict
+from lockstep.comparison import Verdict
 from modewright.api import Replayed
 from modewright.doctor import HealthCheck
 

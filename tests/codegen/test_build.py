@@ -12,7 +12,7 @@ from codegen.harness.harness import build_executable, compared_variables, tick_i
 from codegen.toolchain import compiler as build
 from codegen.toolchain.compiler import BuildError, compile_program, find_compiler, run_executable
 from language.text.diagnostic import MissingToolError
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.lockstep.heater import heater, heater_tape
 
 FAILING = """\

@@ -14,7 +14,7 @@ from codegen.harness.harness import build_executable
 from codegen.toolchain import build_cache as cache
 from codegen.toolchain.compiler import FLAGS, find_compiler, run_compiler, run_executable
 from codegen.toolchain.object_cache import object_of
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.lockstep.heater import heater, heater_tape
 
 PARTS = ["ha_math.c", "stdio.c"]

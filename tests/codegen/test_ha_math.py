@@ -9,7 +9,8 @@ import pytest
 
 from language.numerics.evaluate import ELEMENTARY, Scalar, apply_function
 from language.numerics.function_table import FUNCTIONS
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import program
 from tests.lockstep.programs import Tick, record_ticks
 

@@ -15,7 +15,8 @@ from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import Branch
 from language.ir.program import Program
 from language.ir.traversal import block_reads, names_used, walk_ops
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import program as shipped
 from tests.language.making import program
 from tests.lockstep.heater import column

@@ -16,7 +16,7 @@ from fmpy.fmi3 import FMU3Slave
 from codegen.exchange.fmi.variable import Version
 from codegen.harness.harness import tick_inputs, tunable_constants
 from language.ir.program import Program, unqualified_name
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 
 Values = Mapping[str, float]
 """Truths are 0 and 1; what is read back is float, int or bool."""

@@ -17,7 +17,7 @@ from codegen.exchange.fmi.variable import Version
 from engine.interpreter.apply_calibration import calibrate
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from modewright.api import program
 from tests.codegen.waiting import waiting_automaton
 from tests.fmi.conftest import Ready

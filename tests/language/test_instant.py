@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from engine.interpreter.interpreter import Interpreter
 from language.observers.input_change import change_moments
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.language.test_recursive import STATES, A, Matrix, covariance, make_program, step, ticks
 from tests.lockstep.programs import record_ticks
 

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.language.making import program
 from tests.lockstep.programs import record_ticks
 

@@ -11,7 +11,7 @@ from filterpy.common import van_loan_discretization
 from engine.interpreter.interpreter import Interpreter
 from language.ir.ops import Block, Branch, Compare, Loop, Ref, RunBlock, Value
 from language.ir.traversal import walk_ops
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from modewright.api import program as shipped_program
 from tests.language.making import problem_lines, program, project_of
 from tests.language.test_recursive import CONSTANT, SPEC, make_program

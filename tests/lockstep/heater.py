@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from language.ir.program import Program
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from modewright.api import program
 from tests.lockstep.programs import Tick, record_ticks
 

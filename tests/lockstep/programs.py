@@ -34,7 +34,7 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Program
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from tests.lockstep.assembly import (
     CONDITIONS,
     EQUATIONS,

@@ -13,7 +13,8 @@ from codegen.emit.c_module import emit_c_files
 from codegen.toolchain.machine import HOST
 from language.ir.program import Program
 from language.numerics.evaluate import apply_function
-from lockstep.compare import Difference, TickLog, compare
+from lockstep.comparison import Difference, compare
+from lockstep.tick_log import TickLog
 from tests.lockstep.heater import PERIOD, column, heater_tape, temperature
 
 Change = Callable[[str, str], None]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from language.ir.program import Program
-from lockstep.compare import Verdict, compare
+from lockstep.comparison import Verdict, compare
 from modewright.api import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick, record_ticks

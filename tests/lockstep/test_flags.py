@@ -24,8 +24,9 @@ from codegen.toolchain.compiler import (
 )
 from language.ir.number_type import NUMBER_TYPES, NumberType, shortest_decimal
 from language.loading.system_reader import with_number_type
-from lockstep import taping
-from lockstep.compare import TickLog, compare
+from lockstep import tick_log as taping
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import load, program
 from tests.lockstep.programs import record_ticks
 

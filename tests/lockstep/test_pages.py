@@ -14,8 +14,8 @@ from language.ir.program import Program
 from language.loading.calibration_page_reader import parse_pages
 from language.loading.system_reader import with_number_type
 from language.text.diagnostic import SpecError
-from lockstep.compare import TickLog, compare
-from lockstep.taping import record_ticks
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog, record_ticks
 from modewright.api import load, lockstep
 from tests.lockstep.heater import column
 

@@ -13,7 +13,7 @@ from language.ir.program import Program
 from language.ir.traversal import names_used, walk_ops
 from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY
 from language.numerics.function_table import FUNCTIONS
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.lockstep.programs import Tick, programs, record_ticks, ticks
 
 SHARE = 2

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from hypothesis import HealthCheck, given, note, settings, strategies as st
 
 from language.ir.number_type import NUMBER_TYPES, NumberType
-from lockstep.compare import compare
+from lockstep.comparison import compare
 from tests.lockstep.chance.batch import FLAGS
 from tests.lockstep.chance.healthy import ReferenceRun
 from tests.lockstep.chance.kinds import random_spec

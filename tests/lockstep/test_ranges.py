@@ -9,7 +9,8 @@ import pytest
 
 from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType, round_to_type
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick

@@ -13,7 +13,7 @@ from language.ir.number_type import NUMBER_TYPES
 from language.ir.program import Program
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from tests.language.making import ROOT
 from tests.lockstep.chance.batch import Batch
 from tests.lockstep.programs import Tick

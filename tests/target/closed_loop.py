@@ -10,8 +10,7 @@ from pathlib import Path
 
 from language.ir.number_type import NumberType
 from language.loading.system_reader import with_number_type
-from lockstep.compare import TickLog
-from lockstep.taping import record_ticks
+from lockstep.tick_log import TickLog, record_ticks
 from modewright.api import load
 
 TICK = Fraction(1, 100)

@@ -12,7 +12,8 @@ from codegen.toolchain.compiler import FLAGS, BuildError, flags_at_level
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
 from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.number_type import NUMBER_TYPES, NumberType
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import lockstep, program
 from tests.lockstep.programs import record_ticks
 from tests.lockstep.test_flags import PRODUCT, TINY

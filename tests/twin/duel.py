@@ -14,7 +14,7 @@ from codegen.harness.harness import LOCKSTEP, tick_inputs, write_harness
 from codegen.harness.instruction_count import ICOUNT_OPTIONS, MAIN
 from codegen.toolchain.compiler import FLAGS, WARNINGS, run_compiler
 from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine, run_in_qemu
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 
 HERE = Path(__file__).parent
 RUN: dict[str, Callable[[Path, bytes], bytes]] = {

@@ -12,7 +12,7 @@ import pytest
 
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
 from codegen.toolchain.machine import CORTEX_M4F, HOST, MACHINES
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from tests.target.closed_loop import record_driveline
 from tests.twin.duel import HERE, duel
 

@@ -26,7 +26,8 @@ from language.loading.load import program_of
 from language.loading.stimulus_reader import constant_pieces
 from language.loading.system_reader import single_instance_system, with_number_type
 from language.model.system import Stimulus
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from modewright.api import Loaded, load
 from tests.verify.store import ROOT, write_json
 

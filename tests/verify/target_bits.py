@@ -14,7 +14,8 @@ from functools import partial
 from codegen.toolchain.compiler import flags_at_level
 from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine
 from language.ir.number_type import NUMBER_TYPES, NumberType
-from lockstep.compare import TickLog, compare
+from lockstep.comparison import compare
+from lockstep.tick_log import TickLog
 from tests.target.closed_loop import record_driveline, record_supervisor
 from tests.verify.store import ROOT, Figure, measure_figures
 

@@ -12,7 +12,8 @@ from codegen.harness.harness import write_harness
 from codegen.toolchain.compiler import compiler_version, find_compiler, flags_at_level
 from codegen.toolchain.object_cache import is_shared, object_of
 from language.ir.program import Program
-from lockstep.compare import TickLog, Verdict, compare_output
+from lockstep.comparison import Verdict, compare_output
+from lockstep.tick_log import TickLog
 
 FLAGS = (*flags_at_level("O1"), "-w")
 QUICK = (*flags_at_level("O0"), "-w")

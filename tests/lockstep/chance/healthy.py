@@ -10,7 +10,8 @@ import pytest
 from engine.interpreter.block_compiler import BlockCompiler
 from language.ir.number_type import NUMBER_TYPES
 from language.ir.program import Program
-from lockstep.compare import TickLog, Verdict, compare_output
+from lockstep.comparison import Verdict, compare_output
+from lockstep.tick_log import TickLog
 from tests.lockstep.chance.batch import QUICK, Batch
 from tests.lockstep.chance.kinds import spec_of
 from tests.lockstep.chance.mutant import Mutant

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from tests.lockstep.chance.hits import BROKEN, INPUTS, LAST, RULES, Hits
 from tests.lockstep.chance.operations import KINDS, count_executed
 from tests.lockstep.chance.probe import instrument_program

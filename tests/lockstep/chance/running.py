@@ -10,7 +10,7 @@ from engine.execution.event_loop import ContinuousRun, SimulationStopped
 from engine.interpreter.interpreter import Interpreter
 from engine.results.trajectory import Event
 from language.ir.program import Program
-from lockstep.compare import TickLog
+from lockstep.tick_log import TickLog
 from tests.lockstep.chance.spec import Spec
 from tests.lockstep.chance.stimulus import Tick, ticks
 

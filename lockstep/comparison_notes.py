@@ -10,7 +10,7 @@ from engine.simulation.instance_programs import programs_of
 from engine.simulation.stimuli import resolve_recording
 from language.ir.program import Program
 from language.model.system import Scenario, System
-from lockstep.compare import Verdict, skipped_verdict
+from lockstep.comparison import Verdict, skipped_verdict
 
 
 def add_notes(
