@@ -21,7 +21,7 @@ from language.overlays.expand_document import Project, add_calibrations, expand_
 from language.programs.solved_numbers_report import format_method_lines
 from language.text.diagnostic import Problem, Problems, SpecError, sort_problems
 from language.text.document import Document, ScalarNode
-from sweep.study_reader import read_study
+from sweep.definition.study_reader import read_study
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import pyarrow.parquet
 
 import modewright.cluster_worker
 import modewright.compiled
-from sweep import cluster_worker  # noqa: F401
+from sweep.execution import dask_worker as cluster_worker  # noqa: F401
 
 modewright.cluster_worker.own_fingerprint()
 pyarrow.array([0])  # which loads pandas where that is installed

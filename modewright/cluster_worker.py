@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sweep.cluster_worker import Answer
+    from sweep.execution.dask_worker import Answer
 
 
 def compute_block(
@@ -18,15 +18,15 @@ def compute_block(
 ) -> Answer:
     """Return the answer of this worker about the variants from `start` to before `stop`."""
     from modewright.compiled import run_block
-    from sweep.block import Block
-    from sweep.cluster_worker import answer_block
+    from sweep.execution.dask_worker import answer_block
+    from sweep.store.row import Block
 
     return answer_block(expected_fingerprint, serialised_study, Block(start, stop), run_block)
 
 
 def own_fingerprint() -> Mapping[str, str]:
     """Return the fingerprint of this worker."""
-    from sweep.fingerprint import fingerprint
+    from sweep.execution.fingerprint import fingerprint
 
     return fingerprint()
 

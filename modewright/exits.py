@@ -16,7 +16,7 @@ import typer
 from language.text.diagnostic import MissingToolError, SpecError, render_all, sort_problems
 from language.text.sanitise import escape_invisible, truncate
 from modewright.files import OutputError
-from sweep.cluster_error import ClusterError
+from sweep.execution.dask_error import ClusterError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
 MAX_SHOWN = 100

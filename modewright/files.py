@@ -11,7 +11,7 @@ from pathlib import Path
 DEFAULT_FILE_MODE = 0o644
 SPEC_SUFFIXES = (".yaml", ".yml")
 RESULT_NAMES = ("study.json", "blocks")
-"""What the results of a study are in their folder: sweep/store.py."""
+"""What the results of a study are in their folder: sweep/store/store.py."""
 STUDY_FOLDER_NAMES = (*RESULT_NAMES, "plots", ".lock")
 """What a run of a study writes into that folder."""
 

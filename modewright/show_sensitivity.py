@@ -13,7 +13,7 @@ from rich.table import Table
 from language.text.sanitise import escape_invisible
 from modewright.show import null_nonfinite
 from modewright.show_study import format_number, interval_text, progress_text
-from sweep.sensitivity import MIN_COMPLETE, Index, Sensitivity
+from sweep.analysis.sensitivity import MIN_COMPLETE, Index, Sensitivity
 
 DESIGN_UNITS = {"saltelli": "blocks", "morris": "paths"}
 

@@ -14,7 +14,7 @@ from rich.table import Table
 from language.expressions.units import display_unit
 from language.text.sanitise import escape_invisible
 from modewright.show import null_nonfinite
-from sweep.summary import Rate, Summary, SummaryLine
+from sweep.analysis.summary import Rate, Summary, SummaryLine
 
 MAX_FAILURES = 5
 """Reasons that are told; `--json` and the store have all."""

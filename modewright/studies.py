@@ -16,22 +16,22 @@ from language.text.diagnostic import MissingToolError, Problems, render_problem,
 from language.text.document import ScalarNode
 from modewright.compiled import run_block
 from modewright.files import OutputError
-from sweep import fork_server
-from sweep.address import Address, Credentials, parse_address
-from sweep.executor import Executor, SerialExecutor
-from sweep.override import require_overridable
-from sweep.preparation import prepare_study, resample_study
-from sweep.processes import ProcessExecutor
-from sweep.sampling_reader import find_imbalance
-from sweep.store import read_store
-from sweep.study import Study
-from sweep.study_reader import read_study
-from sweep.study_run import Progress, StudyRun, Warn, run_study
-from sweep.summary import Summary, summary_of
+from sweep.analysis.summary import Summary, summary_of
+from sweep.definition.override_check import require_overridable
+from sweep.definition.sampling_reader import find_imbalance
+from sweep.definition.study import Study
+from sweep.definition.study_reader import read_study
+from sweep.execution import fork_server
+from sweep.execution.dask_address import Address, Credentials, parse_address
+from sweep.execution.executor import Executor, SerialExecutor
+from sweep.execution.prepare_study import prepare_study, resample_study
+from sweep.execution.processes import ProcessExecutor
+from sweep.execution.study_run import Progress, StudyRun, Warn, run_study
+from sweep.store.store import read_store
 
 if TYPE_CHECKING:
     from engine.results.plot import Picture
-    from sweep.sensitivity import Sensitivity
+    from sweep.analysis.sensitivity import Sensitivity
 
 WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.worker")
 """What starts a process that computes blocks."""
@@ -119,8 +119,8 @@ def _override_sampling(study: Study, samples: int | None, seed: int | None, warn
 def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Executor]:
     """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
     try:
-        from sweep.cluster import DaskExecutor
-        from sweep.clustering import WorkerSetup, open_client
+        from sweep.execution.dask_client import WorkerSetup, open_client
+        from sweep.execution.dask_executor import DaskExecutor
     except ImportError:
         advice = "pip install 'modewright[cluster]'"
         raise MissingToolError(f"a cluster needs the package `distributed`: {advice}") from None
@@ -138,14 +138,14 @@ def study_summary(out: str | Path) -> Summary:
 
 def study_pictures(out: str | Path) -> dict[str, Picture]:
     """Return the pictures that the study asks for, by name. Raises SpecError."""
-    from sweep.picture import draw_pictures
+    from sweep.analysis.plots import draw_pictures
 
     return draw_pictures(read_store(Path(out)))
 
 
 def sensitivity(out: str | Path) -> Sensitivity:
     """Return which of the things that a study draws move its measures. Raises SpecError."""
-    from sweep.sensitivity import sensitivity_of
+    from sweep.analysis.sensitivity import sensitivity_of
 
     return sensitivity_of(read_store(Path(out)))
 

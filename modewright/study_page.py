@@ -15,15 +15,15 @@ import numpy as np
 from language.expressions.units import display_unit
 from modewright.show_sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.show_study import failure_texts, format_number, interval_text
-from sweep.block import DONE
-from sweep.manifest import Design, Manifest
-from sweep.measure import StoreColumn
-from sweep.picture import draw_pictures
-from sweep.rows_file import import_arrow
-from sweep.sensitivity import sensitivity_of
-from sweep.store import Store
-from sweep.summary import Summary, format_value, summary_of
-from sweep.table import StudyTable
+from sweep.analysis.plots import draw_pictures
+from sweep.analysis.sensitivity import sensitivity_of
+from sweep.analysis.summary import Summary, format_value, summary_of
+from sweep.definition.measure import StoreColumn
+from sweep.store.block_file import import_arrow
+from sweep.store.manifest import Design, Manifest
+from sweep.store.row import DONE
+from sweep.store.store import Store
+from sweep.store.table import StudyTable
 
 MAX_EXTREMES, MAX_FAILED, MAX_INDICES = 5, 100, 300
 """Rows of each table that grows with the study."""

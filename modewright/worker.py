@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from modewright.compiled import run_block
-from sweep.worker import serve_blocks
+from sweep.execution.worker import serve_blocks
 
 
 def main() -> None:

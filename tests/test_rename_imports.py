@@ -21,7 +21,7 @@ PACKAGES = Packages(
                 "engine.runs.cruise",
                 "spec",
             ),
-            *("sweep", "sweep.worker", "modewright", "modewright.sweep"),
+            *("sweep", "sweep.execution.worker", "modewright", "modewright.sweep"),
         }
     ),
 )
@@ -59,7 +59,7 @@ def rewritten(text: str) -> str:
             "import modewright._engine.frame as frame",
         ),
         (
-            "import os, engine, sweep.worker as worker",
+            "import os, engine, sweep.execution.worker as worker",
             "import os, modewright._engine as engine, modewright._sweep.worker as worker",
         ),
         ('files("spec") / "spec"', 'files("modewright._spec") / "spec"'),
@@ -100,7 +100,7 @@ def test_what_names_a_module_is_rewritten(before: str, after: str) -> None:
         "from engines import frame",
         "import numpy.engine",
         "engine = 1",
-        "sweep.worker = engine.interpreter.value_frame",
+        "sweep.execution.worker = engine.interpreter.value_frame",
         'root / "spec"',
         'NAMES = ("engine", "sweep")',
         'name == "spec"',

@@ -21,7 +21,7 @@ import pytest
 from build_wheel import layout_of
 from rename_imports import wheel_name
 
-from sweep.fingerprint import fingerprint
+from sweep.execution.fingerprint import fingerprint
 from tests.diagnosis.spinning import COMMAND, write_project
 
 ROOT = Path(__file__).parent.parent

@@ -13,10 +13,10 @@ from modewright.console import console, pluralise, progress_bar, report_written_
 from modewright.exits import PROBLEMS
 from modewright.files import OutputError, make_folder, require_separate_outputs, write_files
 from modewright.interruption import debounce_interrupts
-from sweep.cluster_error import ClusterError
+from sweep.execution.dask_error import ClusterError
 
 if TYPE_CHECKING:
-    from sweep.study_run import StudyRun
+    from sweep.execution.study_run import StudyRun
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
@@ -126,7 +126,7 @@ def _cluster_options(
     cluster: str | None, workers: int, files: tuple[Path | None, ...]
 ) -> dict[str, Any]:
     """Return where the study is computed; warn of a connection that others can read."""
-    from sweep.address import Credentials, parse_address
+    from sweep.execution.dask_address import Credentials, parse_address
 
     if cluster is None:
         if any(files):

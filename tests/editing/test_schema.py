@@ -25,7 +25,7 @@ from language.text.project_files import DOCUMENT_KINDS
 from modewright.editing.guide import places
 from modewright.editing.schema import json_schema, schema_text
 from modewright.editing.shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes
-from sweep.study_reader import read_study
+from sweep.definition.study_reader import read_study
 from tests.editing.corpus import ROOT, to_plain_data, valid_documents
 
 COMMITTED = ROOT / "spec" / "modewright.schema.json"

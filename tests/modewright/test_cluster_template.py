@@ -19,8 +19,8 @@ def main():
     environment = dict(os.environ)
     fork_server.start_fork_server(TEMPLATE_MODULE)
     assert environment == dict(os.environ), "its environment is not ours"
-    from sweep.address import Address, Credentials
-    from sweep.clustering import WorkerSetup, open_client
+    from sweep.execution.dask_address import Address, Credentials
+    from sweep.execution.dask_client import WorkerSetup, open_client
     staff = WorkerSetup(modewright.cluster_worker.own_fingerprint)
     with open_client(Address(count=2), Credentials(), staff) as client:
         told = client.run(lambda: (os.getppid(), "engine.batch.compiled_batch" in sys.modules))

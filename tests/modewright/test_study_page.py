@@ -14,11 +14,11 @@ from engine.batch.interpreted_batch import run_interpreted_batch
 from modewright import study_page
 from modewright.cli import app
 from modewright.exits import run_with_exit_code
-from sweep.block import Block
-from sweep.executor import BlockResult, SerialExecutor
-from sweep.store import read_store
-from sweep.study import Study
-from sweep.study_run import run_study
+from sweep.definition.study import Study
+from sweep.execution.executor import BlockResult, SerialExecutor
+from sweep.execution.study_run import run_study
+from sweep.store.row import Block
+from sweep.store.store import read_store
 from tests.sweep.laying import QUICK_EXECUTOR, make_study
 
 DESIGN = ("sampling: {random: 4, seed: 3}", "sampling: {morris: 6, seed: 3}")

@@ -14,9 +14,9 @@ from modewright import studies
 from modewright.cli import app
 from modewright.console import progress_bar
 from modewright.exits import run_with_exit_code
-from sweep import store as store_module
-from sweep.cluster_error import ClusterError
-from sweep.store import read_store
+from sweep.execution.dask_error import ClusterError
+from sweep.store import store as store_module
+from sweep.store.store import read_store
 from tests.sweep.laying import STUDIES, quick_results
 
 

@@ -13,8 +13,8 @@ from modewright.cli import app
 from modewright.commands.sweep import PLOTS
 from modewright.exits import run_with_exit_code
 from modewright.files import RESULT_NAMES, STUDY_FOLDER_NAMES, OutputError
-from sweep.manifest import MANIFEST_NAME, seal_of
-from sweep.store import BLOCKS_FOLDER, LOCK_NAME
+from sweep.store.manifest import MANIFEST_NAME, seal_of
+from sweep.store.store import BLOCKS_FOLDER, LOCK_NAME
 from tests.sweep.laying import STUDIES, quick_results
 
 

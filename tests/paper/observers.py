@@ -13,7 +13,7 @@ from pyarrow import Table
 from scipy.stats import chi2
 
 import modewright as mw
-from sweep.interval import Interval, interval_of_quantile, wilson_interval
+from sweep.analysis.confidence_interval import Interval, interval_of_quantile, wilson_interval
 from tests.verify.store import ROOT
 
 STUDY, CRUISE = "observers", "false_losses"

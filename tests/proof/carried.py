@@ -9,9 +9,9 @@ from typing import Any
 import pyarrow
 import pyarrow.parquet
 
-from sweep.block import Block, Row
-from sweep.measure import StoreColumn
-from sweep.store import Store
+from sweep.definition.measure import StoreColumn
+from sweep.store.row import Block, Row
+from sweep.store.store import Store
 
 SHARED = ("number", "variant", "scenario", "sample", "replicate", "seed", "status", "message")
 

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from modewright import cluster_worker
-from sweep.address import Credentials, parse_address
-from sweep.block import DONE, STOPPED, Block, Row
-from sweep.clustering import WorkerSetup, open_client
-from sweep.manifest import Manifest
-from sweep.measure import StoreColumn
-from sweep.preparation import digest_of
-from sweep.store import Store, lock_folder, open_store
-from sweep.study import Presentation
+from sweep.definition.measure import StoreColumn
+from sweep.definition.study import Presentation
+from sweep.execution.dask_address import Credentials, parse_address
+from sweep.execution.dask_client import WorkerSetup, open_client
+from sweep.store.digest import digest_of
+from sweep.store.manifest import Manifest
+from sweep.store.row import DONE, STOPPED, Block, Row
+from sweep.store.store import Store, lock_folder, open_store
 from tests.proof.answer import Answer
 from tests.proof.carried import export_results, import_results, rows_of
 from tests.proof.cases import Cases, Label, generate_cases

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from sweep.block import DONE, Block, Row
-from sweep.manifest import Manifest
-from sweep.measuring import Cell
-from sweep.store import Store, open_store
-from sweep.study import Presentation
+from sweep.definition.study import Presentation
+from sweep.measurement.evaluate_measures import Cell
+from sweep.store.manifest import Manifest
+from sweep.store.row import DONE, Block, Row
+from sweep.store.store import Store, open_store
 from tests.proof.carried import export_results, import_results, rows_of
 from tests.proof.kept import MEASURES, VARIED
 

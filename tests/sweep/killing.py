@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from engine.batch.batch import Batch, BatchResult
-from sweep.block import Block
-from sweep.cluster_worker import Answer, answer_block
-from sweep.fingerprint import fingerprint
+from sweep.execution.dask_worker import Answer, answer_block
+from sweep.execution.fingerprint import fingerprint
+from sweep.store.row import Block
 from tests.sweep.laying import quick_results
 
 

@@ -11,13 +11,13 @@ import numpy as np
 from engine.batch.batch import Batch, BatchResult, EventKind
 from language.overlays.expand_document import Project, parse_document, read_document
 from language.text.diagnostic import Problems, Source
-from sweep.block import Block
-from sweep.executor import BlockResult, SerialExecutor
-from sweep.preparation import prepare_study
-from sweep.rows_file import import_arrow
-from sweep.store import Store
-from sweep.study import Study
-from sweep.study_reader import read_study
+from sweep.definition.study import Study
+from sweep.definition.study_reader import read_study
+from sweep.execution.executor import BlockResult, SerialExecutor
+from sweep.execution.prepare_study import prepare_study
+from sweep.store.block_file import import_arrow
+from sweep.store.row import Block
+from sweep.store.store import Store
 
 STUDIES = Path(__file__).parent.parent / "data" / "studies"
 

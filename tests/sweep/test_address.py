@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sweep.address import Address, parse_address
+from sweep.execution.dask_address import Address, parse_address
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ import modewright as mw
 from engine.batch.batch import Batch, BatchResult
 from engine.batch.interpreted_batch import run_interpreted_batch
 from modewright.compiled import run_batch, run_block
-from sweep.block import Block, Row, compute_rows
-from sweep.structure import format_decimal
+from sweep.design.variant_system import format_decimal
+from sweep.execution.block import compute_rows
+from sweep.store.row import Block, Row
 from tests.sweep.laying import STUDIES, make_study
 
 

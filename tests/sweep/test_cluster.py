@@ -14,16 +14,16 @@ from pathlib import Path
 import pytest
 from distributed import Client, LocalCluster, Security
 
-from sweep import cluster, clustering
-from sweep.address import Address, Credentials, parse_address
-from sweep.block import Block
-from sweep.cluster import DaskExecutor
-from sweep.cluster_error import ClusterError
-from sweep.cluster_worker import Answer, answer_block, pack_study
-from sweep.clustering import DASHBOARD_ADDRESS, WorkerSetup, open_client
-from sweep.fingerprint import describe_differences, fingerprint
-from sweep.processes import WorkerError
-from sweep.study_run import run_study
+from sweep.execution import dask_client as clustering, dask_executor as cluster
+from sweep.execution.dask_address import Address, Credentials, parse_address
+from sweep.execution.dask_client import DASHBOARD_ADDRESS, WorkerSetup, open_client
+from sweep.execution.dask_error import ClusterError
+from sweep.execution.dask_executor import DaskExecutor
+from sweep.execution.dask_worker import Answer, answer_block, pack_study
+from sweep.execution.fingerprint import describe_differences, fingerprint
+from sweep.execution.processes import WorkerError
+from sweep.execution.study_run import run_study
+from sweep.store.row import Block
 from tests.sweep.killing import (
     answer_quickly,
     answer_with_defect,

@@ -13,11 +13,11 @@ from distributed import KilledWorker
 from distributed.scheduler import WorkerState
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from sweep.block import Block
-from sweep.cluster import BLOCKS_PER_THREAD, DaskExecutor
-from sweep.cluster_error import ClusterError
-from sweep.cluster_worker import Answer
-from sweep.study_run import run_study
+from sweep.execution.dask_error import ClusterError
+from sweep.execution.dask_executor import BLOCKS_PER_THREAD, DaskExecutor
+from sweep.execution.dask_worker import Answer
+from sweep.execution.study_run import run_study
+from sweep.store.row import Block
 from tests.sweep.killing import answer_quickly
 from tests.sweep.laying import QUICK_EXECUTOR, make_study, store_rows
 
@@ -94,7 +94,7 @@ class Turning(queue.SimpleQueue):  # type: ignore[type-arg]
 
 def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> DaskExecutor:
     kind = type("Turned", (Turning,), {"desk": desk})
-    monkeypatch.setattr("sweep.cluster.SimpleQueue", kind)
+    monkeypatch.setattr("sweep.execution.dask_executor.SimpleQueue", kind)
     return DaskExecutor(desk, answer_quickly)
 
 
@@ -140,7 +140,7 @@ def test_a_block_is_to_blame_only_where_it_is_alone(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_cluster_whose_workers_are_all_gone_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.cluster.POLL_INTERVAL", 0.0)
+    monkeypatch.setattr("sweep.execution.dask_executor.POLL_INTERVAL", 0.0)
     desk = Desk(lambda count: 0, threads=0)
     with pytest.raises(ClusterError, match="no worker any more for 0 s"):
         list(

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from sweep import clustering
-from sweep.address import Address, Credentials
-from sweep.cluster import DaskExecutor
-from sweep.cluster_error import ClusterError
-from sweep.clustering import WorkerSetup, open_client
-from sweep.study_run import run_study
+from sweep.execution import dask_client as clustering
+from sweep.execution.dask_address import Address, Credentials
+from sweep.execution.dask_client import WorkerSetup, open_client
+from sweep.execution.dask_error import ClusterError
+from sweep.execution.dask_executor import DaskExecutor
+from sweep.execution.study_run import run_study
 from tests.sweep.killing import answer_quickly, own_fingerprint
 from tests.sweep.laying import make_study
 

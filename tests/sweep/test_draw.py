@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 from scipy.stats import qmc
 
-from sweep.draw import draw_values, quantile
-from sweep.point import variants_of
-from sweep.study import Distribution
+from sweep.definition.study import Distribution
+from sweep.design.random_draws import draw_values, quantile
+from sweep.design.variant import variants_of
 from tests.sweep.laying import make_study
 
 SHARES = np.array([0.001, 0.25, 0.5, 0.75, 0.999])

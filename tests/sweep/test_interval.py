@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sweep.interval import (
+from sweep.analysis.confidence_interval import (
     effective_sample_size,
     interval_of_mean,
     interval_of_quantile,

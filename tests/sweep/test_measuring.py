@@ -13,15 +13,10 @@ import pytest
 from language.ir.regions import CHART
 from language.loading.event_names import ModeEntryEvent
 from language.text.diagnostic import Source, Span
-from sweep.measure import (
-    DelayMeasure,
-    EventMeasure,
-    MatchMeasure,
-    SignalMeasure,
-)
-from sweep.measuring import evaluate_measures
-from sweep.observation import ModeChange, Observation
-from sweep.waveform import frequency_by_crossings, frequency_by_spectrum
+from sweep.definition.measure import DelayMeasure, EventMeasure, MatchMeasure, SignalMeasure
+from sweep.measurement.evaluate_measures import evaluate_measures
+from sweep.measurement.observation import ModeChange, Observation
+from sweep.measurement.waveform import frequency_by_crossings, frequency_by_spectrum
 
 AT = Span(Source("test"), 1, 1)
 PLANT, SEEN = ("plant", CHART), ("est", CHART)

@@ -13,18 +13,18 @@ import pytest
 
 from engine.batch.batch import Batch, BatchResult
 from modewright.show_study import summary_json
-from sweep.executor import SerialExecutor
-from sweep.interval import interval_of_mean, interval_of_quantile
-from sweep.moments import (
+from sweep.analysis.confidence_interval import interval_of_mean, interval_of_quantile
+from sweep.analysis.plots import draw_pictures
+from sweep.analysis.summary import summary_of
+from sweep.execution.executor import SerialExecutor
+from sweep.execution.study_run import run_study
+from sweep.measurement.exact_moments import (
     deviation_of,
     mean_of,
     quantiles_of,
     root_mean_square,
     total_of,
 )
-from sweep.picture import draw_pictures
-from sweep.study_run import run_study
-from sweep.summary import summary_of
 from tests.sweep.laying import make_study, quick_results, store_rows
 from tests.sweep.test_measuring import make_observation, signal
 
@@ -107,7 +107,9 @@ def test_an_infinite_number_in_a_store_counts_as_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As stores of before hold it: the root mean square of a signal above 1e154."""
-    monkeypatch.setattr("sweep.measuring.evaluate_signal", lambda *given: math.inf)
+    monkeypatch.setattr(
+        "sweep.measurement.evaluate_measures.evaluate_signal", lambda *given: math.inf
+    )
     store = run_study(make_study("alone"), tmp_path, SerialExecutor(quick_results)).store
     assert [row["final"] for row in store_rows(store)] == [math.inf] * 5
     found = summary_of(store)

@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from sweep.study_run import run_study
+from sweep.execution.study_run import run_study
 from tests.sweep.laying import QUICK_EXECUTOR, make_study
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "studies.md"

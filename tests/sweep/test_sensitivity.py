@@ -10,20 +10,20 @@ import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
 from language.text.diagnostic import SpecError
-from sweep.design import STRIDE, morris_points
-from sweep.draw import draw_values
-from sweep.moments import scale_to_squarable
-from sweep.sensitivity import (
+from sweep.analysis.sensitivity import (
     Index,
     elementary_effects,
     morris_indices,
     sensitivity_of,
     sobol_indices,
 )
-from sweep.store import read_store
-from sweep.study import MORRIS_LEVELS, Study
-from sweep.study_run import run_study
-from sweep.table import Reals
+from sweep.definition.study import MORRIS_LEVELS, Study
+from sweep.design.random_draws import draw_values
+from sweep.design.sensitivity_design import STRIDE, morris_points
+from sweep.execution.study_run import run_study
+from sweep.measurement.exact_moments import scale_to_squarable
+from sweep.store.store import read_store
+from sweep.store.table import Reals
 from tests.sweep.laying import QUICK_EXECUTOR, ReversedExecutor, make_study, store_rows
 
 A, B = 7.0, 0.1

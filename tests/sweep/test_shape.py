@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from language.text.diagnostic import Problems, SpecError
-from sweep.shape import log_spaced
+from sweep.definition.distribution_check import log_spaced
 from tests.sweep.laying import make_study
 
 AXIS, DRAWN = "[0.1 1/s, 0.2 1/s, 0.4 1/s]", "{uniform: [0.5 m, 1.5 m]}"

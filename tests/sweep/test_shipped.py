@@ -8,12 +8,13 @@ import pytest
 
 from engine.batch.interpreted_batch import run_interpreted_batch
 from language.overlays.expand_document import Project, read_document
-from sweep.block import Block, compute_rows
-from sweep.case import variant_values_of
-from sweep.point import variants_of
-from sweep.preparation import prepare_study
-from sweep.study import Study, Target
-from sweep.study_reader import read_study
+from sweep.definition.study import Study, Target
+from sweep.definition.study_reader import read_study
+from sweep.design.variant import variants_of
+from sweep.design.variant_values import variant_values_of
+from sweep.execution.block import compute_rows
+from sweep.execution.prepare_study import prepare_study
+from sweep.store.row import Block
 
 ROOT = Path(__file__).parent.parent.parent
 

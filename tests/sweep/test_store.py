@@ -14,10 +14,10 @@ import pyarrow.parquet
 import pytest
 
 from language.text.diagnostic import SpecError
-from sweep.manifest import MANIFEST_NAME, seal_of
-from sweep.rows_file import fault_of
-from sweep.store import Store, read_store
-from sweep.study_run import run_study
+from sweep.execution.study_run import run_study
+from sweep.store.block_file import fault_of
+from sweep.store.manifest import MANIFEST_NAME, seal_of
+from sweep.store.store import Store, read_store
 from tests.sweep.laying import QUICK_EXECUTOR, make_study
 from tests.sweep.test_study_run import bytes_of
 

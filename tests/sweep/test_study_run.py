@@ -21,15 +21,15 @@ import pytest
 from engine.batch.batch import Batch, BatchResult
 from engine.batch.interpreted_batch import run_interpreted_batch
 from language.text.diagnostic import SpecError
-from sweep.block import Block, Row
-from sweep.executor import BlockResult, SerialExecutor
-from sweep.manifest import Manifest, manifest_of
-from sweep.measure import StoreColumn
-from sweep.processes import MAX_DEATHS, ProcessExecutor
-from sweep.store import Store, lock_folder, open_store, read_store
-from sweep.study import Presentation as Shown, Study
-from sweep.study_run import fill_store, run_study
-from sweep.summary import summary_of
+from sweep.analysis.summary import summary_of
+from sweep.definition.measure import StoreColumn
+from sweep.definition.study import Presentation as Shown, Study
+from sweep.execution.executor import BlockResult, SerialExecutor
+from sweep.execution.processes import MAX_DEATHS, ProcessExecutor
+from sweep.execution.study_run import fill_store, run_study
+from sweep.store.manifest import Manifest, manifest_of
+from sweep.store.row import Block, Row
+from sweep.store.store import Store, lock_folder, open_store, read_store
 from tests.sweep.laying import (
     QUICK_EXECUTOR,
     ReversedExecutor,
@@ -189,7 +189,7 @@ WORKER = """
 import os, sys
 import modewright
 from tests.sweep.laying import quick_results
-from sweep.worker import serve_blocks
+from sweep.execution.worker import serve_blocks
 
 def run(batch):
     mark = sys.argv[1]

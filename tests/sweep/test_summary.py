@@ -14,13 +14,18 @@ from matplotlib.patches import Rectangle
 
 from engine.batch.batch import Batch, BatchResult
 from modewright import show_study
-from sweep.bins import MAX_BINS, histogram_bin_edges
-from sweep.executor import SerialExecutor
-from sweep.interval import wilson_interval
-from sweep.picture import _assign_bins, draw_pictures, rank_correlation
-from sweep.store import Store
-from sweep.study_run import run_study
-from sweep.summary import Summary, summary_of
+from sweep.analysis.confidence_interval import wilson_interval
+from sweep.analysis.plots import (
+    MAX_BINS,
+    _assign_bins,
+    draw_pictures,
+    histogram_bin_edges,
+    rank_correlation,
+)
+from sweep.analysis.summary import Summary, summary_of
+from sweep.execution.executor import SerialExecutor
+from sweep.execution.study_run import run_study
+from sweep.store.store import Store
 from tests.sweep.laying import QUICK_EXECUTOR, make_study, quick_results, store_rows
 
 

@@ -9,12 +9,12 @@ import pytest
 
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import SpecError
-from sweep.measure import SignalMeasure
-from sweep.picture import draw_pictures
-from sweep.study import Axis, Distribution
-from sweep.study_reader import read_study
-from sweep.study_run import run_study
-from sweep.summary import summary_of
+from sweep.analysis.plots import draw_pictures
+from sweep.analysis.summary import summary_of
+from sweep.definition.measure import SignalMeasure
+from sweep.definition.study import Axis, Distribution
+from sweep.definition.study_reader import read_study
+from sweep.execution.study_run import run_study
 from tests.sweep.laying import QUICK_EXECUTOR, STUDIES, make_study
 
 POINT = "a temperature in degC is a point, not a difference"

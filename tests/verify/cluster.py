@@ -116,10 +116,10 @@ def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
     import modewright as mw
     from modewright import cluster_worker
     from modewright.studies import TEMPLATE_MODULE
-    from sweep import fork_server
-    from sweep.address import Address, Credentials
-    from sweep.cluster import DaskExecutor
-    from sweep.clustering import WorkerSetup, open_client
+    from sweep.execution import fork_server
+    from sweep.execution.dask_address import Address, Credentials
+    from sweep.execution.dask_client import WorkerSetup, open_client
+    from sweep.execution.dask_executor import DaskExecutor
 
     if kind == "warm":  # what is compiled is compiled, what is read is read
         mw.sweep(study, out, root=ROOT, samples=2000, workers=WORKERS)
@@ -157,11 +157,11 @@ def a_million_variants() -> Figure:
 
 def million(out: str) -> dict[str, Any]:
     """Run a million variants on two workers; the scheduler is in the client's process, too."""
-    from sweep.address import Address, Credentials
-    from sweep.cluster import DaskExecutor
-    from sweep.clustering import WorkerSetup, open_client
-    from sweep.study_run import run_study
-    from sweep.summary import summary_of
+    from sweep.analysis.summary import summary_of
+    from sweep.execution.dask_address import Address, Credentials
+    from sweep.execution.dask_client import WorkerSetup, open_client
+    from sweep.execution.dask_executor import DaskExecutor
+    from sweep.execution.study_run import run_study
     from tests.sweep.killing import answer_quickly, own_fingerprint
     from tests.sweep.laying import make_study
 

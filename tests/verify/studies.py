@@ -29,9 +29,9 @@ CLIENT = """
 import sys, time
 from pathlib import Path
 import modewright
-from sweep.processes import ProcessExecutor
-from sweep.study_run import run_study
-from sweep.summary import summary_of
+from sweep.execution.processes import ProcessExecutor
+from sweep.execution.study_run import run_study
+from sweep.analysis.summary import summary_of
 from tests.sweep.laying import make_study
 from tests.verify.processor import peak_megabytes
 
@@ -39,7 +39,7 @@ axes = "{linspace: [1 rad/s, 3 rad/s, 1000]}", "{linspace: [0 1/s, 1 1/s, 1000]}
 changes = (("[1 rad/s, 3 rad/s]", axes[0]), ("[0.05 1/s, 0.3 1/s]", axes[1]))
 made = make_study("alone", *changes, ("one_at_a_time", "grid"))
 worker = "import modewright; from tests.sweep.laying import quick_results"
-worker += "; from sweep.worker import serve_blocks; serve_blocks(quick_results)"
+worker += "; from sweep.execution.worker import serve_blocks; serve_blocks(quick_results)"
 start = time.monotonic()
 found = run_study(made, Path(sys.argv[1]), ProcessExecutor(2, [sys.executable, "-c", worker]))
 seconds = time.monotonic() - start

@@ -1,0 +1,1 @@
+"""Analysis of a study: summaries, intervals, sensitivity, plots."""

@@ -1,0 +1,130 @@
+"""Interval: confidence intervals of means, medians and rates of numbers that come in draws.
+
+Numbers of one independent draw - replicates, points of a grid that see the same samples, entries of
+one list - are not independent of each other: a draw counts once, however many numbers it gives.
+Means: a ratio of totals by draw, its variance by linearization (Cochran, Sampling Techniques, 3rd
+ed. 1977, section 6.4), Student's t of the draws. Rates: the score interval (Wilson 1927, "Probable
+inference") at the effective number of Korn and Graubard (Survey Methodology 24 (1998) 193).
+Medians: order statistics (David and Nagaraja, Order Statistics, section 7.1) at that number
+(Woodruff, J. Am. Stat. Assoc. 47 (1952) 635). With one number a draw these are the usual intervals.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.measurement.exact_moments import quantiles_of, scale_to_squarable, undo_scale
+
+Interval = tuple[float, float] | None
+Reals = NDArray[np.float64]
+DrawIndices = NDArray[np.int64]
+
+
+def sum_by_draw(values: Reals, draws: DrawIndices) -> Reals:
+    """Return the total of the values (n,) of each draw that has some, in the order of draws."""
+    _, places = np.unique(draws, return_inverse=True)
+    return np.bincount(places.reshape(-1), values).astype(np.float64)
+
+
+def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> Interval:
+    """Return the interval of a mean [unit of the values] (n,); None for fewer than two draws.
+
+    None too where an end is more than a number can hold.
+    """
+    count = len(values)
+    own, exponent = scale_to_squarable(values)
+    totals, sizes = sum_by_draw(own, draws), sum_by_draw(np.ones(count), draws)
+    number = len(sizes)
+    if number < 2:
+        return None
+    from scipy.special import stdtrit
+
+    mean = math.fsum(own) / count
+    spread = math.fsum((totals - mean * sizes) ** 2) * number / (number - 1)
+    half = float(stdtrit(number - 1, 0.5 + confidence / 2.0)) * math.sqrt(spread) / count
+    low, high = undo_scale(mean - half, exponent), undo_scale(mean + half, exponent)
+    return (low, high) if math.isfinite(low) and math.isfinite(high) else None
+
+
+def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
+    """Return the interval of a rate: `hits` of `sizes` (n_draws,) were seen in each draw.
+
+    None for fewer than two draws.
+    """
+    count = effective_sample_size(hits, sizes, confidence)
+    return (
+        wilson_interval(count * float(np.sum(hits) / np.sum(sizes)), count, confidence)
+        if count
+        else None
+    )
+
+
+def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float:
+    """Return how many independent numbers say as much of a rate as `hits` of `sizes` (n_draws,).
+
+    As many as there are numbers where each is a draw of its own, or where draws differ no more than
+    such would; as many as there are draws where all numbers of a draw are the same: then, and for
+    fewer, their variance is less sure, which the quotient of the two t says. Of a rate of 0 or 1
+    nothing is known of that variance: the draws count. 0 for fewer than two draws.
+    """
+    sizes, hits = sizes[sizes > 0], hits[sizes > 0]
+    draws, count = len(sizes), float(np.sum(sizes))
+    share = float(np.sum(hits)) / count if count else 0.0
+    if draws < 2:
+        return 0.0
+    if share in (0.0, 1.0):
+        return float(draws)
+    from scipy.special import stdtrit
+
+    spread = math.fsum((hits - share * sizes) ** 2) / count**2
+    effective = share * (1.0 - share) / spread if spread > 0.0 else count
+    level = 0.5 + confidence / 2.0
+    t_ratio = float(stdtrit(count - 1.0, level) / stdtrit(draws - 1.0, level))
+    return min(count, effective) * min(1.0, t_ratio) ** 2
+
+
+def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
+    """Return the interval of a rate: `hits` of so many independent numbers; None without any."""
+    if count == 0:
+        return None
+    from scipy.special import ndtri
+
+    z = float(ndtri(0.5 + confidence / 2.0))
+    share, spread = hits / count, z * z / count
+    middle = (share + spread / 2.0) / (1.0 + spread)
+    half = z * math.sqrt(share * (1.0 - share) / count + spread / (4.0 * count)) / (1.0 + spread)
+    low = 0.0 if hits == 0 else middle - half
+    return max(0.0, low), 1.0 if hits == count else min(1.0, middle + half)
+
+
+def interval_of_quantile(
+    values: Reals, draws: DrawIndices, level: float, confidence: float
+) -> Interval:
+    """Return the interval of a quantile between two of the values (n,); None for too few.
+
+    Of m independent numbers it is from the l-th to the u-th smallest: P(l <= B < u) >= confidence,
+    B binomial(m, share). Of n numbers that say as much as m it is as far in shares of them.
+    """
+    count = len(values)
+    if count == 0:
+        return None
+    from scipy.stats import binom
+
+    ordered = np.sort(values)
+    below = (values <= quantiles_of(ordered, (level,))[0]).astype(np.float64)
+    hits, sizes = sum_by_draw(below, draws), sum_by_draw(np.ones(count), draws)
+    effective = int(effective_sample_size(hits, sizes, confidence) + COUNT_ROUNDING)
+    tail = (1.0 - confidence) / 2.0
+    low = int(binom.ppf(tail, effective, level)) if effective else 0
+    high = int(binom.ppf(1.0 - tail, effective, level)) + 1
+    if low < 1 or high > effective:
+        return None
+    first, last = (low - 1) * count // effective, -(-high * count // effective) - 1
+    return float(ordered[first]), float(ordered[last])
+
+
+COUNT_ROUNDING = 1e-6
+"""Relative to one number: what rounding takes of an effective number that is whole."""

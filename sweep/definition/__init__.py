@@ -1,0 +1,1 @@
+"""The definition of a study: variables, distributions, measures, plots."""

@@ -1,0 +1,58 @@
+"""Design: drawn points of which sensitivity indices are made - Saltelli's blocks, Morris' paths.
+
+Saltelli and others, Comput. Phys. Commun. 181 (2010) 259; Morris, Technometrics 33 (1991) 161.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.definition.study import MORRIS_LEVELS
+
+Reals = NDArray[np.float64]
+STRIDE = MORRIS_LEVELS // 2
+"""Levels of one step of a path; so all levels come equally often."""
+
+
+def saltelli_points(
+    dimensions: int, samples: NDArray[np.int64], sobol: Callable[[int], Reals]
+) -> Reals:
+    """Return shares (n_samples, dimensions): A, B, then A with one column after the other of B.
+
+    `sobol` gives a row of a sequence in twice as many dimensions.
+    """
+    points = np.empty((len(samples), dimensions))
+    for place, sample in enumerate(samples.tolist()):
+        row, part = divmod(sample, dimensions + 2)
+        both = sobol(row)
+        points[place] = both[dimensions:] if part == 1 else both[:dimensions]
+        if part > 1:
+            points[place, part - 2] = both[dimensions + part - 2]
+    return points
+
+
+def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Reals:
+    """Return shares (n_samples, dimensions) along paths that change one thing after the other."""
+    paths: dict[int, Reals] = {}
+    points = np.empty((len(samples), dimensions))
+    for place, sample in enumerate(samples.tolist()):
+        number, step = divmod(sample, dimensions + 1)
+        if number not in paths:
+            paths[number] = _morris_path(dimensions, seed, number)
+        points[place] = paths[number][step]
+    return points
+
+
+def _morris_path(dimensions: int, seed: int, number: int) -> Reals:
+    key = np.array([seed, number], dtype=np.uint64)
+    source = np.random.Generator(np.random.Philox(key=key))
+    order = source.permutation(dimensions)
+    low = source.integers(0, STRIDE, dimensions)
+    is_up = source.integers(0, 2, dimensions) == 1
+    levels = np.tile(np.where(is_up, low, low + STRIDE), (dimensions + 1, 1))
+    for place, column in enumerate(order.tolist(), start=1):
+        levels[place:, column] += STRIDE if is_up[column] else -STRIDE
+    return (levels + 0.5) / MORRIS_LEVELS

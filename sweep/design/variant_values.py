@@ -1,0 +1,121 @@
+"""Case: a point of a study as values for instances, start values, parts of inputs, sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from language.ir.ops import Expr, Ref, Value
+from language.lowering.expressions import lower_assigned_value
+from language.model.declaration import Formula
+from language.model.system import System
+from language.numerics.evaluate import evaluate
+from sweep.definition.study import Study, SystemVariant, Target, design_group_size
+from sweep.design.variant import Variant
+
+
+@dataclass(frozen=True)
+class VariantValues:
+    """The values [SI] of one variant, by target; `refused` says why it cannot be simulated."""
+
+    variant: Variant
+    values: Mapping[Target, float]
+    seed: int
+    refusal: str = ""
+    structural_values: tuple[tuple[Target, float], ...] = field(default=())
+
+
+def variant_values_of(study: Study, variant: Variant) -> VariantValues:
+    """Return the values of a variant, with those that follow from what varies."""
+    kind = study.system_variants[variant.system_variant]
+    scenario = kind.scenario_bindings[study.scenarios[variant.scenario]].scenario
+    values: dict[Target, float] = {}
+    for varied in study.variables:
+        if varied.name in variant.values:
+            values.update(dict.fromkeys(varied.targets, variant.values[varied.name]))
+    for setting in study.settings:
+        names = [name for name in setting.formula.reads if name not in variant.values]
+        if all(_is_parameter(kind.system, name) for name in names):
+            found = _evaluate_setting(setting.formula, variant.values, values, kind.system)
+            values.update(dict.fromkeys(setting.targets, found))
+    values = {target: value for target, value in values.items() if _has_target(kind.system, target)}
+    changed = tuple((t, v) for t, v in values.items() if t.kind not in ("parameter", "initial"))
+    each = design_group_size(study.sampling.method, len(study.random_variables))
+    seed = variant.seed(scenario.seed, study.replicates, each)
+    return VariantValues(variant, values, seed, _find_refusal(kind, values), changed)
+
+
+def _has_target(system: System, target: Target) -> bool:
+    """Tell whether a system has a place: of several variants, one may lack what others have."""
+    owner = target.path[0]
+    if target.kind in ("input", "sensor"):
+        return owner in (system.inputs if target.kind == "input" else system.sensors)
+    if owner not in system.instances:
+        return False
+    automaton = system.instances[owner].automaton
+    known = {"parameter": automaton.parameters, "initial": automaton.states}
+    return target.kind == "clock" or target.path[1] in known[target.kind]
+
+
+def _is_parameter(system: System, name: str) -> bool:
+    owner, _, short = name.rpartition(".")
+    instances = [system.instances.get(owner)] if owner else system.instances.values()
+    return any(each and short in each.automaton.parameters for each in instances)
+
+
+def _evaluate_setting(
+    formula: Formula,
+    varied: Mapping[str, float],
+    target_values: Mapping[Target, float],
+    system: System,
+) -> float:
+    read: dict[str, float] = {}
+    operands: dict[str, Expr] = {}
+    for name in dict.fromkeys(formula.reads):
+        read[name] = (
+            varied[name] if name in varied else parameter_value(system, name, target_values)
+        )
+        operands[name] = Ref(name)
+    return float(evaluate(lower_assigned_value(formula.tree, operands, False), read))
+
+
+def parameter_value(system: System, name: str, target_values: Mapping[Target, float]) -> float:
+    """Return the value [SI] of a parameter in a variant; of one name in several the first's."""
+    owner, _, short = name.rpartition(".")
+    if not owner:
+        owner = next(o for o, i in system.instances.items() if short in i.automaton.parameters)
+    target = Target("parameter", (owner, short))
+    if target in target_values:
+        return target_values[target]
+    automaton = system.instances[owner].automaton
+    parameter = automaton.parameters[short]
+    if parameter.derived is None:
+        return float(parameter.value or 0)
+    read: dict[str, float] = {}
+    operands: dict[str, Expr] = {}
+    for inner in dict.fromkeys(parameter.derived.reads):
+        if inner in automaton.enum_literals:
+            operands[inner] = Value(automaton.enum_literals[inner])
+        else:
+            operands[inner] = Ref(inner)
+            read[inner] = parameter_value(system, f"{owner}.{inner}", target_values)
+    return float(evaluate(lower_assigned_value(parameter.derived.tree, operands, False), read))
+
+
+def _find_refusal(system_variant: SystemVariant, values: Mapping[Target, float]) -> str:
+    """Return why values cannot be used: not finite, outside a declared range, no time."""
+    for target, value in values.items():
+        name = ".".join(target.path)
+        if not math.isfinite(value):
+            return f"`{name}` is {value}"
+        if target.kind == "parameter":
+            owner, short = target.path
+            limits = system_variant.system.instances[owner].automaton.parameters[short].range
+            low, high = map(float, limits) if limits else (-math.inf, math.inf)
+            if not low <= value <= high:
+                return f"`{name}` = {value:.6g} is outside its range [{low:.6g}, {high:.6g}]"
+        is_positive = target.kind == "sensor" or target.path[-1] in ("period", "step")
+        if target.kind in ("sensor", "clock") and (value < 0 or (is_positive and value == 0)):
+            return f"`{name}` = {value:.6g} is not above zero"
+    return ""

@@ -1,0 +1,1 @@
+"""Execution of a study: blocks, processes, clusters."""

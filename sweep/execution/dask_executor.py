@@ -1,0 +1,195 @@
+"""Cluster: an executor on the workers of a Dask cluster, here or elsewhere.
+
+A worker that dies is survived: its blocks are given to others. A block that several have died of is
+computed again at the end, alone; where that ends workers too, it is left out, and said to be.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from distributed import Client, Future, KilledWorker
+
+from sweep.definition.study import Study
+from sweep.execution.dask_error import ClusterError
+from sweep.execution.dask_worker import Answer, pack_study
+from sweep.execution.executor import BlockResult
+from sweep.execution.fingerprint import fingerprint
+from sweep.execution.processes import WorkerError
+from sweep.store.row import Block
+
+BlockTask = Callable[[Mapping[str, str], bytes, int, int], Answer]
+"""What a worker does: with the client's fingerprint, a packed study, the ends of a block.
+
+It is sent by its name, so workers have it from their own installation.
+"""
+
+PLACE_STUDY: Callable[[bytes], bytes] = bytes
+"""What a worker does with the study, and then has it: of Python's own, so that workers with other
+code can do it, too, and refuse the rest.
+"""
+BLOCKS_PER_THREAD = 2
+"""Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
+MAX_STUDY_DEATHS = 10
+"""How often workers may die that were given the study: then it is the study that they die of."""
+POLL_INTERVAL = 5.0
+"""Time [s] between two looks at how many workers there are."""
+WORKER_TIMEOUT = 60.0
+"""Time [s] without any worker, or an answer of the scheduler, after which a cluster is given up."""
+
+
+@dataclass(frozen=True)
+class DaskExecutor:
+    """The workers of a client; each does `task`."""
+
+    client: Client
+    task: BlockTask
+    timeout: float = WORKER_TIMEOUT
+
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
+        """Yield each block as it is finished; closing the iterator ends the work."""
+        flight = _DaskRun(self, pack_study(study))
+        try:
+            flight.place_study()
+            suspects = []
+            for finished in flight.iterate_results(blocks):
+                if finished.lost_reason:
+                    suspects.append(finished.block)
+                else:
+                    yield finished
+            for block in suspects:
+                yield from flight.iterate_results([block])
+        finally:
+            flight.cancel()
+
+
+@dataclass
+class _DaskRun:
+    """What is under way: the `study` that workers hold, and the blocks that they have.
+
+    `former` are the keys of what was held by workers that died.
+    """
+
+    executor: DaskExecutor
+    study: bytes
+    study_future: Any = None
+    former_study_keys: set[str] = field(default_factory=set)
+    pending: dict[Future, Block] = field(default_factory=dict)
+    completed: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
+    checked_at: float = float("-inf")
+    workers_seen_at: float = field(default_factory=time.monotonic)
+    threads: int = 0
+
+    def iterate_results(self, blocks: Iterable[Block]) -> Iterator[BlockResult]:
+        """Yield blocks as they are finished; those that workers died of are lost."""
+        waiting = iter(blocks)
+        while True:
+            self._check_workers()
+            free = max(1, BLOCKS_PER_THREAD * self.threads) - len(self.pending)
+            for block in itertools.islice(waiting, max(0, free)):
+                self._submit(block)
+            if not self.pending:
+                return
+            try:
+                future = self.completed.get(timeout=POLL_INTERVAL)
+            except Empty:
+                continue
+            found = self._collect_result(future)
+            if found:
+                yield found
+
+    def place_study(self) -> None:
+        """Give the study to a worker, from which the others have it."""
+        if self.study_future:
+            self.former_study_keys.add(self.study_future.key)
+        self.study_future = self.executor.client.submit(PLACE_STUDY, self.study, pure=False)
+
+    def cancel(self) -> None:
+        """Take back what is under way."""
+        client = self.executor.client
+        if client.status == "running":
+            client.cancel(
+                [*self.pending, *([self.study_future] if self.study_future else [])], force=True
+            )
+        self.pending.clear()
+
+    def _submit(self, block: Block) -> None:
+        future = self.executor.client.submit(
+            self.executor.task,
+            fingerprint(),
+            self.study_future,
+            block.start,
+            block.stop,
+            pure=False,
+        )
+        self.pending[future] = block
+        future.add_done_callback(self.completed.put)
+
+    def _check_workers(self) -> None:
+        """See how many threads there are. Raises ClusterError where nobody is left to compute."""
+        client, patience = self.executor.client, self.executor.timeout
+        if client.status in ("closing", "closed"):
+            raise ClusterError("the connection to the scheduler is lost")
+        if time.monotonic() < self.checked_at + POLL_INTERVAL:
+            return
+        try:
+            threads = client.nthreads(callback_timeout=patience)
+        except TimeoutError:
+            raise ClusterError(f"the scheduler does not answer for {patience:g} s") from None
+        except OSError as error:
+            raise ClusterError(f"the scheduler does not answer any more: {error}") from None
+        self.threads = sum(threads.values())
+        self.checked_at = time.monotonic()
+        if self.threads:
+            self.workers_seen_at = self.checked_at
+        elif self.checked_at > self.workers_seen_at + self.executor.timeout:
+            raise ClusterError(f"there is no worker any more for {self.executor.timeout:g} s")
+
+    def _wait_for_answer(self, future: Future) -> Answer:
+        """Return an answer; it may be lost with its worker, and made again, which takes a while."""
+        while True:
+            try:
+                found: Answer = future.result(timeout=self.executor.timeout)
+                return found
+            except TimeoutError:
+                self.checked_at = float("-inf")
+                self._check_workers()
+
+    def _collect_result(self, future: Future) -> BlockResult | None:
+        """Return what became of a block; None where it is under way again, since a worker died of
+        another one while it was given the study.
+        """
+        block = self.pending.pop(future)
+        try:
+            answer = self._wait_for_answer(future)
+        except KilledWorker as error:
+            if error.task not in (self.study_future.key, *self.former_study_keys):
+                return BlockResult(block, lost_reason=_death_message(error))
+            if len(self.former_study_keys) + 1 >= MAX_STUDY_DEATHS:
+                return BlockResult(
+                    block, lost_reason=f"{MAX_STUDY_DEATHS} workers died that were given the study"
+                )
+            if error.task == self.study_future.key:
+                self.place_study()
+            self._submit(block)
+            return None
+        except ImportError as error:
+            raise ClusterError(f"a worker cannot import modewright: {error}") from None
+        except (CancelledError, OSError):
+            raise ClusterError("the scheduler has dropped what it was given: it ended") from None
+        if answer.refusal:
+            raise ClusterError(f"a worker {answer.refusal}")
+        if answer.defect:
+            raise WorkerError(answer.defect)
+        return BlockResult(block, file=answer.file)
+
+
+def _death_message(error: KilledWorker) -> str:
+    deaths = int(error.allowed_failures) + 1
+    return f"{deaths} worker{'s' * (deaths > 1)} died while it was computed alone"

@@ -1,0 +1,99 @@
+"""Study run: the blocks of a study that are not there yet, computed and kept one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from sweep.definition.study import Study
+from sweep.execution.executor import BlockResult, Executor
+from sweep.store.manifest import Manifest, manifest_of
+from sweep.store.row import Block
+from sweep.store.store import Store, lock_folder, open_store, require_same_study
+
+Progress = Callable[[int, int, int], None]
+"""Told how many variants are done, how many of these were there before, and how many in all."""
+Warn = Callable[[str], None]
+"""Told in one line what is not as it should be, and does not end the run."""
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """The store after a run; `lost` are blocks that could not be computed, with the reason."""
+
+    store: Store
+    reused: int
+    computed: int
+    lost_blocks: tuple[tuple[Block, str], ...] = ()
+
+
+def run_study(
+    study: Study,
+    folder: Path,
+    executor: Executor,
+    block_size: int | None = None,
+    progress: Progress | None = None,
+    warn: Warn | None = None,
+) -> StudyRun:
+    """Run a prepared study into a folder, or go on where another run of it ended.
+
+    Raises SpecError where the folder is of another study, OSError where it cannot be written.
+    """
+    return fill_store(
+        manifest_of(study, block_size), folder, partial(executor, study), progress, warn
+    )
+
+
+def fill_store(
+    manifest: Manifest,
+    folder: Path,
+    compute: Callable[[Iterable[Block]], Iterator[BlockResult]],
+    progress: Progress | None = None,
+    warn: Warn | None = None,
+) -> StudyRun:
+    """Fill a store with blocks of any kind of work; what is there is not computed again.
+
+    What is damaged is. Raises SpecError where the folder is of something else, OSError where it
+    cannot be written.
+    """
+    require_same_study(folder, manifest)  # before anything is made there, a lock too
+    with lock_folder(folder):
+        store = open_store(folder, manifest)
+        total = manifest.count
+        complete = _complete_starts(store, warn or _ignore)
+        missing = [each for each in store.manifest.blocks if each.start not in complete]
+        before = total - sum(each.stop - each.start for each in missing)
+        done, lost = before, []
+        report = progress or _ignore
+        report(done, before, total)
+        finished = compute(missing)
+        try:
+            for part in finished:
+                if part.lost_reason:
+                    lost.append((part.block, part.lost_reason))
+                    continue
+                if part.file:
+                    store.write_block_file(part.block, part.file)
+                else:
+                    store.write_rows(part.block, part.rows)
+                done += part.block.stop - part.block.start
+                report(done, before, total)
+        finally:
+            close = getattr(finished, "close", None)
+            if close:
+                close()
+        return StudyRun(store, before, done - before, tuple(lost))
+
+
+def _complete_starts(store: Store, warn: Warn) -> set[int]:
+    """Return the starts of the blocks that are there; tell which are damaged."""
+    found = store.scan()
+    for path in found.damaged:
+        warn(f"{path} is damaged: its variants are computed again")
+    return {block.start for block in found.complete}
+
+
+def _ignore(*arguments: object) -> None:
+    """Tell nobody."""

@@ -1,0 +1,74 @@
+"""Worker: a process that computes blocks, told by messages through its standard streams.
+
+A message is its length (8 bytes, big-endian) and a pickle: first the study, then blocks; each is
+answered by its file, or by the traceback of a defect (text). Where who started it is gone, it ends
+at once, also inside a block.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import struct
+import sys
+import threading
+import traceback
+from typing import IO, Any
+
+from engine.batch.batch import BatchRunner
+from sweep.execution.block import compute_rows
+from sweep.store.block_file import encode_block
+from sweep.store.manifest import manifest_of
+from sweep.store.row import Block
+
+LENGTH_PREFIX = struct.Struct(">Q")
+
+
+def send_message(stream: IO[bytes], message: object) -> None:
+    """Write a message. Raises OSError where nobody reads it."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(LENGTH_PREFIX.pack(len(data)) + data)
+    stream.flush()
+
+
+def receive_message(stream: IO[bytes]) -> Any:
+    """Read a message. Raises EOFError where there is no other one."""
+    head = stream.read(LENGTH_PREFIX.size)
+    if len(head) < LENGTH_PREFIX.size:
+        raise EOFError
+    (length,) = LENGTH_PREFIX.unpack(head)
+    data = stream.read(length)
+    if len(data) < length:
+        raise EOFError
+    return pickle.loads(data)
+
+
+def serve_blocks(run: BatchRunner) -> None:
+    """Answer blocks until the input ends. What is printed meanwhile goes to stderr."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us tells us when to end
+    source = os.fdopen(os.dup(0), "rb")
+    target = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    messages: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_forward_messages, args=(source, messages), daemon=True).start()
+    study = messages.get()
+    manifest = manifest_of(study)
+    while True:
+        block: Block = messages.get()
+        try:
+            answer: object = encode_block(manifest, block, compute_rows(study, block, run))
+        except Exception:
+            answer = traceback.format_exc()
+        send_message(target, answer)
+
+
+def _forward_messages(source: IO[bytes], messages: queue.Queue[Any]) -> None:
+    """Put messages into the queue; where they end, end the process."""
+    while True:
+        try:
+            messages.put(receive_message(source))
+        except (EOFError, OSError):
+            sys.stderr.flush()
+            os._exit(0)

@@ -1,0 +1,1 @@
+"""Measures of a run: statistics, waveforms, observed intervals."""

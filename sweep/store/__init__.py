@@ -1,0 +1,1 @@
+"""Storage of results: manifest, blocks as files, tables."""
