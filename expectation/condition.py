@@ -7,8 +7,14 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from expectation.expected import Condition, FaultFlag, ModePredicate, RegionRef, RunningStatistic
-from expectation.places import (
+from expectation.expectations import (
+    Condition,
+    FaultFlag,
+    ModePredicate,
+    RegionRef,
+    RunningStatistic,
+)
+from expectation.mode_names import (
     fault_bits,
     fault_words,
     format_region,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from expectation.trace import CodeLine, citations
+from expectation.requirement_trace import CodeLine, citations
 from language.text.diagnostic import Span
 from language.text.document import Document, MappingNode, ScalarNode, YamlNode
 from language.text.node_edit import find_node

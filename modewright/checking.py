@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from expectation.reader import read_test
+from expectation.test_reader import read_test
 from language.checks.check_warnings import check_warnings
 from language.ir.program import Program
 from language.loading.load import automaton_of, lower_automaton

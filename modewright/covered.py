@@ -7,8 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from expectation.coverage import Coverage, measure_coverage as reached_by, merge_coverages, names_of
-from expectation.decision import COVERED, Decision
+from expectation.coverage_measurement import (
+    Coverage,
+    measure_coverage as reached_by,
+    merge_coverages,
+    names_of,
+)
+from expectation.mcdc import COVERED, Decision
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from modewright.diagram import Arrow, Diagram, ModeBox, ModePath, RegionBox, Shade, graph
 from modewright.tests import find_tests, load_tests

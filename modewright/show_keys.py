@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from expectation.key_trace import KeyTrace, KeyTraces
-from expectation.trace import CodeLine
+from expectation.requirement_trace import CodeLine
 from modewright.console import pluralise
 
 STYLE = """body{font:13px/1.4 system-ui,sans-serif;margin:0;color:#222;height:100vh;display:flex;

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
-from expectation.expected import Expectation
-from expectation.judging import Outcome
+from expectation.evaluate_expectations import Outcome
+from expectation.expectations import Expectation
 from language.expressions.units import Dimension
 from language.text.sanitise import escape_invisible
 from modewright.console import pluralise

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-from expectation.trace import (
+from expectation.requirement_trace import (
     CodeLine,
     Implementation,
     RequirementTrace,

@@ -11,9 +11,9 @@ import numpy as np
 
 from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
-from expectation.expected import Test
-from expectation.judging import Outcome, evaluate_test
-from expectation.reader import read_test
+from expectation.evaluate_expectations import Outcome, evaluate_test
+from expectation.expectations import Test
+from expectation.test_reader import read_test
 from language.overlays.expand_document import Project
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.project_files import HEAD_PATTERN

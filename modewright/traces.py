@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
-from expectation.expected import Test
+from expectation.expectations import Test
 from expectation.key_trace import KeyTraces, build_key_traces
-from expectation.trace import RequirementTrace, trace_requirements
+from expectation.requirement_trace import RequirementTrace, trace_requirements
 from language.loading.instances import expand_instances
 from language.loading.load import automaton_of, program_of
 from language.loading.system_reader import read_system

@@ -14,7 +14,7 @@ from modewright.exits import PROBLEMS
 from modewright.files import make_folder, require_writable, write_files
 
 if TYPE_CHECKING:
-    from expectation.coverage import Coverage
+    from expectation.coverage_measurement import Coverage
     from modewright.tests import TestRun
 
 
@@ -44,7 +44,7 @@ def test(
     modewright test tip_out_is_detected --junit build/tests.xml
     modewright test --coverage --graphs build
     """
-    from expectation.coverage import measure_coverage as covered, merge_coverages
+    from expectation.coverage_measurement import measure_coverage as covered, merge_coverages
     from modewright.show_tests import spec_test_lines
     from modewright.tests import run_tests
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from expectation.reader import read_test
+from expectation.test_reader import read_test
 from language.loading.automaton_reader import read_automaton
 from language.loading.recording_map_reader import read_map
 from language.loading.scenario_reader import read_scenario

@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from engine.simulation.simulate import simulate
-from expectation.expected import Test
-from expectation.judging import Outcome, evaluate_test
+from expectation.evaluate_expectations import Outcome, evaluate_test
+from expectation.expectations import Test
 from modewright.tests import load_test
 
 AUTOMATON = """\

@@ -10,9 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from engine.simulation.simulate import simulate
-from expectation.coverage import instrument_programs, measure_coverage
-from expectation.expected import Test
-from expectation.judging import evaluate_test
+from expectation.coverage_measurement import instrument_programs, measure_coverage
+from expectation.evaluate_expectations import evaluate_test
+from expectation.expectations import Test
 from language.ir.ops import Store
 from language.ir.traversal import walk_ops
 from modewright import tests

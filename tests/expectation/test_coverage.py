@@ -13,7 +13,12 @@ from typer.testing import CliRunner
 from engine.simulation.instance_programs import automata_of
 from engine.simulation.simulate import simulate
 from engine.simulation.stimuli import resolve_recording
-from expectation.coverage import Coverage, instrument_programs, measure_coverage, merge_coverages
+from expectation.coverage_measurement import (
+    Coverage,
+    instrument_programs,
+    measure_coverage,
+    merge_coverages,
+)
 from language.ir.ops import Store
 from language.ir.traversal import walk_ops
 from language.loading.load import load_automaton

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from expectation.decision import Decision, decision_of
+from expectation.mcdc import Decision, decision_of
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
 from tests.expectation.latching import AUTOMATON

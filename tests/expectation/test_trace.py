@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from expectation.trace import RequirementTrace
+from expectation.requirement_trace import RequirementTrace
 from modewright import show_trace, traces
 from modewright.cli import app
 from modewright.tests import load_test

@@ -11,9 +11,9 @@ from engine.interpreter.interpreter import Interpreter
 from engine.simulation.instance_programs import automata_of
 from engine.simulation.simulate import simulate
 from engine.simulation.stimuli import resolve_recording
-from expectation.decision import COVERED, ConditionCoverage, Decision, decision_of
-from expectation.expected import Test
-from expectation.probe import GUARD_READ_BLOCK, instrument, reached_array
+from expectation.expectations import Test
+from expectation.instrumentation import GUARD_READ_BLOCK, instrument, reached_array
+from expectation.mcdc import COVERED, ConditionCoverage, Decision, decision_of
 from language.ir.program import Program
 from language.ir.regions import CHART
 from language.loading.load import lower_automaton

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from expectation.decision import MAX_CONDITIONS, Decision, match_conditions
+from expectation.mcdc import MAX_CONDITIONS, Decision, match_conditions
 from language.ir.ops import (
     Assign,
     Binary,

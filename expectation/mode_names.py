@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from expectation.expected import ModePredicate, RegionRef
+from expectation.expectations import ModePredicate, RegionRef
 from language.ir.regions import CHART
 from language.loading.event_names import ModeEntryEvent
 from language.loading.load import lower_automaton

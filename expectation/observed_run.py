@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from engine.results.trajectory import Event, Trajectory
-from expectation.expected import Condition, ModePredicate, RegionRef, RunningStatistic
-from expectation.places import (
+from expectation.expectations import Condition, ModePredicate, RegionRef, RunningStatistic
+from expectation.mode_names import (
     format_region,
     is_chart,
     leaf_modes_entered,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from expectation.condition import ConditionReader
-from expectation.expected import (
+from expectation.expectations import (
     Condition,
     Expectation,
     RegionRef,
@@ -16,8 +17,13 @@ from expectation.expected import (
     TimeConstraint,
     Trigger,
 )
-from expectation.places import format_region, require_mode_output, suggest_mode
-from expectation.recording import select_recorded_signals
+from expectation.mode_names import (
+    format_region,
+    is_chart,
+    mode_signals,
+    require_mode_output,
+    suggest_mode,
+)
 from language.expressions.syntax_tree import ErrorNode
 from language.expressions.units import SECOND, are_compatible
 from language.ir.regions import CHART
@@ -34,10 +40,47 @@ from language.text.document import Document, Entry, MappingNode, ScalarNode, Yam
 from language.text.overlay import without_keys
 from language.text.requirement import all_requirements, requirements_of
 
+MAX_ROWS = 1_000_000
+"""More rows are a mistake of a horizon, or of a period."""
+
+
+def select_recorded_signals(
+    scenario: Scenario, system: System, expectations: Sequence[Expectation], problems: Problems
+) -> Scenario:
+    """Return a scenario that records the signals that are read, at least one.
+
+    The modes of charts are recorded at their ticks: their transitions do not tell them all.
+    """
+    read = [n for e in expectations for c in e.conditions for n in c.all_signals]
+    every = scenario.every
+    for name, instance in system.instances.items():
+        automaton = instance.automaton
+        if is_chart(system, name) and "mode" in automaton.outputs:
+            read += mode_signals(system, name)
+            if automaton.period:
+                every = _common_period(every, automaton.period, instance.offset)
+    horizon = scenario.horizon
+    if every != scenario.every and horizon and horizon / every > MAX_ROWS:
+        label = f"rows at all ticks of its charts are more than {MAX_ROWS}"
+        problems.error("range", scenario.span, label, "a shorter `horizon`")
+    signals = tuple(dict.fromkeys(read)) or system.signals[:1]
+    return dataclasses.replace(scenario, signals=signals, every=every)
+
+
+def _common_period(every: Fraction, period: Fraction, offset: Fraction) -> Fraction:
+    """Return the largest time of which all three are whole multiples [s]."""
+    times = (every, period, offset)
+    whole = math.lcm(*(time.denominator for time in times))
+    return Fraction(math.gcd(*(int(time * whole) for time in times)), whole)
+
+
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
+
 INLINE_SCENARIO_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
 """The keys of a scenario that is written in a test."""
+
 TIME_KEYS = ("at", "within", "before", "after", "from", "until")
+
 EXPECTATION_KEYS: Mapping[str, tuple[str, ...]] = {
     "that": TIME_KEYS,
     "always": ("from", "until", "after", "within"),
@@ -46,6 +89,7 @@ EXPECTATION_KEYS: Mapping[str, tuple[str, ...]] = {
     "modes": ("of", "from", "until"),
 }
 """What an expectation may be, and what stands beside it."""
+
 MAX_EVENTS = 1_000_000
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from engine.results.trajectory import Trajectory
-from expectation.expected import Condition, Expectation, Test, TimeConstraint, Trigger
-from expectation.observed import (
+from expectation.expectations import Condition, Expectation, Test, TimeConstraint, Trigger
+from expectation.observed_run import (
     ObservedRun,
     evaluate_series,
     observe_run,

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from expectation.expected import Test
+from expectation.expectations import Test
 from language.text.document import Document, MappingNode, ScalarNode
 from language.text.node_edit import entries
 from language.text.requirement import find_requirements
