@@ -9,15 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from diagnosis.dossier import DiagnosisReport
-    from diagnosis.fit import Fit
+    from diagnosis.pipeline.parameter_fit import Fit
+    from diagnosis.report.diagnosis_report import DiagnosisReport
     from engine.results.plot import Picture
     from engine.results.run_comparison import RunDifference
     from engine.results.trajectory import Event, Trajectory
     from language.text.diagnostic import Problem, SpecError, render_all
     from lockstep.comparison import Verdict
-    from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
-    from modewright.calibrations import (
+    from modewright.api.calibrations import (
         CalibrationPage,
         ImportedPage,
         ResolvedPage,
@@ -25,20 +24,16 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.code import a2l, dbc, fmu, fuzz, generate, mcdc, metrics, prove
-    from modewright.diagnoses import diagnose, fit, save_diagnosis
-    from modewright.diagram import Diagram, graph
-    from modewright.recordings import CheckedRecordings, check_recordings
-    from modewright.runs import compare, plot, read, save
-    from modewright.studies import (
-        sensitivity,
-        study_pictures,
-        study_report,
-        study_summary,
-        sweep,
-    )
-    from modewright.tests import run_tests
-    from modewright.traces import trace
+    from modewright.api.code_generation import a2l, dbc, fmu, fuzz, generate, mcdc, metrics, prove
+    from modewright.api.diagnosis import diagnose, fit, save_diagnosis
+    from modewright.api.recordings import CheckedRecordings, check_recordings
+    from modewright.api.runs import compare, plot, read, save
+    from modewright.api.simulation import Loaded, Replayed, check, load, lockstep, replay, simulate
+    from modewright.api.spec_tests import run_tests
+    from modewright.api.studies import sensitivity, study_pictures, study_summary, sweep
+    from modewright.api.traces import trace
+    from modewright.diagram.diagram import Diagram, graph
+    from modewright.render.study_page import study_report
 
 __all__ = [
     "CalibrationPage",
@@ -93,58 +88,58 @@ __all__ = [
 ]
 
 PLACES = {
-    "CalibrationPage": "modewright.calibrations",
-    "ImportedPage": "modewright.calibrations",
-    "ResolvedPage": "modewright.calibrations",
-    "export_calibration": "modewright.calibrations",
-    "import_calibration": "modewright.calibrations",
-    "resolve_calibration": "modewright.calibrations",
-    "CheckedRecordings": "modewright.recordings",
-    "Diagram": "modewright.diagram",
-    "DiagnosisReport": "diagnosis.dossier",
+    "CalibrationPage": "modewright.api.calibrations",
+    "ImportedPage": "modewright.api.calibrations",
+    "ResolvedPage": "modewright.api.calibrations",
+    "export_calibration": "modewright.api.calibrations",
+    "import_calibration": "modewright.api.calibrations",
+    "resolve_calibration": "modewright.api.calibrations",
+    "CheckedRecordings": "modewright.api.recordings",
+    "Diagram": "modewright.diagram.diagram",
+    "DiagnosisReport": "diagnosis.report.diagnosis_report",
     "Event": "engine.results.trajectory",
-    "Fit": "diagnosis.fit",
+    "Fit": "diagnosis.pipeline.parameter_fit",
     "Picture": "engine.results.plot",
     "Problem": "language.text.diagnostic",
     "RunDifference": "engine.results.run_comparison",
     "SpecError": "language.text.diagnostic",
     "Trajectory": "engine.results.trajectory",
     "Verdict": "lockstep.comparison",
-    "a2l": "modewright.code",
-    "dbc": "modewright.code",
-    "fmu": "modewright.code",
-    "fuzz": "modewright.code",
-    "generate": "modewright.code",
-    "mcdc": "modewright.code",
-    "metrics": "modewright.code",
-    "prove": "modewright.code",
-    "compare": "modewright.runs",
-    "plot": "modewright.runs",
-    "read": "modewright.runs",
-    "check": "modewright.checking",
-    "check_recordings": "modewright.recordings",
-    "diagnose": "modewright.diagnoses",
-    "fit": "modewright.diagnoses",
-    "graph": "modewright.diagram",
+    "a2l": "modewright.api.code_generation",
+    "dbc": "modewright.api.code_generation",
+    "fmu": "modewright.api.code_generation",
+    "fuzz": "modewright.api.code_generation",
+    "generate": "modewright.api.code_generation",
+    "mcdc": "modewright.api.code_generation",
+    "metrics": "modewright.api.code_generation",
+    "prove": "modewright.api.code_generation",
+    "compare": "modewright.api.runs",
+    "plot": "modewright.api.runs",
+    "read": "modewright.api.runs",
+    "check": "modewright.api.checking",
+    "check_recordings": "modewright.api.recordings",
+    "diagnose": "modewright.api.diagnosis",
+    "fit": "modewright.api.diagnosis",
+    "graph": "modewright.diagram.diagram",
     "render_all": "language.text.diagnostic",
-    "save": "modewright.runs",
-    "save_diagnosis": "modewright.diagnoses",
-    "run_tests": "modewright.tests",
-    "sensitivity": "modewright.studies",
-    "study_pictures": "modewright.studies",
-    "study_report": "modewright.studies",
-    "study_summary": "modewright.studies",
-    "sweep": "modewright.studies",
-    "trace": "modewright.traces",
+    "save": "modewright.api.runs",
+    "save_diagnosis": "modewright.api.diagnosis",
+    "run_tests": "modewright.api.spec_tests",
+    "sensitivity": "modewright.api.studies",
+    "study_pictures": "modewright.api.studies",
+    "study_report": "modewright.api.studies",
+    "study_summary": "modewright.api.studies",
+    "sweep": "modewright.api.studies",
+    "trace": "modewright.api.traces",
 }
-"""Where a name of the public API is defined, if not in `modewright.api`."""
+"""Where a name of the public API is defined, if not in `modewright.api.simulation`."""
 
 
 def __getattr__(name: str) -> Any:
     """Load a name of the public API."""
     if name not in __all__:
         raise AttributeError(f"module `modewright` has no `{name}`")
-    value = getattr(import_module(PLACES.get(name, "modewright.api")), name)
+    value = getattr(import_module(PLACES.get(name, "modewright.api.simulation")), name)
     globals()[name] = value
     return value
 

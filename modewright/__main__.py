@@ -9,6 +9,6 @@ HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if not sys.flags.safe_path and sys.path and os.path.realpath(sys.path[0]) != os.path.realpath(HERE):
     del sys.path[0]
 
-from modewright.cli import main  # noqa: E402
+from modewright.cli.app import main  # noqa: E402
 
 main()

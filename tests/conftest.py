@@ -13,11 +13,11 @@ import typer
 from hypothesis import settings
 
 from language.loading import load
-from modewright.garbage import raise_gc_threshold
+from modewright.runtime.gc_pause import raise_gc_threshold
 from tests.once import memoise_lowering, memoise_shipped
 
 load.program_of = memoise_lowering(load.program_of)  # before it is imported by name
-from modewright import api  # noqa: E402
+from modewright.api import simulation as api  # noqa: E402
 
 for name in ("load", "program"):
     setattr(api, name, memoise_shipped(getattr(api, name)))

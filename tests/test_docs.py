@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 import modewright as mw
 from codegen.toolchain.compiler import compile_program
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()

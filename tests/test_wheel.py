@@ -244,7 +244,7 @@ def test_the_installed_command_works_in_a_folder_with_our_names(
     assert run([python.parent / "modewright", *arguments], folder)
 
 
-FINGERPRINT = "from modewright.cluster_worker import own_fingerprint as f; print(dict(f()))"
+FINGERPRINT = "from modewright.workers.dask_worker import own_fingerprint as f; print(dict(f()))"
 
 
 def test_results_of_the_wheel_are_not_taken_for_those_of_the_repository(
@@ -274,5 +274,5 @@ def test_the_language_server_and_its_background_process_start(python: Path, fold
     assert '"capabilities"' in told and '"id":2' in told.replace(" ", "")
     path = str(folder / "spec" / "spinner.yaml")
     asked = {"path": path, "root": str(folder), "texts": {}, "encoding": "utf-16"}
-    proving: list[str | Path] = [python, "-P", "-m", "modewright.lsp.proving"]
+    proving: list[str | Path] = [python, "-P", "-m", "modewright.lsp.background_check"]
     assert json.loads(run(proving, folder, json.dumps(asked))) == []

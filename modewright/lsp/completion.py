@@ -13,8 +13,7 @@ from language.text.diagnostic import SpecError
 from language.text.document import Document, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.project_files import DOCUMENT_KINDS, parse_document, source_of
 from language.typecheck.function_calls import FUNCTION_NAMES
-from modewright.editing.guide import Place, kind_of_file, places, root_shape
-from modewright.editing.shape import (
+from modewright.editing.key_shape import (
     Choice,
     MappingOf,
     ShapeRef,
@@ -23,10 +22,11 @@ from modewright.editing.shape import (
     alternatives_of,
     shapes,
 )
-from modewright.lsp.asked import expected_symbols
-from modewright.lsp.namespace import Symbol, SymbolTable, build_symbol_table
+from modewright.editing.node_kinds import Place, kind_of_file, places, root_shape
+from modewright.lsp.expected_symbols import expected_symbols
 from modewright.lsp.positions import column_of, encoded_column
-from modewright.lsp.world import Workspace
+from modewright.lsp.symbol_table import Symbol, SymbolTable, build_symbol_table
+from modewright.lsp.workspace import Workspace
 
 CURSOR_MARK = "zzCURSORzz"
 """Stands in the text for what is being written; no name of a spec looks like it."""

@@ -12,12 +12,12 @@ from language.overlays.expand_document import display_path
 from language.text.diagnostic import Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode
 from language.text.node_edit import entries
-from modewright.editing.guide import places
-from modewright.editing.shape import Key, ShapeRef, shapes
-from modewright.lsp.mention import Reference, find_references, references_to
-from modewright.lsp.namespace import Symbol
+from modewright.editing.key_shape import Key, ShapeRef, shapes
+from modewright.editing.node_kinds import places
 from modewright.lsp.positions import contains_position, range_of
-from modewright.lsp.world import Workspace
+from modewright.lsp.reference import Reference, find_references, references_to
+from modewright.lsp.symbol_table import Symbol
+from modewright.lsp.workspace import Workspace
 
 SHOWN_KEYS = ("unit", "value", "derived", "default", "initial", "range", "tunable", "type", "of")
 """Keys of a declaration that tell what it is, in this order."""

@@ -9,10 +9,10 @@ from lsprotocol import types
 
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, SequenceNode, YamlNode
-from modewright.editing.guide import places
-from modewright.editing.shape import MappingOf
+from modewright.editing.key_shape import MappingOf
+from modewright.editing.node_kinds import places
 from modewright.lsp.positions import range_of
-from modewright.lsp.world import Workspace
+from modewright.lsp.workspace import Workspace
 
 K = types.SymbolKind
 SECTION_KINDS = {

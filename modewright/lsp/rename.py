@@ -11,11 +11,11 @@ from language.ir.regions import CHART
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems
 from modewright.lsp.hover import reference_at
-from modewright.lsp.mention import Reference, find_references, references_to
-from modewright.lsp.namespace import load_symbol_table
 from modewright.lsp.positions import range_of, source_text, uri_of
-from modewright.lsp.renamed import RenameRefused, replace_last_part, require_same_meaning
-from modewright.lsp.world import Workspace
+from modewright.lsp.reference import Reference, find_references, references_to
+from modewright.lsp.rename_check import RenameRefused, replace_last_part, require_same_meaning
+from modewright.lsp.symbol_table import load_symbol_table
+from modewright.lsp.workspace import Workspace
 
 
 def definition(workspace: Workspace, path: Path, position: types.Position) -> list[types.Location]:

@@ -10,15 +10,15 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
 from language.text.diagnostic import SpecError
-from modewright.editing.format import format_text
+from modewright.editing.formatter import format_text
 from modewright.lsp.completion import complete
-from modewright.lsp.desk import OpenDocuments
 from modewright.lsp.hover import hover, reference_at
+from modewright.lsp.open_documents import OpenDocuments
 from modewright.lsp.outline import outline
 from modewright.lsp.positions import range_of
+from modewright.lsp.quick_fix import quick_fixes
 from modewright.lsp.rename import definition, references, rename
-from modewright.lsp.renamed import RenameRefused
-from modewright.lsp.repair import quick_fixes
+from modewright.lsp.rename_check import RenameRefused
 
 TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
 """Characters after which an editor asks for completions by itself."""

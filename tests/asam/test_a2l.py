@@ -15,9 +15,9 @@ from codegen.exchange.a2l.writer import ModuleLocation, _unique_name, emit_a2l, 
 from codegen.exchange.calibration.calibration_page import page_constants, page_name
 from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.program import Program
-from modewright.api import program as shipped
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api.simulation import program as shipped
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.asam.linked import TARGETS, link_program, read_section, symbol_addresses
 from tests.asam.reading import elements_of_kind, open_database
 from tests.codegen.waiting import waiting_automaton

@@ -18,7 +18,7 @@ from codegen.toolchain.compiler import FLAGS, find_compiler
 from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType
 from language.ir.program import Program
-from modewright.api import program as program_of_spec
+from modewright.api.simulation import program as program_of_spec
 
 HERE = Path(__file__).resolve().parent
 TICKS, TICKS_IN_C = 20_000, 200_000

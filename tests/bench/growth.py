@@ -142,8 +142,8 @@ def _spec(states: int, modes: int) -> str:
 
 def _grown(states: int, modes: int, folder: Path) -> dict[str, float]:
     """Read, check and lower, compile and run a spec of a size; return each's processor time."""
-    from modewright.api import load
-    from modewright.compiled import run_in_c
+    from modewright.api.simulation import load
+    from modewright.runtime.compiled_run import run_in_c
 
     os.environ["MODEWRIGHT_CACHE"] = str(folder / "cache")
     (folder / "spec").mkdir()
@@ -166,8 +166,8 @@ def _grown(states: int, modes: int, folder: Path) -> dict[str, float]:
 def _lasting(seconds: int, folder: Path) -> dict[str, float]:
     import dataclasses
 
-    from modewright.api import load
-    from modewright.compiled import run_in_c
+    from modewright.api.simulation import load
+    from modewright.runtime.compiled_run import run_in_c
 
     loaded = load("ev_driveline_ideal", "tip_out", root=ROOT)
     gentle = {"T_req": Stimulus((StimulusPiece(Fraction(0), GENTLE),))}

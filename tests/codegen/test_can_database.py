@@ -12,9 +12,9 @@ from cantools.database import Database
 from codegen.exchange.dbc import emit_dbc
 from language.ir.printer import digest
 from language.ir.program import unqualified_name
-from modewright.api import program
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api.simulation import program
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.language.making import program as made
 
 PERIODS = {"contactor": 10, "supervisor": 10, "estimator": 1, "estimator_float32": 1}

@@ -11,9 +11,9 @@ import pytest
 
 from codegen.exchange.cmake import FILE, SET_BY_CMAKE, emit_cmake_file
 from codegen.toolchain.compiler import FLAGS
-from modewright.api import program
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api.simulation import program
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 USER = """

@@ -18,7 +18,7 @@ from codegen.proofs.acsl.assigns_contract import (
 from codegen.proofs.acsl.function_outlining import function_of, outline_except
 from codegen.proofs.acsl.mode_contract import write_contracts
 from language.ir.program import Program
-from modewright.api import program
+from modewright.api.simulation import program
 
 JUMPS = ("jump_drive", "jump_gap", "jump_coast")
 

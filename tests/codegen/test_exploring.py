@@ -12,7 +12,7 @@ from codegen.coverage.coverage_exploration import generate_corpus, page_scalars
 from codegen.coverage.libfuzzer import FUZZER_COMPILER
 from codegen.coverage.mcdc import EXPORTER, measure_mcdc
 from language.ir.program import Program
-from modewright.api import program as program_named
+from modewright.api.simulation import program as program_named
 from tests.language.making import program
 
 pytestmark = pytest.mark.skipif(

@@ -11,8 +11,8 @@ from codegen.passes.inline_policy import select_noinline_blocks
 from codegen.proofs.stack_usage import LIMIT
 from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.number_type import NumberType
-from modewright.api import program
-from modewright.code import metrics
+from modewright.api.code_generation import metrics
+from modewright.api.simulation import program
 
 
 def test_what_computes_much_has_a_frame_of_its_own() -> None:

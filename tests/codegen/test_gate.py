@@ -21,7 +21,7 @@ from codegen.toolchain.compiler import FLAGS, compile_program, run_executable
 from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
 from language.numerics.evaluate import evaluate
-from modewright.api import program as shipped
+from modewright.api.simulation import program as shipped
 from tests.language.making import program
 
 X = Ref("x")

@@ -11,7 +11,7 @@ from language.numerics.evaluate import ELEMENTARY, Scalar, apply_function
 from language.numerics.function_table import FUNCTIONS
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.lockstep.programs import Tick, record_ticks
 
 POINTS = 20_000

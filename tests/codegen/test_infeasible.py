@@ -16,8 +16,8 @@ from codegen.proofs.infeasible.infeasible_conditions import (
     unshare_expressions,
 )
 from language.ir.program import Program
-from modewright import code
-from modewright.api import program as program_named
+from modewright.api import code_generation as code
+from modewright.api.simulation import program as program_named
 from tests.language.making import program
 from tests.lockstep.chance.kinds import spec_of
 from tests.lockstep.chance.running import record_ticks

@@ -16,7 +16,7 @@ from codegen.proofs.infeasible.invariant_terms import Number, holds
 from codegen.proofs.infeasible.symbolic_execution import SymbolicProgram
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from modewright.api import program as program_named
+from modewright.api.simulation import program as program_named
 from tests.lockstep.chance.kinds import spec_of
 from tests.lockstep.chance.running import record_ticks
 from tests.lockstep.chance.spec import Spec, program as program_of

@@ -17,7 +17,7 @@ from language.ir.program import Program
 from language.ir.traversal import block_reads, names_used, walk_ops
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import program as shipped
+from modewright.api.simulation import program as shipped
 from tests.language.making import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import record_ticks

@@ -19,7 +19,7 @@ from codegen.emit.c_expression import format_literal
 from codegen.toolchain.compiler import compile_program, run_executable
 from language.expressions.units import parse_unit
 from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
-from modewright.api import program
+from modewright.api.simulation import program
 
 COUNT = 2000
 SPECIALS = (

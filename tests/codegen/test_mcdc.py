@@ -13,8 +13,8 @@ from codegen.coverage.boundary_values import NEIGHBOUR_COUNT
 from codegen.coverage.mcdc import EXPORTER, McdcCoverage, measure_mcdc
 from codegen.emit.c_module import emit_c_files
 from language.ir.program import Program
-from modewright import code
-from modewright.cli import app
+from modewright.api import code_generation as code
+from modewright.cli.app import app
 from tests.language.making import program
 
 pytestmark = pytest.mark.skipif(

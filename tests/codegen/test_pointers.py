@@ -6,7 +6,7 @@ import pytest
 
 from codegen.emit.c_module import emit_c_files
 from codegen.proofs.acsl.assigns_contract import is_inside, required
-from modewright.api import program
+from modewright.api.simulation import program
 
 HEAD = "estimator_Self *self, const estimator_In *in, estimator_Work *work"
 

@@ -7,7 +7,7 @@ import pytest
 from codegen.emit.c_module import ENTRIES, emit_c_files, fault_reason, run_c_passes
 from codegen.emit.c_names import c_member, transition_constants
 from codegen.emit.function_comments import describe_function
-from modewright.api import program
+from modewright.api.simulation import program
 
 SHIPPED = ("estimator", "estimator_float32", "hko", "driveline", "supervisor", "contactor")
 

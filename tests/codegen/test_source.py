@@ -21,7 +21,7 @@ from language.ir.printer import digest
 from language.ir.program import Program
 from language.ir.traversal import walk_ops
 from language.loading.load import program_of
-from modewright.api import load, program
+from modewright.api.simulation import load, program
 
 GOLDEN = Path(__file__).parent / "golden"
 HEATER = GOLDEN / "heater.yaml"

@@ -12,7 +12,7 @@ from codegen.simulator.compiled_stepper import CompiledStepper
 from codegen.toolchain.compiler import flags_at_level
 from engine.interpreter.interpreter import Interpreter
 from engine.simulation.simulate import simulate
-from modewright.api import load
+from modewright.api.simulation import load
 from tests.language.making import ROOT, program
 from tests.lockstep.heater import heater
 

@@ -25,7 +25,7 @@ from language.ir.ops import (
     real,
 )
 from language.ir.program import Program, Variable
-from modewright.api import program as shipped
+from modewright.api.simulation import program as shipped
 
 A, B = Ref("work.a"), Ref("work.b")
 SET_A = Assign("work.a", real(1.0))

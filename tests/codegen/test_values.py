@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from codegen.emit.c_module import run_c_passes
 from codegen.proofs.eva import counter_limits
-from modewright.api import program
+from modewright.api.simulation import program
 
 
 def test_the_value_analysis_begins_with_any_counts() -> None:

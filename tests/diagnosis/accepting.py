@@ -9,23 +9,23 @@ from typing import Any, cast
 import numpy as np
 
 from codegen.predictor.predictor import PredictorColumns
-from diagnosis.bench import EXCLUDED_EFFECTS
-from diagnosis.candidate import Candidate
-from diagnosis.case import Case
-from diagnosis.diagnose import Diagnosis
-from diagnosis.dossier import DiagnosisReport
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import LikelihoodGain
-from diagnosis.layers import PlacedEffect, automaton_with_effects, find_placements
-from diagnosis.library import describe_effect, library_effects
-from diagnosis.naming import named_effect_of
-from diagnosis.normal import NormalEquations
-from diagnosis.point import ParameterVector, per_recording_mask
-from diagnosis.recipe import CompiledModel
-from diagnosis.search import CandidateFit
-from diagnosis.selection import Selection
-from diagnosis.uncertain import FreeParameter, free_parameters_of
-from diagnosis.verdict import Verdict
+from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import EXCLUDED_EFFECTS
+from diagnosis.estimation.normal_equations import NormalEquations
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.compile_cache import CompiledModel
+from diagnosis.model.effect_library import describe_effect, library_effects
+from diagnosis.model.parameter import FreeParameter, free_parameters_of
+from diagnosis.model.parameter_vector import ParameterVector, per_recording_mask
+from diagnosis.model.placed_effect import PlacedEffect, automaton_with_effects, find_placements
+from diagnosis.pipeline.case import Case
+from diagnosis.pipeline.diagnose import Diagnosis
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.result.effect_naming import named_effect_of
+from diagnosis.result.verdict import Verdict
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
 from language.loading.recording_map_reader import read_map
 from language.overlays.effect_reader import added_names
 from language.overlays.expand_document import Project, expand_document, read_document

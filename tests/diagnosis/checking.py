@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from diagnosis.mistakes import find_clock_and_sign_errors
-from diagnosis.recording_check import RecordingCheck, check_recordings
+from diagnosis.quality.clock_search import find_clock_and_sign_errors
+from diagnosis.quality.recording import RecordingCheck, check_recordings
 from engine.recordings.recording import Recording
 from language.overlays.expand_document import Project
-from modewright.compiled import simulate_resolved
+from modewright.runtime.compiled_run import simulate_resolved
 from tests.diagnosis.driving import (
     document,
     driveline,

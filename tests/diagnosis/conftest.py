@@ -14,9 +14,9 @@ import pytest
 
 from codegen.predictor import predictor
 from codegen.toolchain.build_cache import cache_folder
-from diagnosis import recipe
-from diagnosis.dossier import replace_non_finite
-from diagnosis.verdict import Verdict
+from diagnosis.model import compile_cache as recipe
+from diagnosis.report.diagnosis_report import replace_non_finite
+from diagnosis.result.verdict import Verdict
 from tests.language.making import ROOT
 
 SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))

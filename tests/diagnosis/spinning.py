@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.language.making import ROOT
 
 SPEC = """\

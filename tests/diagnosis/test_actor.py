@@ -6,12 +6,12 @@ import dataclasses
 
 import pytest
 
-from diagnosis.actor import attribute_causes, is_inactive
-from diagnosis.bench import ModelSet
-from diagnosis.freedom import free_disturbance
-from diagnosis.layers import shipped_effects
-from diagnosis.location import rank_causes_first
-from diagnosis.locus import Location, location_of, with_smoothed_disturbances
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.cause import attribute_causes, is_inactive
+from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
+from diagnosis.localisation.ranking import rank_causes_first
+from diagnosis.model.placed_effect import shipped_effects
 from tests.diagnosis.test_estimation import FRICTION, bench
 from tests.diagnosis.test_location import fit_first_base, with_effect
 

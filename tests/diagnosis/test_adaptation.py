@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.adaptation import reestimate_per_recording, restart_phases
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import evaluate
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.point import vector_of
-from diagnosis.prediction import measured_noise_levels
+from diagnosis.estimation.estimate import evaluate
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.per_recording import reestimate_per_recording, restart_phases
+from diagnosis.model.parameter_vector import vector_of
+from diagnosis.model.placed_effect import find_placements, shipped_effects
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

@@ -9,7 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import (
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation_by_recording
+from diagnosis.criterion.likelihood_gain import likelihood_gain
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.model.placed_effect import find_placements, read_effects
+from diagnosis.selection.bound_score import bound_score, rejects_bounds
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.unknown_input.dependence import input_dependence, standstill_dependence
+from diagnosis.validation.adequacy import (
     SMALL_GAIN,
     has_autocorrelated_residuals,
     has_autocorrelated_residuals_in_most,
@@ -18,18 +31,6 @@ from diagnosis.adequacy import (
     lacks_simulation_improvement,
     reject_effects,
 )
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.estimation import estimate_parameters
-from diagnosis.evidence import integrated_autocorrelation_by_recording, likelihood_gain
-from diagnosis.joined import burn_in_samples
-from diagnosis.layers import find_placements, read_effects
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.search import CandidateFit
-from diagnosis.selection import Selection
-from diagnosis.series import SampledRecording
-from diagnosis.stirring import input_dependence, standstill_dependence
-from diagnosis.strain import bound_score, rejects_bounds
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import fit_first_base, with_effect
 from tests.language.making import ROOT
@@ -194,5 +195,5 @@ def test_what_gained_little_has_to_show_in_simulations(
         id(selection.base): np.array([0.1, 0.2]),
         id(selection.model): loud * np.array([0.1, 0.2]),
     }
-    monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
+    monkeypatch.setattr("diagnosis.validation.adequacy.nrmse", lambda one, series: sizes[id(one)])
     assert lacks_simulation_improvement(rubbing, faint) is (part < 1.0 and loud > 0.85)

@@ -11,10 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import diagnosis.bootstrap as bootstrap
-from diagnosis.alone import OUTPUT_ERROR_THRESHOLDS
-from diagnosis.bench import ModelSet, balance_disturbances
-from diagnosis.bootstrap import (
+import diagnosis.selection.bootstrap as bootstrap
+from diagnosis.criterion.threshold import (
+    DEFAULT_THRESHOLD,
+    Thresholds,
+    format_thresholds,
+    read_thresholds,
+)
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.estimation.noise_level import fit_with_noise
+from diagnosis.model.placed_effect import (
+    PlacedEffect,
+    disturbance_effect,
+    find_placements,
+    shipped_effects,
+)
+from diagnosis.selection.bootstrap import (
     MAX_THRESHOLD,
     MIN_THRESHOLD,
     bootstrap_thresholds,
@@ -24,16 +39,11 @@ from diagnosis.bootstrap import (
     threshold_key,
     thresholds_of,
 )
-from diagnosis.estimate import Estimate
-from diagnosis.layers import PlacedEffect, disturbance_effect, find_placements, shipped_effects
-from diagnosis.level import fit_with_noise
-from diagnosis.prediction import measured_noise_levels
-from diagnosis.replicate import simulate_replicate
-from diagnosis.series import SampledRecording
-from diagnosis.threshold import DEFAULT_THRESHOLD, Thresholds, format_thresholds, read_thresholds
+from diagnosis.selection.output_error import OUTPUT_ERROR_THRESHOLDS
+from diagnosis.selection.replicate import simulate_replicate
 from language.loading.load import automaton_of
 from language.overlays.expand_document import expand_document
-from modewright.diagnoses import diagnose
+from modewright.api.diagnosis import diagnose
 from tests.language.making import ROOT, SHIPPED, document
 
 TEXT = """language: 1

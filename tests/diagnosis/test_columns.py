@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import evaluate, innovations_at, predict_with_gains_of
-from diagnosis.estimation import estimate_parameters
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.normal import NormalEquations, damped_step
-from diagnosis.point import ParameterVector, vector_of
-from diagnosis.prediction import measured_noise_levels
-from diagnosis.slopes import STEP, difference_jacobian
+from diagnosis.estimation.estimate import evaluate, innovations_at, predict_with_gains_of
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.jacobian import STEP, difference_jacobian
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.normal_equations import NormalEquations, damped_step
+from diagnosis.model.parameter_vector import ParameterVector, vector_of
+from diagnosis.model.placed_effect import find_placements, shipped_effects
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

@@ -6,14 +6,14 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.constancy import (
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.validation.parameter_constancy import (
     heterogeneity_score,
     is_lag_or_delay,
     rejects_constancy,
     simulated_heterogeneity,
 )
-from diagnosis.layers import find_placements, shipped_effects
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 from tests.diagnosis.test_needed import FRICTION, find_layer
@@ -56,7 +56,9 @@ def test_what_comes_late_alone_is_the_same_in_each_recording(
         known, placed_effect=find_layer(bench, effect), likelihood_gain=gained
     )
     for one in ("heterogeneity_score", "simulated_heterogeneity"):
-        monkeypatch.setattr(f"diagnosis.constancy.{one}", lambda *of: part * 10_000.0)
+        monkeypatch.setattr(
+            f"diagnosis.validation.parameter_constancy.{one}", lambda *of: part * 10_000.0
+        )
     assert rejects_constancy(selection.model, tried, rubbing.series, is_alone) is is_other
 
 
@@ -71,7 +73,7 @@ def test_what_an_effect_gains_beside_the_others_counts_where_that_is_more(
         known, likelihood_gain=dataclasses.replace(known.likelihood_gain, penalised=1500.0)
     )
     for one in ("heterogeneity_score", "simulated_heterogeneity"):
-        monkeypatch.setattr(f"diagnosis.constancy.{one}", lambda *of: 400.0)
+        monkeypatch.setattr(f"diagnosis.validation.parameter_constancy.{one}", lambda *of: 400.0)
     assert rejects_constancy(selection.model, tried, rubbing.series, False)
     beside = dataclasses.replace(tried, joint_gain=25_000.0)
     assert not rejects_constancy(selection.model, beside, rubbing.series, False)
@@ -107,5 +109,7 @@ def test_what_is_foreseen_and_not_shown_is_no_difference(
     """Of a friction that bends the normal equations promised 227 nats, 19 were there."""
     selection = select_effect(bench, rubbing, FRICTION)
     (known,) = selection.accepted
-    monkeypatch.setattr("diagnosis.constancy.heterogeneity_score", lambda *of: 1e6)
+    monkeypatch.setattr(
+        "diagnosis.validation.parameter_constancy.heterogeneity_score", lambda *of: 1e6
+    )
     assert not rejects_constancy(selection.model, known, rubbing.series, True)

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.description import discover_equation
-from diagnosis.excess import regression_at
-from diagnosis.formula import build_formula
-from diagnosis.layers import automaton_with_effects
-from diagnosis.level import disturbance_units
-from diagnosis.locus import Location
-from diagnosis.regression import (
+from diagnosis.equation.discovery import discover_equation
+from diagnosis.equation.effect_text import build_formula
+from diagnosis.equation.forward_regression import (
     RegressionProblem,
     TermColumns,
     build_problem,
@@ -20,7 +15,12 @@ from diagnosis.regression import (
     rank_terms,
     select_terms,
 )
-from diagnosis.term import ORDERS, LibraryTerm, Signals, generate_terms
+from diagnosis.equation.regression_problem import regression_at
+from diagnosis.equation.term_library import ORDERS, LibraryTerm, Signals, generate_terms
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units
+from diagnosis.localisation.location import Location
+from diagnosis.model.placed_effect import automaton_with_effects
 from tests.diagnosis.test_estimation import FRICTION, bench
 from tests.diagnosis.test_location import fit_first_base, with_effect
 
@@ -111,7 +111,7 @@ def test_an_order_of_a_torque_is_written_with_a_phase_for_each_recording(bench: 
 def test_a_friction_without_a_name_becomes_its_formula(
     bench: ModelSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("diagnosis.description.MAX_FITS", 1)
+    monkeypatch.setattr("diagnosis.equation.discovery.MAX_FITS", 1)
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
     base = fit_first_base(hidden)
     excess = regression_at(hidden, base, "flow", "w_em")

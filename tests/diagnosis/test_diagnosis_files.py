@@ -23,10 +23,10 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from diagnosis.dossier import verdict_to_json
-from diagnosis.shelf import FitCache, hash_of
-from diagnosis.variant import missing_effect_notes
-from modewright.diagnoses import base_of
+from diagnosis.estimation.checkpoint import FitCache, hash_of
+from diagnosis.report.diagnosis_report import verdict_to_json
+from diagnosis.report.variant_file import missing_effect_notes
+from modewright.api.diagnosis import base_of
 from tests.diagnosis.spinning import COMMAND, RIDER, SCHEMA, T_C, B, J, run_command, write_project
 
 RIG = """language: 1
@@ -77,7 +77,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
     code += "    if event == 'open' and str(about[0]).endswith('.csv'):\n"
     code += "        print('opened', about[0], file=sys.stderr, flush=True)\n"
     code += "sys.addaudithook(hook)\n"
-    code += "from modewright.cli import main; main()"
+    code += "from modewright.cli.app import main; main()"
     words = [*COMMAND, "--out", "found", "--fail-on", "effect"]
     told = subprocess.run(
         [sys.executable, "-c", code, *words],

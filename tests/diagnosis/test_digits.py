@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.digits import format_change, format_percent, format_significant, format_with_std
+from diagnosis.report.number_text import (
+    format_change,
+    format_percent,
+    format_significant,
+    format_with_std,
+)
 
 
 @pytest.mark.parametrize(

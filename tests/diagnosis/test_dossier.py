@@ -10,12 +10,13 @@ import jsonschema
 import pytest
 
 import modewright as mw
-from diagnosis import wording
-from diagnosis.dossier import usable_recordings, verdict_to_json
-from diagnosis.finding import Finding
-from diagnosis.report import report_files
-from diagnosis.wording import format_headline, format_separation
-from modewright.recordings import held_out_findings
+from diagnosis.pipeline.usable_recordings import usable_recordings
+from diagnosis.quality.finding import Finding
+from diagnosis.report import sentences as wording
+from diagnosis.report.diagnosis_report import verdict_to_json
+from diagnosis.report.page import report_files
+from diagnosis.report.sentences import format_headline, format_separation
+from modewright.api.recordings import held_out_findings
 from tests.diagnosis.spinning import SCHEMA, write_project
 
 

@@ -8,12 +8,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet, balance_disturbances
-from diagnosis.candidate import Candidate
-from diagnosis.evidence import likelihood_gain
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_base, fit_with_noise, recalibrate
-from diagnosis.series import SampledRecording, decimate
+from diagnosis.criterion.likelihood_gain import likelihood_gain
+from diagnosis.data.sampled_recording import SampledRecording, decimate
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.estimation.noise_level import (
+    disturbance_units,
+    fit_base,
+    fit_with_noise,
+    recalibrate,
+)
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.placed_effect import find_placements, shipped_effects
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from tests.language.making import ROOT

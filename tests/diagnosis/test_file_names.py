@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from diagnosis.file_names import distinguish_file_names, recording_names
+from diagnosis.data.file_names import distinguish_file_names, recording_names
 
 
 def test_bare_names_where_they_tell_all_apart() -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.diagnosis.spinning import B, J, write_project
 
 MORE = "b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}\n  T_0: {value: 1 N*m, range: [0.5, 2]}"

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from diagnosis.leftover import find_stale_files
+from diagnosis.report.stale_files import find_stale_files
 from tests.diagnosis.spinning import COMMAND, run_command, write_project
 
 VERDICT = '{"format": "modewright-verdict/1", "verdict": "effect"}'

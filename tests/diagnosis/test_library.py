@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.library import describe_effect, library_effects
-from diagnosis.signature import simulate_signature
+from diagnosis.model.effect_library import describe_effect, library_effects
+from diagnosis.model.effect_signature import simulate_signature
 from language.overlays.expand_document import expand_document, read_document
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.diagnosis.spinning import MAP, SPEC
 from tests.language.making import ROOT, SHIPPED, document, project_of
 

@@ -7,11 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate, evaluate, evaluate_near
-from diagnosis.likeness import share_operating_points
-from diagnosis.point import extend_vector
-from diagnosis.series import SampledRecording
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate, evaluate, evaluate_near, share_operating_points
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.parameter_vector import extend_vector
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
 from tests.diagnosis.test_location import fit_first_base
 

@@ -6,24 +6,24 @@ import dataclasses
 
 import pytest
 
-from diagnosis.actor import balance_of
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import integrated_autocorrelation
-from diagnosis.freedom import free_disturbance
-from diagnosis.joined import BURN_IN
-from diagnosis.layers import disturbance_effect, find_placements
-from diagnosis.level import disturbance_units, fit_base, recalibrate
-from diagnosis.location import (
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import BURN_IN
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_base, recalibrate
+from diagnosis.localisation.cause import balance_of
+from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.location import Location, location_of
+from diagnosis.localisation.location_text import NO_LOCATION, format_location
+from diagnosis.localisation.ranking import (
     ABSORBED_FRACTION,
     localise,
     rank_accepted_first,
     rank_causes_first,
     unexplained_gain,
 )
-from diagnosis.locus import Location, location_of
-from diagnosis.place_sentence import NO_LOCATION, format_location
-from diagnosis.series import SampledRecording
+from diagnosis.model.placed_effect import disturbance_effect, find_placements
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

@@ -7,8 +7,9 @@ import math
 
 import pytest
 
-from diagnosis.verdict import DecisionOutcome, Misfit, NamedEffect, Verdict
-from modewright.missed import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.report.unfollowed_signals import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.result.verdict import DecisionOutcome, NamedEffect, Verdict
+from diagnosis.validation.misfit import Misfit
 
 
 def verdict(says: DecisionOutcome, nrmse: float) -> Verdict:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from codegen.predictor.predictions import Prediction, StackedPrediction
-from diagnosis.linear import _pseudoinverse
-from diagnosis.modes import _dwell_intervals
+from diagnosis.estimation.linearisation import _pseudoinverse
+from diagnosis.estimation.operating_point import _dwell_intervals
 
 RUN = st.lists(st.integers(-1, 1), min_size=1, max_size=12).flatmap(
     lambda modes: st.tuples(st.just(modes), st.integers(0, len(modes)))

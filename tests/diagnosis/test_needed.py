@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import LikelihoodGain, likelihood_gain, subtract_gains
-from diagnosis.layers import PlacedEffect, find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.needed import AcceptedEffects, eliminate_backward, update_first_round
-from diagnosis.search import CandidateFit
-from diagnosis.threshold import DEFAULT_THRESHOLDS
+from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain, subtract_gains
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.model.placed_effect import PlacedEffect, find_placements, shipped_effects
+from diagnosis.selection.backward_elimination import (
+    AcceptedEffects,
+    eliminate_backward,
+    update_first_round,
+)
+from diagnosis.selection.candidate_search import CandidateFit
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 from tests.diagnosis.test_location import fit_first_base
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.noise import noise_of, quantum_of
+from diagnosis.data.noise_estimate import noise_of, quantum_of
 
 RNG = np.random.default_rng(3)
 

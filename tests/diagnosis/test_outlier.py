@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.finding import format_findings
+from diagnosis.quality.finding import format_findings
 from tests.diagnosis.checking import check, finding_keys
 from tests.diagnosis.driving import (
     Spoil,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from diagnosis.model.effect_folder import explain_unplaceable, load_effects
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.diagnostic import SpecError
-from modewright.own_effects import explain_unplaceable, load_effects
 
 EFFECT = """language: 1
 effect: {name}

@@ -6,19 +6,19 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import LikelihoodGain, likelihood_gain
-from diagnosis.form import choose_form
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.plainer import (
+from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.nested_form import (
     RESTRICTED_LEAD,
     accepts_restriction,
+    choose_form,
     promote_restricted,
     restricted_candidates,
 )
-from diagnosis.search import CandidateFit
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import fit_first_base, with_effect
 from tests.diagnosis.test_needed import find_layer

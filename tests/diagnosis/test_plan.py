@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.bench import ModelSet
-from diagnosis.layers import find_placements
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.manoeuvre import manoeuvres_for
-from diagnosis.plan import MIN_LOG_BAYES_FACTOR, plan_experiment
-from diagnosis.plan_picture import draw_experiment
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.experiment.discrimination import MIN_LOG_BAYES_FACTOR, plan_experiment
+from diagnosis.experiment.manoeuvre import manoeuvres_for
+from diagnosis.model.placed_effect import find_placements
+from diagnosis.report.figures import draw_experiment
 from tests.diagnosis.test_estimation import FRICTION, bench
 from tests.diagnosis.test_location import fit_first_base, with_effect
 

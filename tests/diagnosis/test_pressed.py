@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.judgement import _rejection_reason
-from diagnosis.point import ParameterVector, bounds_of, vector_of
-from diagnosis.pressed import (
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.parameter_vector import ParameterVector, bounds_of, vector_of
+from diagnosis.pipeline.decision import _rejection_reason
+from diagnosis.selection.active_bound import (
     active_bound_locations,
     has_opposing_active_bound,
     release_active_bounds,
 )
-from diagnosis.screening import ScreeningResult
-from diagnosis.search import ENTRY_THRESHOLD, MAX_RELEASED_FITS, _FitBudget
+from diagnosis.selection.candidate_search import ENTRY_THRESHOLD, MAX_RELEASED_FITS, _FitBudget
+from diagnosis.selection.screening import ScreeningResult
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_needed import FRICTION, find_layer

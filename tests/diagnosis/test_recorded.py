@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from diagnosis.free_run import FreeRun, simulate_free_run
+from diagnosis.quality.free_run import FreeRun, simulate_free_run
 from engine.recordings.recording import read_recording, split_by_windows
 from language.loading.load import automaton_of, command_line_value
 from language.loading.recording_map_reader import read_map

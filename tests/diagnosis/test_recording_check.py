@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.consistency import OutputAgreement, compare_signals
-from diagnosis.disagreement import agrees_with_other_outputs
-from diagnosis.finding import Finding, format_findings
-from diagnosis.free_run import OutputComparison
-from diagnosis.needs import EFFECT_NEEDS, NEED_DESCRIPTIONS
-from diagnosis.recording_check import check_recordings
+from diagnosis.quality.excitation import EFFECT_NEEDS, NEED_DESCRIPTIONS
+from diagnosis.quality.finding import Finding, format_findings
+from diagnosis.quality.free_run import OutputComparison
+from diagnosis.quality.model_agreement import OutputAgreement, compare_signals
+from diagnosis.quality.recording import check_recordings
+from diagnosis.quality.unit_sign_clock import agrees_with_other_outputs
 from language.overlays.expand_document import Project
 from tests.diagnosis.checking import check, finding_keys
 from tests.diagnosis.driving import (

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.evidence import LikelihoodGain
-from diagnosis.rival import (
+from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.confusion_set import (
     CONFUSION_FRACTION,
     CONFUSION_GAIN,
     confusion_set,
     is_confusable,
     near_best,
 )
-from diagnosis.search import CandidateFit
 from language.overlays.expand_document import Project
 from tests.diagnosis.accepting import acceptable_layers, make_dossier
 

@@ -6,12 +6,12 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.room import disturbance_gain, further_gain_bound, meets_stopping_rule
-from diagnosis.selection import select_effects
-from diagnosis.threshold import DEFAULT_THRESHOLD
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.selection.forward_selection import select_effects
+from diagnosis.selection.stopping import disturbance_gain, further_gain_bound, meets_stopping_rule
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import fit_first_base
@@ -65,7 +65,7 @@ def test_no_further_effect_is_looked_for_where_there_is_no_room(
     assert [one.placed_effect.effect.name for one in found.accepted] == ["coulomb_friction"]
     assert any("no further effect is looked for" in text for text in told)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("diagnosis.selection.meets_stopping_rule", lambda *_: False)
+        patch.setattr("diagnosis.selection.forward_selection.meets_stopping_rule", lambda *_: False)
         again = select_effects(own, base, units)
     assert [one.placed_effect.id for one in again.accepted] == [
         one.placed_effect.id for one in found.accepted

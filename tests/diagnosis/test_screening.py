@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from diagnosis import screening
-from diagnosis.bench import ModelSet
-from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, evaluate
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_base
-from diagnosis.point import ParameterVector, extend_vector, values_at
-from diagnosis.screening import (
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_base
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter_vector import ParameterVector, extend_vector, values_at
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.selection import screening
+from diagnosis.selection.screening import (
     MAX_SCREENED,
     MIN_BEST_FRACTION,
     MIN_SCREENING_GAIN,

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import pytest
 
-from diagnosis.alone import OUTPUT_ERROR_SCREENING_FRACTION
-from diagnosis.bench import ModelSet
-from diagnosis.evidence import LikelihoodGain
-from diagnosis.screening import ScreeningResult
-from diagnosis.search import MAX_FITS, CandidateFit, search_candidates
-from diagnosis.selection import MAX_EFFECTS, SCREENING_FRACTION, select_effects
-from diagnosis.threshold import DEFAULT_THRESHOLD
+from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.selection.candidate_search import MAX_FITS, CandidateFit, search_candidates
+from diagnosis.selection.forward_selection import MAX_EFFECTS, SCREENING_FRACTION, select_effects
+from diagnosis.selection.output_error import OUTPUT_ERROR_SCREENING_FRACTION
+from diagnosis.selection.screening import ScreeningResult
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import fit_first_base
@@ -31,7 +31,9 @@ def test_what_some_recordings_alone_promise_takes_no_turn_of_a_fit(
     friction = select_effect(bench, rubbing, FRICTION)
     unseen = [ScreeningResult(find_layer(bench, DRAG), 1e6)] * MAX_FITS
     seen = ScreeningResult(find_layer(bench, FRICTION), 1e3, friction.model)
-    monkeypatch.setattr("diagnosis.search.screen_candidates", lambda *_: [*unseen, seen])
+    monkeypatch.setattr(
+        "diagnosis.selection.candidate_search.screen_candidates", lambda *_: [*unseen, seen]
+    )
     found = search_candidates(rubbing, friction.base, {}, [])
     assert [one.placed_effect.id for one in found if one.likelihood_gain] == [FRICTION]
     assert len(found) == MAX_FITS + 1
@@ -52,17 +54,25 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
     def many(_: object, accepted: Sequence[CandidateFit]) -> bool:
         return len(accepted) >= strained
 
-    monkeypatch.setattr("diagnosis.selection.search_candidates", found)
+    monkeypatch.setattr("diagnosis.selection.forward_selection.search_candidates", found)
     monkeypatch.setattr(
-        "diagnosis.selection.rescreen_after_refit", lambda _, m, u, tried, *__: (None, tried)
+        "diagnosis.selection.forward_selection.rescreen_after_refit",
+        lambda _, m, u, tried, *__: (None, tried),
     )
-    monkeypatch.setattr("diagnosis.selection.choose_form", lambda _, m, u, best, tried: best)
     monkeypatch.setattr(
-        "diagnosis.selection.exchange_effects", lambda _, m, before, *__: (before, m)
+        "diagnosis.selection.forward_selection.choose_form", lambda _, m, u, best, tried: best
     )
-    monkeypatch.setattr("diagnosis.selection.meets_stopping_rule", lambda *_: False)
-    monkeypatch.setattr("diagnosis.selection.eliminate_backward", lambda _, kept, *__: kept)
-    monkeypatch.setattr("diagnosis.selection.rejects_bounds", many)
+    monkeypatch.setattr(
+        "diagnosis.selection.forward_selection.exchange_effects",
+        lambda _, m, before, *__: (before, m),
+    )
+    monkeypatch.setattr(
+        "diagnosis.selection.forward_selection.meets_stopping_rule", lambda *_: False
+    )
+    monkeypatch.setattr(
+        "diagnosis.selection.forward_selection.eliminate_backward", lambda _, kept, *__: kept
+    )
+    monkeypatch.setattr("diagnosis.selection.forward_selection.rejects_bounds", many)
     accepted = select_effects(rubbing, fit_first_base(rubbing), {}).accepted
     assert len(accepted) == (MAX_EFFECTS - 1 if strained == MAX_EFFECTS else MAX_EFFECTS)
 
@@ -84,7 +94,7 @@ def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
         asked.append(given[WORTH])
         return []
 
-    monkeypatch.setattr("diagnosis.selection.search_candidates", found)
+    monkeypatch.setattr("diagnosis.selection.forward_selection.search_candidates", found)
     selection = select_effects(rubbing, fit_first_base(rubbing), {}, screening_fraction=hope)
     assert not selection.accepted
     assert asked == [pytest.approx(least)]

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.candidate import compile_candidate
-from diagnosis.case import Case, read_series
-from diagnosis.series import has_feedthrough
+from diagnosis.data.sampled_recording import has_feedthrough
+from diagnosis.model.candidate import compile_candidate
+from diagnosis.pipeline.case import Case, read_series
 from engine.recordings.recording_window import overlap
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.evidence import LikelihoodGain
-from diagnosis.share import (
+from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from diagnosis.criterion.recording_support import (
     OPPOSED_FACTOR,
     SINGLE_RECORDING_FACTOR,
     discount_unsupported,
     supported_gain,
 )
-from diagnosis.threshold import DEFAULT_THRESHOLD
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
 
 
 @pytest.mark.parametrize(

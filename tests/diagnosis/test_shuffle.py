@@ -8,21 +8,21 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis import level
-from diagnosis.bench import ModelSet, balance_disturbances
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import likelihood_gain
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.level import disturbance_units, fit_base, recalibrate
-from diagnosis.series import SampledRecording
-from diagnosis.shuffle import (
+from diagnosis.criterion.likelihood_gain import likelihood_gain
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation import noise_level as level
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.estimation.noise_level import disturbance_units, fit_base, recalibrate
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.report.figures import draw_oscillation
+from diagnosis.validation.oscillation import (
     Cycles,
     Oscillation,
     _find_cycles,
     _remove_moving_mean,
     analyse_oscillation,
 )
-from diagnosis.shuffle_picture import draw_oscillation
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document
 from language.text.diagnostic import Source

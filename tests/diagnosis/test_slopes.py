@@ -7,18 +7,18 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import evaluate, predict_with_gains_of, with_normal_equations
-from diagnosis.layers import (
+from diagnosis.estimation.estimate import evaluate, predict_with_gains_of, with_normal_equations
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.jacobian import broyden_update
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.normal_equations import predicted_gain
+from diagnosis.model.parameter_vector import ParameterVector, vector_of
+from diagnosis.model.placed_effect import (
     automaton_with_effects,
     find_placements,
     minimum_substeps,
     shipped_effects,
 )
-from diagnosis.normal import predicted_gain
-from diagnosis.point import ParameterVector, vector_of
-from diagnosis.prediction import measured_noise_levels
-from diagnosis.slopes import broyden_update
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

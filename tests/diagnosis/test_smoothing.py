@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 from filterpy.kalman import KalmanFilter, rts_smoother
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import evaluate
-from diagnosis.joined import burn_in_samples
-from diagnosis.level import disturbance_units
-from diagnosis.point import vector_of
-from diagnosis.prediction import measured_noise_levels
-from diagnosis.smoothing import SmootherInput, smooth_deviations, smooth_states
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import evaluate
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units
+from diagnosis.localisation.smoother import SmootherInput, smooth_deviations, smooth_states
+from diagnosis.model.parameter_vector import vector_of
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from codegen.predictor.predictor import Predictor
-from diagnosis.candidate import compile_candidate
+from diagnosis.model.candidate import compile_candidate
 from language.overlays.expand_document import Project, expand_document, read_document
 
 RNG = np.random.default_rng(5)

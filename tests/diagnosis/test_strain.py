@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.estimate import Estimate
-from diagnosis.evidence import LikelihoodGain
-from diagnosis.judgement import _rejection_reason
-from diagnosis.point import ParameterVector, bounds_of
-from diagnosis.search import CandidateFit
-from diagnosis.strain import is_at_bound, prefer_interior
+from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.parameter_vector import ParameterVector, bounds_of
+from diagnosis.pipeline.decision import _rejection_reason
+from diagnosis.selection.bound_score import is_at_bound, prefer_interior
+from diagnosis.selection.candidate_search import CandidateFit
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_needed import FRICTION, find_layer
@@ -109,7 +109,7 @@ def test_beside_a_hidden_input_what_is_left_does_not_count(
     bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, rule: str, why: str
 ) -> None:
     """It takes up anything at all: its own form is never quite right."""
-    monkeypatch.setattr(f"diagnosis.judgement.{rule}", lambda *of: True)
+    monkeypatch.setattr(f"diagnosis.pipeline.decision.{rule}", lambda *of: True)
     alone = select_effect(bench, rubbing, FRICTION)
     assert _rejection_reason(alone, rubbing) == why
     hidden = CandidateFit(

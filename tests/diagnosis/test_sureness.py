@@ -6,12 +6,12 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.constancy import has_varying_parameters, heterogeneity_score
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.search import CandidateFit
-from diagnosis.selection import Selection
-from diagnosis.sureness import PROBABILITY_CAP, cap_probability
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.validation.confidence_cap import PROBABILITY_CAP, cap_probability
+from diagnosis.validation.parameter_constancy import has_varying_parameters, heterogeneity_score
 from tests.diagnosis.test_adequacy import rubbing, select_effect
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 from tests.diagnosis.test_needed import FRICTION, find_layer

@@ -6,11 +6,11 @@ import dataclasses
 
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.evidence import LikelihoodGain, likelihood_gain
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.search import CandidateFit
-from diagnosis.swap import exchange_effects
+from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.exchange import exchange_effects
 from tests.diagnosis.test_estimation import TRUTH, bench, simulate_recordings
 from tests.diagnosis.test_location import fit_first_base
 from tests.diagnosis.test_needed import FRICTION, STARTS, find_layer

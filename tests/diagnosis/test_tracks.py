@@ -13,11 +13,11 @@ from codegen.predictor import predictor as predictor_module
 from codegen.predictor.predictions import Prediction, StackedRecordings
 from codegen.predictor.predictor import Predictor, columns_of, slice_to_outputs
 from codegen.predictor.simd_recordings import simd_recordings_context
-from diagnosis import recipe
-from diagnosis.bench import ModelSet, balance_disturbances
-from diagnosis.candidate import Candidate
-from diagnosis.layers import find_placements, shipped_effects
-from diagnosis.series import SampledRecording
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.model import compile_cache as recipe
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.placed_effect import find_placements, shipped_effects
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from tests.diagnosis.conftest import SOON

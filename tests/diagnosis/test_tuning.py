@@ -7,13 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.bench import ModelSet
-from diagnosis.candidate import Candidate
-from diagnosis.estimate import Estimate, evaluate
-from diagnosis.estimation import iterate_broyden
-from diagnosis.level import disturbance_units, fit_with_noise
-from diagnosis.point import ParameterVector
-from diagnosis.prediction import (
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.innovations import (
     INPUT_NOISE_NAME,
     OUTPUT_NOISE_NAME,
     PROCESS_NOISE_NAME,
@@ -21,9 +17,18 @@ from diagnosis.prediction import (
     measured_noise_levels,
     noise_levels_at,
 )
-from diagnosis.series import SampledRecording
-from diagnosis.tuning import MAX_LEVEL, MAX_NOISE_RATIO, MIN_LEVEL, fit_noise_covariance
-from diagnosis.uncertain import FreeParameter
+from diagnosis.estimation.levenberg_marquardt import iterate_broyden
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_covariance import (
+    MAX_LEVEL,
+    MAX_NOISE_RATIO,
+    MIN_LEVEL,
+    fit_noise_covariance,
+)
+from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter import FreeParameter
+from diagnosis.model.parameter_vector import ParameterVector
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, simulate_recordings
 
 __all__ = ["bench"]

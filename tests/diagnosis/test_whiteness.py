@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from diagnosis.whiteness import ljung_box
+from diagnosis.validation.whiteness import ljung_box
 
 PERIOD = 0.005
 

@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 
 import modewright as mw
+from diagnosis.pipeline.usable_recordings import (
+    MAX_SAMPLES,
+    MAX_VALUE,
+    MIN_SAMPLES,
+    LazyRecordings,
+    unusable_reason,
+)
 from engine.recordings.recording import Channel, Recording
 from language.model.system import ColumnMapping
-from modewright.workable import MAX_SAMPLES, MAX_VALUE, MIN_SAMPLES, LazyRecordings, unusable_reason
 from tests.diagnosis.driving import read_recording_map
 
 COLUMNS = read_recording_map().columns

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
-from diagnosis.layers import PlacedEffect
-from diagnosis.naming import quantities_of
-from diagnosis.variant import format_variant, variant_name
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.model.placed_effect import PlacedEffect
+from diagnosis.report.variant_file import format_variant, variant_name
 from language.overlays.expand_document import Project
 from tests.diagnosis.accepting import BASE, make_dossier
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from language.text.diagnostic import SpecError
 from language.text.project_files import parse_document, source_of
-from modewright.cli import app
-from modewright.editing.difference import SpecChange, diff_documents
-from modewright.editing.show_difference import diff_html
+from modewright.cli.app import app
+from modewright.editing.spec_diff.difference import SpecChange, diff_documents
+from modewright.editing.spec_diff.rendering import diff_html
 
 BASE = """\
 language: 1

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from language.overlays.expand_document import parse_document
 from language.text.diagnostic import SpecError
 from language.text.project_files import source_of
-from modewright.cli import app
-from modewright.editing.format import format_text
-from modewright.editing.page import tokenise
-from modewright.files import OutputError
+from modewright.cli.app import app
+from modewright.editing.formatter import format_text
+from modewright.editing.tokenised_text import tokenise
+from modewright.runtime.output_files import OutputError
 from tests.editing.corpus import ROOT, to_plain_data, valid_documents
 
 HERE = Path(__file__).parent
@@ -132,7 +132,7 @@ def test_what_cannot_be_written_is_not_told_as_changed(
         os.close(descriptor)
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("modewright.files.os.fdopen", full)
+    monkeypatch.setattr("modewright.runtime.output_files.os.fdopen", full)
     told = CliRunner().invoke(app, ["format", str(path)])
     assert isinstance(told.exception, OutputError) and told.stdout == ""
     assert path.read_text() == UNTIDY and list(tmp_path.iterdir()) == [path]

@@ -22,9 +22,9 @@ from language.reading.reader import Reader
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import Document, MappingNode, YamlNode
 from language.text.project_files import DOCUMENT_KINDS
-from modewright.editing.guide import places
-from modewright.editing.schema import json_schema, schema_text
-from modewright.editing.shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes
+from modewright.editing.json_schema import json_schema, schema_text
+from modewright.editing.key_shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes
+from modewright.editing.node_kinds import places
 from sweep.definition.study_reader import read_study
 from tests.editing.corpus import ROOT, to_plain_data, valid_documents
 

@@ -16,7 +16,7 @@ from engine.batch.batch import Batch, InputTable, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatch, run_compiled_batch
 from engine.batch.interpreted_batch import run_interpreted_batch
 from language.model.system import Scenario, System
-from modewright.api import load
+from modewright.api.simulation import load
 from tests.engine.test_planned import DRIVELINES, assert_same_batch, compile_unoptimised, load_drive
 from tests.language.making import ROOT
 

@@ -15,7 +15,7 @@ from engine.batch.interpreted_batch import run_interpreted_batch
 from engine.batch.parameter_binding import bind_parameters
 from engine.simulation.simulate import simulate
 from language.model.system import Scenario, StimulusPiece
-from modewright.api import load
+from modewright.api.simulation import load
 
 RULES = Path(__file__).parent.parent / "rules"
 HORIZON = Fraction(3, 20)

@@ -20,7 +20,7 @@ from engine.interpreter.interpreter import Interpreter
 from engine.results.trajectory import Trajectory
 from engine.simulation.instance_programs import programs_of
 from engine.simulation.simulate import simulate
-from modewright.api import Loaded, load
+from modewright.api.simulation import Loaded, load
 from tests.language.making import project_of
 
 QUICK = flags_at_level("O0")

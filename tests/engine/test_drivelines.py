@@ -14,7 +14,7 @@ from engine.reference.scipy_reference import simulate_with_scipy
 from engine.reference.scipy_stepper import ScipyMethod
 from engine.simulation.simulate import simulate
 from language.model.system import Instance, Scenario, System
-from modewright.api import load
+from modewright.api.simulation import load
 from tests.language.making import ROOT
 
 SPECS = ROOT / "tests/data/specs/drivelines"

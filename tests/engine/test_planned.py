@@ -24,8 +24,8 @@ from engine.simulation.instance_programs import programs_of
 from engine.simulation.simulate import simulate
 from language.model.system import Scenario, ScheduledCalibration, StimulusPiece, System
 from language.programs.simulation_assembly import SimulationAssembly
-from modewright.api import load
-from modewright.compiled import run_batch, run_simulation
+from modewright.api.simulation import load
+from modewright.runtime.compiled_run import run_batch, run_simulation
 from tests.language.making import ROOT
 
 DRIVELINES = ROOT / "tests/data/specs/drivelines"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from modewright.api import load
+from modewright.api.simulation import load
 
 PLANT = Path(__file__).parent.parent.parent / "spec" / "ev_driveline" / "plant.yaml"
 

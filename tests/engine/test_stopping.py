@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import modewright as mw
-from modewright.cli import app
-from modewright.exits import PROBLEMS
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import PROBLEMS
 from tests.engine.runaway import RUNAWAY
 from tests.language.making import project_of
 

@@ -10,7 +10,7 @@ import pytest
 
 from codegen.exchange.calibration.encoding import MAX_BYTES
 from language.text.diagnostic import SpecError
-from modewright.calibrations import export_calibration, import_calibration
+from modewright.api.calibrations import export_calibration, import_calibration
 from tests.exchange.tuned import run_command, write_project
 
 DAMAGED = 100

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from modewright.calibrations import import_calibration
+from modewright.api.calibrations import import_calibration
 from tests.exchange.tuned import replace_line, run_command, write_project
 
 

@@ -15,8 +15,8 @@ from codegen.exchange.calibration.formats import read_page
 from codegen.toolchain.compiler import compile_program, flags_at_level
 from language.ir.number_type import round_to_type
 from language.text.diagnostic import Problems
-from modewright.api import program
-from modewright.calibrations import export_calibration, import_calibration, resolve_calibration
+from modewright.api.calibrations import export_calibration, import_calibration, resolve_calibration
+from modewright.api.simulation import program
 from tests.exchange.tuned import replace_line, run_command, write_project
 
 MAIN = """#include "{name}.h"

@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from codegen.exchange.calibration.formats import FORMATS
 from language.ir.number_type import NumberType, round_to_type, shortest_decimal
 from language.ir.program import unqualified_name
-from modewright.calibrations import CalibrationPage, export_calibration, import_calibration
+from modewright.api.calibrations import CalibrationPage, export_calibration, import_calibration
 from tests.exchange.tuned import NUMBERS, constant_bits, write_project
 
 FORMS = st.sampled_from(sorted(FORMATS))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from modewright.calibrations import ImportedPage, import_calibration
+from modewright.api.calibrations import ImportedPage, import_calibration
 from tests.exchange.tuned import write_project
 
 TOOLS = Path(__file__).parent / "tools"

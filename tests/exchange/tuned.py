@@ -8,9 +8,9 @@ from pathlib import Path
 
 from language.ir.number_type import NumberType
 from language.ir.program import Constant
-from modewright.calibrations import CalibrationPage
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api.calibrations import CalibrationPage
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 KINDS = """language: 1
 automaton: kinds_{number}

@@ -11,7 +11,7 @@ from pathlib import Path
 from engine.simulation.simulate import simulate
 from expectation.evaluate_expectations import Outcome, evaluate_test
 from expectation.expectations import Test
-from modewright.tests import load_test
+from modewright.api.spec_tests import load_test
 
 AUTOMATON = """\
 language: 1

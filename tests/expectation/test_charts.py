@@ -15,9 +15,9 @@ from expectation.evaluate_expectations import evaluate_test
 from expectation.expectations import Test
 from language.ir.ops import Store
 from language.ir.traversal import walk_ops
-from modewright import tests
-from modewright.covered import coverage_diagram
-from modewright.diagram import ModeBox
+from modewright.api import spec_tests as tests
+from modewright.api.test_coverage import coverage_diagram
+from modewright.diagram.boxes import ModeBox
 
 CHART = """\
 language: 1

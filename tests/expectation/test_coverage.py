@@ -23,10 +23,10 @@ from language.ir.ops import Store
 from language.ir.traversal import walk_ops
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
-from modewright import tests
-from modewright.cli import app
-from modewright.covered import coverage_diagram
-from modewright.diagram_svg import SHADE_COLOURS
+from modewright.api import spec_tests as tests
+from modewright.api.test_coverage import coverage_diagram
+from modewright.cli.app import app
+from modewright.diagram.svg import SHADE_COLOURS
 from tests.expectation.latching import AUTOMATON, HEAD, write_project
 
 ROOT = Path(__file__).parent.parent.parent

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modewright import tests
+from modewright.api import spec_tests as tests
 
 CHARGER = Path(__file__).parent.parent / "data" / "charts" / "charger.yaml"
 HEAD = """\

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
-from modewright.traces import KeyTraceReport, trace_keys
+from modewright.api.traces import KeyTraceReport, trace_keys
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.language.making import ROOT
 
 

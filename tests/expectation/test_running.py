@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 import modewright as mw
 from engine.simulation.simulate import simulate
-from modewright import show_tests, tests
-from modewright.cli import app
+from modewright.api import spec_tests as tests
+from modewright.cli.app import app
+from modewright.render import spec_tests as show_tests
 from tests.expectation.latching import write_project
 
 SHIPPED = Path(__file__).parent.parent.parent

@@ -11,9 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from expectation.requirement_trace import RequirementTrace
-from modewright import show_trace, traces
-from modewright.cli import app
-from modewright.tests import load_test
+from modewright.api import traces
+from modewright.api.spec_tests import load_test
+from modewright.cli.app import app
+from modewright.render import trace as show_trace
 from tests.expectation.latching import AUTOMATON, HEAD, write_project
 
 REQUIRED = (

@@ -12,7 +12,7 @@ import pytest
 from codegen.exchange.fmi.archive import build_fmu
 from codegen.exchange.fmi.variable import VERSIONS, Version
 from lockstep.tick_log import TickLog
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.fmi.importer import Importer, UnpackedFmu, unpack_fmu
 from tests.target.closed_loop import record_driveline, record_supervisor
 

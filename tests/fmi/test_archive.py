@@ -17,7 +17,7 @@ from codegen.exchange.fmi.archive import binary_path, build_fmu
 from codegen.exchange.fmi.content import HEADERS, emit_fmu_files, read_headers
 from codegen.exchange.fmi.variable import Version
 from codegen.toolchain.compiler import FLAGS, WARNINGS, BuildError
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.fmi.conftest import Ready
 
 MAIN = """

@@ -18,7 +18,7 @@ from engine.interpreter.apply_calibration import calibrate
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from lockstep.tick_log import TickLog
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.codegen.waiting import waiting_automaton
 from tests.fmi.conftest import Ready
 from tests.fmi.importer import Importer, UnpackedFmu, count_differences, inputs_of, unpack_fmu

@@ -10,8 +10,8 @@ import pytest
 
 import modewright as mw
 from codegen.exchange.fmi.archive import binary_path
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:

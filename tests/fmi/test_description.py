@@ -19,7 +19,7 @@ from codegen.exchange.fmi.archive import build_fmu
 from codegen.exchange.fmi.content import HEADERS, emit_fmu_files
 from codegen.exchange.fmi.unit import unit_definitions, unit_name
 from codegen.exchange.fmi.variable import Version
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.fmi.importer import Importer, unpack_fmu
 
 SHIPPED = ("estimator", "estimator_float32", "supervisor", "contactor", "driveline")

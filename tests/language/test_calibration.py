@@ -10,7 +10,7 @@ import modewright as mw
 from language.loading.load import load_automaton
 from language.loading.system_reader import read_system
 from language.overlays.expand_document import Project, read_document
-from modewright import explaining
+from modewright.api import explaining
 from tests.language.making import problem_lines, project_of
 
 FIT = """language: 1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from modewright.checking import spec_files
+from modewright.api.checking import spec_files
 
 ROOT = Path(__file__).parent.parent.parent
 HEAD = """language: 1

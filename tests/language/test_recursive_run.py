@@ -12,7 +12,7 @@ from engine.interpreter.interpreter import Interpreter
 from language.ir.ops import Block, Branch, Compare, Loop, Ref, RunBlock, Value
 from language.ir.traversal import walk_ops
 from lockstep.comparison import compare
-from modewright.api import program as shipped_program
+from modewright.api.simulation import program as shipped_program
 from tests.language.making import problem_lines, program, project_of
 from tests.language.test_recursive import CONSTANT, SPEC, make_program
 from tests.lockstep.programs import record_ticks

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from language.ir.program import Program
 from lockstep.tick_log import TickLog
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.lockstep.programs import Tick, record_ticks
 
 SPEC = Path(__file__).parents[1] / "codegen" / "golden" / "heater.yaml"

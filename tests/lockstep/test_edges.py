@@ -10,7 +10,7 @@ import pytest
 
 from language.ir.program import Program
 from lockstep.comparison import Verdict, compare
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick, record_ticks
 

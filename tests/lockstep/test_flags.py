@@ -27,7 +27,7 @@ from language.loading.system_reader import with_number_type
 from lockstep import tick_log as taping
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import load, program
+from modewright.api.simulation import load, program
 from tests.lockstep.programs import record_ticks
 
 LEVELS = ("-O0", "-O2", "-O3", "-Os", "-O3 -march=native")

@@ -19,10 +19,10 @@ from codegen.emit.c_module import emit_c_files
 from codegen.harness.harness import tick_inputs
 from language.ir.program import Program, unqualified_name
 from lockstep.fuzzing import fuzz
-from modewright import code
-from modewright.api import program
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api import code_generation as code
+from modewright.api.simulation import program
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 needs_fuzzer = pytest.mark.skipif(
     not shutil.which(FUZZER_COMPILER), reason="no clang-19: make system-packages"

@@ -16,7 +16,7 @@ from language.loading.system_reader import with_number_type
 from language.text.diagnostic import SpecError
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog, record_ticks
-from modewright.api import load, lockstep
+from modewright.api.simulation import load, lockstep
 from tests.lockstep.heater import column
 
 ROOT = Path(__file__).parent / "tuned"

@@ -11,7 +11,7 @@ from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NumberType, round_to_type
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick
 

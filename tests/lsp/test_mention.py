@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from language.text.diagnostic import MissingToolError
-from modewright.commands.lsp import lsp
-from modewright.lsp.mention import references_to
-from modewright.lsp.namespace import load_symbol_table
-from modewright.lsp.world import Workspace
+from modewright.cli.commands.lsp import lsp
+from modewright.lsp.reference import references_to
+from modewright.lsp.symbol_table import load_symbol_table
+from modewright.lsp.workspace import Workspace
 
 SPECS = {
     "contactor": """\

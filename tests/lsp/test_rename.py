@@ -9,11 +9,11 @@ import pytest
 from lsprotocol import types
 
 import modewright as mw
-from modewright.lsp.mention import Reference, references_to
-from modewright.lsp.namespace import Symbol
+from modewright.lsp.reference import Reference, references_to
 from modewright.lsp.rename import rename
-from modewright.lsp.renamed import RenameRefused
-from modewright.lsp.world import Workspace
+from modewright.lsp.rename_check import RenameRefused
+from modewright.lsp.symbol_table import Symbol
+from modewright.lsp.workspace import Workspace
 from tests.lsp.heating import apply_edits, position_of
 from tests.lsp.talk import LspClient
 
@@ -286,7 +286,7 @@ def test_a_rename_that_leaves_an_old_name_behind_is_refused(
         return [each for each in references_to(world, declared) if each.path[0] != "tables"]
 
     monkeypatch.setattr("modewright.lsp.rename.references_to", without_tables)
-    monkeypatch.setattr("modewright.lsp.renamed.references_to", without_tables)
+    monkeypatch.setattr("modewright.lsp.rename_check.references_to", without_tables)
     line, column = position_of(DEEP, "x: {unit")
     world = Workspace(deep.parent.parent)
     with pytest.raises(RenameRefused, match=r"not followed: .*deep.yaml:9:"):

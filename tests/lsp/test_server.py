@@ -9,12 +9,12 @@ import pytest
 from lsprotocol import types
 
 from language.text.diagnostic import Source, Span
-from modewright.lsp import problems
+from modewright.lsp import diagnostics as problems
 from modewright.lsp.completion import complete
 from modewright.lsp.hover import hover as hover_at
 from modewright.lsp.positions import column_of, range_of
 from modewright.lsp.rename import definition
-from modewright.lsp.world import Workspace
+from modewright.lsp.workspace import Workspace
 from tests.lsp.heating import HEATER, ROOT, apply_edits, completion_labels, hover, position_of
 from tests.lsp.talk import LspClient
 

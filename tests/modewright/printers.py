@@ -16,8 +16,8 @@ from engine.results.plot import Panel, PlotLine, draw_picture
 from engine.results.trajectory import Trajectory
 from language.overlays.expand_document import parse_document
 from language.text.diagnostic import Problem, Source, Span, render_problem
-from modewright.checking import problem_json
-from modewright.diagram import diagram_of
+from modewright.api.checking import problem_json
+from modewright.diagram.diagram import diagram_of
 
 HOSTILE: Mapping[str, str] = {
     "end of comment": "*/ int evil = 1; /* // /*/ */*/",

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from language.text.diagnostic import Problem, Source, Span
-from modewright.annotations import annotation_lines
-from modewright.sarif import to_sarif
+from modewright.render.github_annotations import annotation_lines
+from modewright.render.sarif import to_sarif
 
 ROOT = Path(__file__).parent.parent.parent
 SPOILED = """language: 1
@@ -27,7 +27,9 @@ HEAVY = ("numpy", "scipy", "matplotlib", "jinja2", "filterpy", "z3")
 
 def test_check_loads_neither_numerics_nor_generator() -> None:
     code = "import sys; sys.argv = ['modewright', 'check', 'tip_out', '--json']\n"
-    code += "from modewright.cli import main\ntry: main()\nexcept SystemExit as e: code = e.code\n"
+    code += (
+        "from modewright.cli.app import main\ntry: main()\nexcept SystemExit as e: code = e.code\n"
+    )
     code += f"print([name for name in {HEAVY} if name in sys.modules], code)"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True

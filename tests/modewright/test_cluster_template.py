@@ -12,7 +12,7 @@ import pytest
 ASKED = """
 import os
 import modewright
-from modewright.studies import TEMPLATE_MODULE
+from modewright.api.studies import TEMPLATE_MODULE
 from sweep import fork_server
 
 def main():
@@ -21,7 +21,7 @@ def main():
     assert environment == dict(os.environ), "its environment is not ours"
     from sweep.execution.dask_address import Address, Credentials
     from sweep.execution.dask_client import WorkerSetup, open_client
-    staff = WorkerSetup(modewright.cluster_worker.own_fingerprint)
+    staff = WorkerSetup(modewright.workers.dask_worker.own_fingerprint)
     with open_client(Address(count=2), Credentials(), staff) as client:
         told = client.run(lambda: (os.getppid(), "engine.batch.compiled_batch" in sys.modules))
     parents, loaded = zip(*told.values())
@@ -29,7 +29,7 @@ def main():
 
 if __name__ == "__main__":
     import sys
-    import modewright.cluster_worker
+    import modewright.workers.dask_worker
     main()
 """
 

@@ -12,8 +12,8 @@ import pytest
 import typer
 
 import modewright as mw
-from modewright.cli import COMMANDS, app, build_application
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import COMMANDS, app, build_application
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 HEAVY = ("scipy", "matplotlib", "numpy", "networkx", "pint", "lark", "jinja2", "rich.console")
@@ -37,7 +37,7 @@ def run(*arguments: str) -> int:
 
 def test_help_loads_no_heavy_module() -> None:
     code = "import sys; sys.argv = ['modewright', '--help']\n"
-    code += "from modewright.cli import main\n"
+    code += "from modewright.cli.app import main\n"
     code += "try: main()\nexcept SystemExit: print(sorted(sys.modules), file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "Usage: modewright" in done.stdout

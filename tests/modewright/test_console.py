@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from modewright import console
+from modewright.cli.common import console
 
 
 @pytest.mark.parametrize(("every", "lines"), [(0.0, 3), (1000.0, 0)])

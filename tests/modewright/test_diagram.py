@@ -13,10 +13,10 @@ from hypothesis import given, strategies as st
 import modewright as mw
 from language.overlays.expand_document import parse_document
 from language.text.diagnostic import Source, SpecError
-from modewright.cli import app
-from modewright.diagram import Diagram, diagram_of
-from modewright.exits import run_with_exit_code
-from modewright.layers import Edge, compute_layout
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
+from modewright.diagram.diagram import Diagram, diagram_of
+from modewright.diagram.layered_layout import Edge, compute_layout
 
 ROOT = Path(__file__).parent.parent.parent
 NESTED = """\

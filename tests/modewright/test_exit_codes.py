@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from modewright import explaining
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api import explaining
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 
 ROOT = Path(__file__).parent.parent.parent
 TRACE = ROOT / "tests" / "data" / "paper" / "est_paper_tip_out_1kHz.csv.gz"
@@ -155,7 +155,7 @@ def test_a_defect_of_ours_is_4_with_a_report(
 def test_an_interrupt_is_130() -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
     code += "import sys; sys.argv = ['modewright', 'demo', '--out', 'build'];"
-    code += "print('ready', flush=True); from modewright.cli import main; main()"
+    code += "print('ready', flush=True); from modewright.cli.app import main; main()"
     process = subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT
     )

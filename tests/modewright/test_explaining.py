@@ -11,8 +11,8 @@ import pytest
 from language.ir.printer import digest
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project
-from modewright.cli import app
-from modewright.explaining import compare_specs, explain_spec, spec_differences_json, spec_json
+from modewright.api.explaining import compare_specs, explain_spec, spec_differences_json, spec_json
+from modewright.cli.app import app
 from tests.language.making import ROOT, SHIPPED, project_of
 
 CALM = """language: 1

@@ -11,7 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from modewright.files import OutputError, require_calibration_output, require_writable, write_files
+from modewright.runtime.output_files import (
+    OutputError,
+    require_calibration_output,
+    require_writable,
+    write_files,
+)
 
 KILLED = """
 import os, signal, sys

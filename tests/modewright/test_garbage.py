@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from modewright.garbage import GENERATION_0_THRESHOLD, infrequent_gc
+from modewright.runtime.gc_pause import GENERATION_0_THRESHOLD, infrequent_gc
 
 
 @pytest.fixture(autouse=True)

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from modewright import interruption
-from modewright.interruption import debounce_interrupts
+from modewright.cli.common import interruption
+from modewright.cli.common.interruption import debounce_interrupts
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modewright.cli import app
-from modewright.console import console
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.console import console
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.diagnosis.driving import MAP, SPEC, Values, tip_in
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 from rich.console import Console
 
 from engine.results.trajectory import Event
-from modewright.show import MAX_EVENTS, events_table
+from modewright.render.run import MAX_EVENTS, events_table
 
 Kind = Literal["transition", "range"]
 HEADS = ["time [s]", "automaton", "transition", "from", "to"]

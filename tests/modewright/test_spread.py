@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from modewright.spread import expand_arguments
+from modewright.cli.app import expand_arguments
 
 
 @pytest.mark.parametrize(

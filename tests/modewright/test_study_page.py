@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from engine.batch.interpreted_batch import run_interpreted_batch
-from modewright import study_page
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
+from modewright.render import study_page
 from sweep.definition.study import Study
 from sweep.execution.executor import BlockResult, SerialExecutor
 from sweep.execution.study_run import run_study

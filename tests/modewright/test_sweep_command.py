@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from engine.batch.batch import Batch, BatchResult
-from modewright import studies
-from modewright.cli import app
-from modewright.console import progress_bar
-from modewright.exits import run_with_exit_code
+from modewright.api import studies
+from modewright.cli.app import app
+from modewright.cli.common.console import progress_bar
+from modewright.cli.common.exit_codes import run_with_exit_code
 from sweep.execution.dask_error import ClusterError
 from sweep.store import store as store_module
 from sweep.store.store import read_store

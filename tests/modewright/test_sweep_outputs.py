@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from modewright import studies
-from modewright.cli import app
-from modewright.commands.sweep import PLOTS
-from modewright.exits import run_with_exit_code
-from modewright.files import RESULT_NAMES, STUDY_FOLDER_NAMES, OutputError
+from modewright.api import studies
+from modewright.cli.app import app
+from modewright.cli.commands.sweep import PLOTS
+from modewright.cli.common.exit_codes import run_with_exit_code
+from modewright.runtime.output_files import RESULT_NAMES, STUDY_FOLDER_NAMES, OutputError
 from sweep.store.manifest import MANIFEST_NAME, seal_of
 from sweep.store.store import BLOCKS_FOLDER, LOCK_NAME
 from tests.sweep.laying import STUDIES, quick_results
@@ -122,7 +122,7 @@ def test_pictures_that_cannot_be_written_are_told_beside_the_summary(
     def full(*files: object) -> None:
         raise OutputError("summary.csv: No space left on device")
 
-    monkeypatch.setattr("modewright.commands.sweep.write_files", full)
+    monkeypatch.setattr("modewright.cli.commands.sweep.write_files", full)
     assert ran("--summary", "o", "--csv", "summary.csv") == 1
     told = capsys.readouterr()
     assert "alone: 5 of 5 variants: 5 done" in told.out

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from modewright.commands import check as command
-from modewright.watching import spec_folders, watch_changes
+from modewright.cli.commands import check as command
+from modewright.cli.common.watch import spec_folders, watch_changes
 
 GOOD = """language: 1
 automaton: slide
@@ -68,7 +68,7 @@ def test_a_watched_check_tells_what_an_edit_breaks_and_mends(
     monkeypatch.chdir(tmp_path)
     broken = GOOD.replace("1 m/s", "1 m")
     edits = Edits(lambda: spec.write_text(broken), lambda: spec.write_text(GOOD))
-    monkeypatch.setattr("modewright.watching.wait_for_poll", edits)
+    monkeypatch.setattr("modewright.cli.common.watch.wait_for_poll", edits)
     with pytest.raises(KeyboardInterrupt):
         command.check([], every=True, watch=True)
     told = capsys.readouterr()

@@ -14,12 +14,12 @@ import pysindy
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from diagnosis.bench import ModelSet
-from diagnosis.diagnose import Diagnosis
-from diagnosis.estimate import Estimate
-from diagnosis.joined import burn_in_samples
-from diagnosis.naming import verdict_id
-from diagnosis.simulation import nrmse
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.pipeline.diagnose import Diagnosis
+from diagnosis.result.effect_naming import verdict_id
+from diagnosis.validation.free_simulation import nrmse
 
 Reals = NDArray[np.float64]
 SMOOTHED = 0.05

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from modewright import cluster_worker
+from modewright.workers import dask_worker as cluster_worker
 from sweep.definition.measure import StoreColumn
 from sweep.definition.study import Presentation
 from sweep.execution.dask_address import Credentials, parse_address

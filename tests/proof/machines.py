@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import modewright as mw
-from diagnosis.case import read_series
-from diagnosis.dossier import DiagnosisReport
-from diagnosis.estimate import evaluate
-from diagnosis.freedom import ALL_LEVELS, scan_level
-from diagnosis.layers import DISTURBANCE_STATE
-from diagnosis.level import disturbance_units
-from diagnosis.point import vector_of
-from diagnosis.series import SampledRecording, decimate
-from diagnosis.smoothing import smooth_states
+from diagnosis.data.sampled_recording import SampledRecording, decimate
+from diagnosis.estimation.estimate import evaluate
+from diagnosis.estimation.noise_level import disturbance_units
+from diagnosis.localisation.free_disturbance import ALL_LEVELS, scan_level
+from diagnosis.localisation.smoother import smooth_states
+from diagnosis.model.parameter_vector import vector_of
+from diagnosis.model.placed_effect import DISTURBANCE_STATE
+from diagnosis.pipeline.case import read_series
+from diagnosis.report.diagnosis_report import DiagnosisReport
 from tests.diagnosis import machines
 from tests.proof.truth import brake_figures, columns, slope_figures
 

@@ -38,7 +38,7 @@ def main() -> None:
     library = effects[0] if effects else None
     sys.addaudithook(guard(_end))
     import modewright
-    from diagnosis.dossier import verdict_to_json
+    from diagnosis.report.diagnosis_report import verdict_to_json
 
     begun = time.monotonic()
     train, held_out = (sorted(Path(case, part).glob("*.csv")) for part in ("train", "held_out"))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import modewright as mw
 from language.text.diagnostic import Problem, SpecError
-from modewright import studies
+from modewright.api import studies
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent

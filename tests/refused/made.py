@@ -25,7 +25,7 @@ measures: {last: {final: x}}
 
 def store(folder: Path) -> Pair:
     """A folder without results of a study, and one with them."""
-    from modewright.studies import sweep
+    from modewright.api.studies import sweep
 
     (folder / "made.yaml").write_text(SPEC)
     (folder / "still.yaml").write_text(

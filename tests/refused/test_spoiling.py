@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modewright.checking import check_spec, check_without_proofs
+from modewright.api.checking import check_spec, check_without_proofs
 from tests.refused.book import ROOT, cases
 from tests.refused.spoiling import spoil_spec
 

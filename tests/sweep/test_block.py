@@ -10,7 +10,7 @@ import pytest
 import modewright as mw
 from engine.batch.batch import Batch, BatchResult
 from engine.batch.interpreted_batch import run_interpreted_batch
-from modewright.compiled import run_batch, run_block
+from modewright.runtime.compiled_run import run_batch, run_block
 from sweep.design.variant_system import format_decimal
 from sweep.execution.block import compute_rows
 from sweep.store.row import Block, Row

@@ -218,7 +218,7 @@ def test_a_cluster_by_tls_takes_files_and_refuses_who_has_none(tmp_path: Path) -
 
 
 def test_dask_is_loaded_by_no_other_executor() -> None:
-    code = "import modewright.studies, sys; print([n for n in sys.modules if n in "
+    code = "import modewright.api.studies, sys; print([n for n in sys.modules if n in "
     code += "('distributed', 'dask')])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from engine.batch.batch import Batch, BatchResult
-from modewright.show_study import summary_json
+from modewright.render.study import summary_json
 from sweep.analysis.confidence_interval import interval_of_mean, interval_of_quantile
 from sweep.analysis.plots import draw_pictures
 from sweep.analysis.summary import summary_of

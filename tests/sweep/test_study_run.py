@@ -220,7 +220,7 @@ def test_a_dead_worker_is_replaced_and_what_ends_every_worker_is_left_out(tmp_pa
 
 
 def test_real_workers_give_the_bits_of_this_process(tmp_path: Path) -> None:
-    from modewright.studies import WORKER_COMMAND as COMMAND
+    from modewright.api.studies import WORKER_COMMAND as COMMAND
 
     made = make_study("alone")
     alone = run_study(made, tmp_path / "alone", SerialExecutor(run_interpreted_batch), block_size=2)

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from engine.batch.batch import Batch, BatchResult
-from modewright import show_study
+from modewright.render import study as show_study
 from sweep.analysis.confidence_interval import wilson_interval
 from sweep.analysis.plots import (
     MAX_BINS,

@@ -11,7 +11,7 @@ from pathlib import Path
 from language.ir.number_type import NumberType
 from language.loading.system_reader import with_number_type
 from lockstep.tick_log import TickLog, record_ticks
-from modewright.api import load
+from modewright.api.simulation import load
 
 TICK = Fraction(1, 100)
 """Of the supervisor, and of the slower estimator [s]."""

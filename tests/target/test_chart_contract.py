@@ -21,7 +21,7 @@ from language.ir.ops import Switch
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project
 from language.programs.name_bindings import chart_context_of
-from modewright.api import program
+from modewright.api.simulation import program
 from tests.language.making import automaton
 
 pytestmark = pytest.mark.skipif(

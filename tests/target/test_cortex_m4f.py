@@ -14,7 +14,7 @@ from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import lockstep, program
+from modewright.api.simulation import lockstep, program
 from tests.lockstep.programs import record_ticks
 from tests.lockstep.test_flags import PRODUCT, TINY
 from tests.target.closed_loop import record_driveline, record_supervisor

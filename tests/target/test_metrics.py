@@ -17,9 +17,9 @@ from codegen.harness.metrics import measure_code
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
 from codegen.toolchain.machine import CORTEX_FLAGS, CORTEX_M4F
-from modewright.api import program
-from modewright.cli import app
-from modewright.exits import run_with_exit_code
+from modewright.api.simulation import program
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.target.closed_loop import record_driveline
 from tests.twin.duel import duel
 

@@ -20,8 +20,8 @@ from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.program import Program
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
-from modewright.api import program
-from modewright.code import prove
+from modewright.api.code_generation import prove
+from modewright.api.simulation import program
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"

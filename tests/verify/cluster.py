@@ -114,8 +114,8 @@ def two_killed_and_what_dask_costs(count: int) -> Figure:
 def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
     """Run a study by local processes or by Dask; two of its workers are killed where asked for."""
     import modewright as mw
-    from modewright import cluster_worker
-    from modewright.studies import TEMPLATE_MODULE
+    from modewright.api.studies import TEMPLATE_MODULE
+    from modewright.workers import dask_worker as cluster_worker
     from sweep.execution import fork_server
     from sweep.execution.dask_address import Address, Credentials
     from sweep.execution.dask_client import WorkerSetup, open_client

@@ -9,7 +9,7 @@ import os
 import sys
 from functools import partial
 
-from modewright.code import fuzz
+from modewright.api.code_generation import fuzz
 from tests.verify.proofs import AUTOMATA, SUBJECT
 from tests.verify.store import ROOT, Figure, measure_figures
 

@@ -28,7 +28,7 @@ from language.loading.system_reader import single_instance_system, with_number_t
 from language.model.system import Stimulus
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
-from modewright.api import Loaded, load
+from modewright.api.simulation import Loaded, load
 from tests.verify.store import ROOT, write_json
 
 EVIDENCE = ROOT / "docs" / "evidence" / "lockstep.json"

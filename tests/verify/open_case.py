@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import modewright
-from diagnosis.dossier import verdict_to_json
+from diagnosis.report.diagnosis_report import verdict_to_json
 
 SPEC = "blind_driveline"
 WHO = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)

@@ -11,8 +11,8 @@ from functools import partial
 from typing import Any
 
 from language.ir.operation_count import max_operations
-from modewright.api import program
-from modewright.code import instructions as counted_of, metrics
+from modewright.api.code_generation import instructions as counted_of, metrics
+from modewright.api.simulation import program
 from tests.paper.claims import PUBLISHED
 from tests.paper.observers import NOTES
 from tests.paper.page import JSON

@@ -10,7 +10,7 @@ import sys
 from functools import partial
 
 from codegen.proofs.all import CHECKS
-from modewright.code import prove
+from modewright.api.code_generation import prove
 from tests.verify.store import ROOT, Figure, measure_figures
 
 SUBJECT = "c_code"

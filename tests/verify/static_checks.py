@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT))
 
 import modewright as mw  # noqa: E402
-from modewright.checking import spec_files  # noqa: E402
+from modewright.api.checking import spec_files  # noqa: E402
 from tests.large.charts import large_chart  # noqa: E402
 from tests.verify.processor import seconds_of  # noqa: E402
 from tests.verify.store import Figure, measure_figures  # noqa: E402

@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 import modewright as mw
-from diagnosis.dossier import DiagnosisReport
-from diagnosis.wording import format_oscillation
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.sentences import format_oscillation
 from tests.open_generator.case import simulate_cases
 from tests.open_generator.recording import write_case
 from tests.open_generator.tip_out import SHAFT, VARIANT, tip_out_case

@@ -11,7 +11,7 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from diagnosis.layers import PlacedEffect
+from diagnosis.model.placed_effect import PlacedEffect
 from language.overlays.expand_document import Project
 from language.text.diagnostic import SpecError
 from tests.diagnosis.accepting import acceptable_layers

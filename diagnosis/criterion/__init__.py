@@ -1,0 +1,1 @@
+"""Criteria that compare models: penalised likelihood, cross-validation, support by recordings."""

@@ -1,0 +1,97 @@
+"""Blocked cross-validation of a gain, by an infinitesimal jackknife."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.data.arrays import Reals
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
+from diagnosis.estimation.innovations import FOLDS, PredictionResult
+from diagnosis.estimation.normal_equations import damped_step
+from diagnosis.model.parameter_vector import ParameterVector
+
+STEP_FRACTIONS = (1.0, 0.5, 0.25, 0.1)
+"""Parts of a step that are tried."""
+
+CACHE_SIZE = 8
+"""Models of which what was left out is kept, the latest ones; known by their identity."""
+
+CacheKey = tuple[int, tuple[int, ...]]
+
+_cache: OrderedDict[CacheKey, tuple[Estimate, Sequence[SampledRecording], Reals]] = OrderedDict()
+
+
+def _cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    """Return the squares (recordings, seen) of each block at the point that the others ask for.
+
+    What was found of the latest models is kept: a base is asked beside each candidate.
+    """
+    key = id(model), tuple(id(one) for one in series)
+    if key not in _cache:
+        _cache[key] = model, series, _compute_cross_validated_squares(model, series)
+        if len(_cache) > CACHE_SIZE:
+            _cache.popitem(last=False)
+    _cache.move_to_end(key)
+    return _cache[key][2]
+
+
+def _compute_cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    found = np.zeros((len(series), len(model.candidate.predictor.outputs)))
+    if model.normal_equations is None:
+        return np.full(found.shape, np.inf)
+    for fold in range(FOLDS):
+        prediction = _predict_without_fold(model, series, fold)
+        if not prediction.is_complete:
+            return np.full(found.shape, np.inf)
+        found += _fold_squares(prediction, fold, False)
+    return found
+
+
+def _predict_without_fold(
+    model: Estimate, series: Sequence[SampledRecording], fold: int
+) -> PredictionResult:
+    """Return the recordings foreseen from where a model would be without a fold.
+
+    A step that does not do the others any good is shortened: the model is not as linear as that.
+    Where not even a tenth of it does, the model stays where it is.
+    """
+    assert model.normal_equations is not None
+    scale = model.prediction.variances
+    there = damped_step(
+        model.candidate, model.point, model.normal_equations.without_fold(fold), 0.0
+    )
+    limit = _training_cost(model, model.prediction, model.point, fold, scale)
+    for part in STEP_FRACTIONS:
+        point = ParameterVector(
+            model.point.shared + part * (there.shared - model.point.shared),
+            model.point.per_recording + part * (there.per_recording - model.point.per_recording),
+        )
+        prediction = predict_with_gains_of(model, series, point)
+        if (
+            prediction.is_complete
+            and _training_cost(model, prediction, point, fold, scale) <= limit
+        ):
+            return prediction
+    return model.prediction
+
+
+def _training_cost(
+    model: Estimate, prediction: PredictionResult, point: ParameterVector, fold: int, scale: Reals
+) -> float:
+    """Return the cost [nats] of what is not left out."""
+    squares = _fold_squares(prediction, fold, True)
+    return 0.5 * float(np.sum(squares.sum(axis=0) / scale)) + point.prior_cost(model.candidate)
+
+
+def _fold_squares(prediction: PredictionResult, fold: int, is_training: bool) -> Reals:
+    """Return the sums of squares (recordings, seen) of a fold, or of all others."""
+    squares = prediction.robust_squares
+    found = np.zeros((len(prediction.slices), squares.shape[1]))
+    for block in prediction.blocks:
+        if (block.fold != fold) == is_training:
+            found[block.recording] += np.nansum(squares[block.part], axis=0)
+    return found

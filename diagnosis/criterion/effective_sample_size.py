@@ -1,0 +1,46 @@
+"""Integrated autocorrelation: how many innovations count as one (Bartlett 1946)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.data.arrays import Reals
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+
+MAX_LAG = 0.25
+"""Seconds over which innovations may hang together."""
+
+
+def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecording]) -> float:
+    """Return how many innovations count as one: 1 + 2 sum of squared autocorrelations, at least 1.
+
+    (Bartlett 1946, for a quadratic function of them.)
+    """
+    return _integrated_autocorrelation(model.prediction.innovations, float(series[0].period))
+
+
+def integrated_autocorrelation_by_recording(
+    model: Estimate, series: Sequence[SampledRecording]
+) -> Reals:
+    """Return how many innovations of each recording count as one: (recordings,)."""
+    period = float(series[0].period)
+    return np.array(
+        [_integrated_autocorrelation([one], period) for one in model.prediction.innovations]
+    )
+
+
+def _integrated_autocorrelation(innovations: Sequence[Reals], period: float) -> float:
+    lags = max(1, round(MAX_LAG / period))
+    by_output = []
+    for channel in range(innovations[0].shape[1]):
+        by_recording = [e[np.isfinite(e[:, channel]), channel] for e in innovations]
+        power = sum(float(e @ e) for e in by_recording)
+        total = 1.0
+        for lag in range(1, lags + 1) if power > 0.0 else ():
+            autocovariance = sum(float(e[lag:] @ e[:-lag]) for e in by_recording if len(e) > lag)
+            total += 2.0 * (autocovariance / power) ** 2
+        by_output.append(total)
+    return float(np.mean(by_output))

@@ -1,0 +1,85 @@
+"""Threshold: how much an effect has to gain before it is accepted [nats]."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from diagnosis.model.placed_effect import PlacedEffect
+
+DEFAULT_THRESHOLD = 75.0
+"""Nats that an effect must gain both in training and left out; a bootstrap gives better ones."""
+FORMAT = "modewright-thresholds/1"
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Nats that an effect must gain: `usual`, or those of its group of effects; `origin` in words.
+
+    A group is an effect at all its places. One that brings modes has to gain `modes` times the
+    usual: with each mode an observer has gains of its own, which may gain a little by accident.
+    """
+
+    groups: Mapping[str, float] = field(default_factory=dict)
+    default: float = DEFAULT_THRESHOLD
+    origin: str = "the usual threshold"
+    mode_factor: float = 2.0
+
+    def threshold_of(self, placed_effect: PlacedEffect) -> float:
+        """Return what a layer has to gain [nats]."""
+        brings_modes = placed_effect.effect.body.get("regions") is not None
+        usual = self.default * (self.mode_factor if brings_modes else 1.0)
+        return self.groups.get(group_of(placed_effect), usual)
+
+    @property
+    def largest(self) -> float:
+        """The largest of them [nats]."""
+        return max((self.default, *self.groups.values()))
+
+    @property
+    def text(self) -> str:
+        """The number, or the smallest and the largest, for a sentence: `45`, `20 to 61`."""
+        least, most = min((self.default, *self.groups.values())), self.largest
+        return f"{least:.0f}" if round(least) == round(most) else f"{least:.0f} to {most:.0f}"
+
+
+DEFAULT_THRESHOLDS = Thresholds()
+"""The usual threshold for all effects."""
+
+
+def group_of(placed_effect: PlacedEffect) -> str:
+    """Return the group of a layer."""
+    return placed_effect.effect.name
+
+
+def format_thresholds(thresholds: Thresholds) -> str:
+    """Return thresholds as the text of a file."""
+    groups = {name: round(value, 2) for name, value in sorted(thresholds.groups.items())}
+    known = {"format": FORMAT, "usual": round(thresholds.default, 2), "effects": groups}
+    return json.dumps({**known, "origin": thresholds.origin}, indent=1) + "\n"
+
+
+def read_thresholds(path: Path) -> Thresholds:
+    """Return the thresholds of a file: `usual` and `effects` by name. Raises ValueError."""
+    try:
+        known = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"{path} cannot be read as thresholds: {error}") from None
+    if not isinstance(known, dict) or known.get("format") != FORMAT:
+        raise ValueError(f"{path} holds no thresholds: its format is not {FORMAT}")
+    usual, groups = known.get("usual", DEFAULT_THRESHOLD), known.get("effects", {})
+    values = [usual, *groups.values()] if isinstance(groups, dict) else [None]
+    if not all(_is_positive(value) for value in values):
+        raise ValueError(f"{path}: `usual` and each of `effects` is a number of nats above 0")
+    origin = str(known.get("origin", "")) or f"those of {path.name}"
+    return Thresholds(
+        {str(k): float(v) for k, v in groups.items()}, float(usual), origin, mode_factor=1.0
+    )
+
+
+def _is_positive(value: object) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and math.isfinite(float(str(value))) and float(str(value)) > 0.0

@@ -1,0 +1,1 @@
+"""Recordings as arrays: resampled, stacked, with estimates of noise and spectra."""

@@ -1,0 +1,247 @@
+"""Series: a recording on the grid of its fastest channel, for prediction from sample to sample.
+
+The grid begins where a compared channel has a value. Every value keeps its own sample: a channel
+without one at a sample is NaN there if it is compared; an input holds its latest value, or runs
+straight between its time stamps where the map says `hold: linear`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.noise_estimate import noise_of
+from engine.recordings.recording import Channel, Recording, split_by_windows
+from language.model.automaton import Automaton
+from language.model.graphs import reachable
+from language.model.system import RecordingMap
+
+Reals = NDArray[np.float64]
+DECIMATED_PERIOD = Fraction(5, 1000)
+"""Seconds between samples of a thinned recording."""
+
+
+@dataclass(frozen=True)
+class SampledRecording:
+    """A recording as arrays: `inputs` (samples, inputs) held, `measured` (samples, seen) or NaN.
+
+    `period` is the time [s] between samples, `start` that of the first one; `is_linear` says that
+    inputs run straight from sample to sample: of a held one they are the steps.
+    """
+
+    name: str
+    period: Fraction
+    start: Fraction
+    inputs: Reals
+    measured: Reals
+    is_first_order_hold: bool = False
+
+    @property
+    def count(self) -> int:
+        """The number of samples."""
+        return len(self.inputs)
+
+    @cached_property
+    def first_measured(self) -> Reals:
+        """The first known value of each compared signal (seen,), NaN where there is none."""
+        known = np.isfinite(self.measured)
+        rows = np.argmax(known, axis=0)
+        return np.asarray(self.measured[rows, np.arange(len(rows))], dtype=np.float64)
+
+    @cached_property
+    def noise(self) -> tuple[Reals, Reals]:
+        """The standard deviation of the noise of the compared signals (seen,) and the inputs."""
+        seen, inputs = (
+            [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
+        )
+        return np.array(seen), np.array(inputs)
+
+
+def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
+    """Return the outputs that a map compares, in the order of the automaton."""
+    mapped = {column.compare for column in mapping.columns.values() if column.compare}
+    return tuple(name for name in automaton.outputs if name in mapped)
+
+
+def sample_windows(
+    recording: Recording, mapping: RecordingMap, automaton: Automaton, output_names: Sequence[str]
+) -> tuple[SampledRecording, ...]:
+    """Return a recording on its grid, a series for each window that is used of it.
+
+    Raises ValueError.
+    """
+    constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
+    declared = {
+        name: float(thing.default)
+        for name, thing in automaton.inputs.items()
+        if thing.default is not None
+    }
+    known = {**declared, **constants}
+    return tuple(
+        sample_recording(piece, list(automaton.inputs), output_names, known)
+        for piece in split_by_windows(recording)
+    )
+
+
+def sample_recording(
+    recording: Recording,
+    inputs: Sequence[str],
+    output_names: Sequence[str],
+    defaults: Mapping[str, float],
+    period: Fraction | None = None,
+) -> SampledRecording:
+    """Return a recording on its grid, or on one of another `period`.
+
+    Raises ValueError where it has too few samples.
+    """
+    input_channels = {
+        c.column.to: c for c in recording.channels.values() if c.column.to is not None
+    }
+    output_channels = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
+    used = [
+        *input_channels.values(),
+        *(output_channels[name] for name in output_names if name in output_channels),
+    ]
+    short = next((channel for channel in used if len(channel.times) < 2), None)
+    if short is not None:
+        raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
+    end = min(channel.times[-1] for channel in used)
+    start = _first_common_stamp(
+        [output_channels[name] for name in output_names if name in output_channels], used
+    )
+    step = period or min(grid_period(channel.seconds) for channel in used)
+    count = int((end - start) / step) + 1
+    if count < 2:
+        raise ValueError(f"{recording.name}: only {count} samples in common")
+    input_values = np.stack(
+        [
+            _sample_input(input_channels.get(name), start, step, count, defaults, name)
+            for name in inputs
+        ]
+    )
+    output_values = np.stack(
+        [_sample_output(output_channels.get(name), start, step, count) for name in output_names]
+    )
+    return SampledRecording(
+        recording.name,
+        step,
+        start,
+        np.ascontiguousarray(input_values.T),
+        np.ascontiguousarray(output_values.T),
+    )
+
+
+def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
+    """Tell whether a compared output follows an input at once, with no state in between."""
+    edges: dict[str, set[str]] = {}
+    for mode in automaton.all_modes:
+        for name, formula in mode.equations.items():
+            edges.setdefault(name, set()).update(formula.reads)
+    read = [reachable(edges, automaton.output_source(name)) for name in output_names]
+    return bool(set(automaton.inputs) & set().union(*read))
+
+
+def resample(
+    series: Sequence[SampledRecording],
+    automaton: Automaton,
+    output_names: Sequence[str],
+    is_first_order_hold: bool,
+) -> tuple[SampledRecording, ...]:
+    """Return recordings whose inputs are held or run straight, thinned where that loses nothing.
+
+    Where an output shows an input at once it does: what is shown with a mean was never measured.
+    """
+    if has_feedthrough(automaton, output_names):
+        return tuple(
+            dataclasses.replace(one, is_first_order_hold=is_first_order_hold) for one in series
+        )
+    return tuple(decimate(one, is_first_order_hold) for one in series)
+
+
+def require_equal_periods(series: Sequence[SampledRecording]) -> None:
+    """Raise ValueError where recordings have samples at different rates."""
+    rates = {one.period: f"{one.name} ({float(1 / one.period):g} Hz)" for one in series}
+    if len(rates) > 1:
+        named = ", ".join(rates.values())
+        raise ValueError(f"recordings at different rates cannot be diagnosed together: {named}")
+
+
+def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> SampledRecording:
+    """Return a fast recording at a slower pace: inputs are means over it, every n-th value is kept.
+
+    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples. A held
+    input is the mean of what it is until the next sample, one that `is_first_order_hold` of what is around.
+    """
+    factor = max(1, int(DECIMATED_PERIOD / series.period))
+    count = series.count // factor
+    inputs = series.inputs[: count * factor]
+    if is_first_order_hold and factor > 1:
+        around = np.pad(inputs, ((factor // 2, factor // 2), (0, 0)), mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, 2 * (factor // 2) + 1, axis=0)
+        inputs = np.mean(windows[::factor], axis=-1)
+    else:
+        inputs = np.mean(inputs.reshape(count, factor, -1), axis=1)
+    return SampledRecording(
+        series.name,
+        series.period * factor,
+        series.start,
+        np.ascontiguousarray(inputs),
+        np.ascontiguousarray(series.measured[: count * factor : factor]),
+        is_first_order_hold,
+    )
+
+
+def grid_period(times: Reals) -> Fraction:
+    """Return the usual distance [s] of time stamps, of a whole rate where it is near one."""
+    usual = float(np.median(np.diff(times)))
+    rate = round(1.0 / usual)
+    if rate > 0 and abs(rate * usual - 1.0) < 0.02:
+        return Fraction(1, rate)
+    return Fraction(usual).limit_denominator(1_000_000)
+
+
+def _first_common_stamp(
+    compared_channels: Sequence[Channel], used_channels: Sequence[Channel]
+) -> Fraction:
+    """Return the first stamp [s] of the fastest compared channel at which all are known."""
+    common = max(channel.times[0] for channel in used_channels)
+    fastest = min(compared_channels, key=lambda channel: grid_period(channel.seconds))
+    return next((time for time in fastest.times if time >= common), common)
+
+
+def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
+    """The sample that each value of a channel belongs to: the nearest one."""
+    return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
+
+
+def _sample_input(
+    channel: Channel | None,
+    start: Fraction,
+    step: Fraction,
+    count: int,
+    defaults: Mapping[str, float],
+    name: str,
+) -> Reals:
+    if channel is None:
+        return np.full(count, defaults[name])
+    if channel.column.hold == "linear":
+        grid = float(start) + float(step) * np.arange(count)
+        return np.asarray(np.interp(grid, channel.seconds, channel.array), dtype=np.float64)
+    places, values = _sample_indices(channel, start, step), channel.array
+    latest = np.searchsorted(places, np.arange(count), side="right") - 1
+    return values[np.maximum(latest, 0)]
+
+
+def _sample_output(channel: Channel | None, start: Fraction, step: Fraction, count: int) -> Reals:
+    values = np.full(count, np.nan)
+    if channel is not None:
+        places = _sample_indices(channel, start, step)
+        inside = (places >= 0) & (places < count)
+        values[places[inside]] = channel.array[inside]
+    return values

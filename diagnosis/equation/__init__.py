@@ -1,0 +1,1 @@
+"""Discovery of a formula for what no effect of the library explains."""

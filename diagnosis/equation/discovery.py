@@ -1,0 +1,171 @@
+"""Description: what an unknown is, as a formula - found by regression, fitted as an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
+from diagnosis.equation.effect_text import FormulaEffect, build_formula
+from diagnosis.equation.forward_regression import (
+    TermColumns,
+    coefficients_of,
+    rank_terms,
+    select_terms,
+)
+from diagnosis.equation.regression_problem import EquationRegression, regression_at
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import fit_with_noise
+from diagnosis.localisation.location import Location
+from diagnosis.model.parameter_vector import ParameterVector, vector_of
+from diagnosis.selection.candidate_search import LogCallback
+from language.text.diagnostic import SpecError
+
+MAX_LOCATIONS = 2
+"""Places that are looked at, those whose freedom explains most."""
+MAX_FITS = 3
+"""Formulas that are fitted, the best of the regressions."""
+MAX_TERMS = 2
+LEADING_FRACTION = 0.85
+"""A formula at a place that asked for more of a freedom has to gain only this part."""
+MIN_SECOND_TERM_GAIN = 45.0
+"""Nats that a second term has to gain."""
+
+
+@dataclass(frozen=True)
+class DiscoveredEquation:
+    """A formula at a place with its fit; `text` tells it with its values."""
+
+    location: Location
+    formula: FormulaEffect
+    estimate: Estimate = field(repr=False)
+    likelihood_gain: LikelihoodGain
+    text: str
+
+
+def discover_equation(
+    model_set: ModelSet,
+    base: Estimate,
+    locations: Sequence[Location],
+    units: Mapping[str, float],
+    threshold: float,
+    log: LogCallback = lambda text: None,
+) -> DiscoveredEquation | None:
+    """Return the formula that explains most of what the base lacks; None where none gains."""
+    equations: list[DiscoveredEquation] = []
+    for formula, location in _propose_formulas(model_set, base, locations):
+        starts = [base.values(0), _values_beside_disturbance(base, location)]
+        one = _fit_formula(model_set, base, formula, location, starts, units)
+        if one is not None:
+            log(_format_equation(one))
+            equations.append(one)
+    best = max(equations, key=_total_gain, default=None)
+    if best is None or best.likelihood_gain.smaller <= threshold:
+        return None
+    ranks = [location.path for location in locations]
+    for one in equations:
+        is_before = ranks.index(one.location.path) < ranks.index(best.location.path)
+        if is_before:
+            starts = [best.estimate.values(0)]
+            again = _fit_formula(model_set, base, one.formula, one.location, starts, units)
+            if again is not None and _total_gain(again) > LEADING_FRACTION * _total_gain(best):
+                log(_format_equation(again))
+                best = again
+    return best
+
+
+def _total_gain(equation: DiscoveredEquation) -> float:
+    total = equation.likelihood_gain.total
+    return total if np.isfinite(total) else -np.inf
+
+
+def _format_equation(equation: DiscoveredEquation) -> str:
+    known = equation.likelihood_gain
+    gains = f"train {known.penalised:.0f}, left out {known.cross_validated:.0f} nats"
+    return f"{equation.text} at {equation.location.path}: {gains}"
+
+
+def _propose_formulas(
+    model_set: ModelSet, base: Estimate, locations: Sequence[Location]
+) -> list[tuple[FormulaEffect, Location]]:
+    """Return the formulas worth a fit: the best single terms, and the best one with a second."""
+    options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
+    places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
+    for location in places:
+        model = _choose_base(model_set, base, location)
+        excess = regression_at(model_set, model, location.section, location.place)
+        ranked = rank_terms(excess.problem, excess.columns)
+        options += [(gain, location, excess, (one,)) for gain, one in ranked[:MAX_FITS]]
+        chosen = select_terms(excess.problem, excess.columns, MAX_TERMS, MIN_SECOND_TERM_GAIN)
+        if len(chosen) > 1:
+            pair = tuple(one.columns for one in chosen)
+            options.append((sum(one.gain for one in chosen), location, excess, pair))
+    options.sort(key=lambda option: -option[0])
+    first = [max((o for o in options if o[1] is place), key=lambda o: o[0]) for place in places]
+    best_options = [*first, *(option for option in options if option not in first)][:MAX_FITS]
+    formulas = []
+    for number, (gain, location, excess, columns) in enumerate(best_options, 1):
+        if gain > 0.0:
+            terms = [excess.terms[excess.columns.index(one)] for one in columns]
+            values = coefficients_of(excess.problem, columns)
+            with suppress(SpecError):
+                formula = build_formula(
+                    model_set, location.section, location.place, terms, values, number
+                )
+                formulas.append((formula, location))
+    return formulas
+
+
+def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
+    """Return the parameters [SI] that were fitted beside the freedom of a place."""
+    return (location.free_model or base).values(0)
+
+
+def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
+    """Return the base, or what it is with the parameters fitted beside the freedom of a place."""
+    point = vector_of(
+        base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
+    )
+    other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
+    return other if other.cost < base.cost else base
+
+
+def _fit_formula(
+    model_set: ModelSet,
+    base: Estimate,
+    formula: FormulaEffect,
+    location: Location,
+    starts: Sequence[Mapping[str, float]],
+    units: Mapping[str, float],
+) -> DiscoveredEquation | None:
+    """Return a formula fitted from the best of some values of the base's parameters."""
+    try:
+        candidate = model_set.compile_candidate((formula.placed_effect,))
+    except SpecError:
+        return None
+    starting_fits = []
+    for values in starts:
+        point = vector_of(candidate, len(model_set.series), {**values, **formula.initial_values})
+        own = point.per_recording.copy()
+        for k, one in enumerate(candidate.free_parameters):
+            if one.name in formula.phases:
+                own[:, k] = [one.coordinate(value) for value in formula.phases[one.name]]
+        starting_fits.append(
+            evaluate(
+                candidate, model_set.series, base.noise_levels, ParameterVector(point.shared, own)
+            )
+        )
+    start = min(starting_fits, key=lambda one: one.cost).point
+    fitted = fit_with_noise(candidate, model_set.series, base.noise_levels, start, units)
+    if not np.isfinite(fitted.cost) or fitted.normal_equations is None:
+        return None
+    each = [fitted.values(k) for k in range(len(model_set.series))]
+    text = formula.format_fitted(quantities_of(fitted), each)
+    return DiscoveredEquation(
+        location, formula, fitted, likelihood_gain(fitted, base, model_set.series), text
+    )

@@ -1,0 +1,151 @@
+"""Probe: how the innovations of a model answer to a known disturbance at one place.
+
+The disturbance is put in through a drift that is measured without noise: what is prescribed is
+what acts. So each term of a formula is tried by one run, with the observer as it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.predictor.predictions import Prediction, StackedRecordings
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples, stack_recordings
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.acting_scale import DISTURBANCE_KIND_BY_SECTION
+from diagnosis.model.candidate import Candidate, compile_candidate
+from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
+from language.expressions.syntax_tree import Name
+from language.model.automaton import Automaton
+from language.reading.element_reader import outputs_as_mapping
+from language.text.document import Document, Entry, MappingNode, ScalarNode
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DisturbanceResponse:
+    """A model that can be disturbed at one place: its observer has the gains of `model`.
+
+    Its signals are those compared, then `torques` of elements, then the disturbance.
+    """
+
+    model: Estimate = field(repr=False)
+    candidate: Candidate = field(repr=False)
+    series: tuple[SampledRecording, ...] = field(repr=False)
+    element_torques: tuple[str, ...]
+    transient_gains: Reals = field(repr=False)
+    steady_state_gains: Reals = field(repr=False)
+
+    def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
+        """Return the predictions of all recordings under a disturbance (samples,) of each."""
+        pages, recorded = self._with_disturbance(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
+        limits = np.full(len(predictor.outputs), np.inf)
+        runs = predictor.predict_recordings(
+            pages, recorded, self.transient_gains, self.steady_state_gains, substeps, limits
+        )
+        return runs.split()
+
+    def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
+        """Return the innovations of such predictions, of which nothing else is told."""
+        pages, recorded = self._with_disturbance(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
+        runs = predictor.predict_points(
+            pages[np.newaxis], recorded, self.transient_gains, self.steady_state_gains, substeps
+        )
+        edges = pairwise(recorded.starts.tolist())
+        return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
+
+    def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
+        """Return the page of each recording and the recordings, with a disturbance measured."""
+        together, candidate = stack_recordings(self.series), self.candidate
+        recorded, seen = together.recorded, candidate.predictor.outputs
+        nothing = np.full((len(recorded.inputs), len(self.element_torques)), np.nan)
+        shown = np.column_stack([recorded.measured, nothing, np.concatenate(disturbance)])
+        first = np.full((len(self.series), len(seen)), np.nan)
+        first[:, : together.first_measured.shape[1]] = together.first_measured
+        first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
+        given = dataclasses.replace(recorded, measured=np.ascontiguousarray(shown))
+        return candidate.calibration_pages(self._values, first), given
+
+    @cached_property
+    def _values(self) -> list[dict[str, float]]:
+        return [self.model.values(k) for k in range(len(self.series))]
+
+    def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
+        """Return the innovations of the compared signals behind the burn-in."""
+        return self._after_burn_in([one.innovations for one in predictions])
+
+    def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
+        seen = len(self.model.candidate.predictor.outputs)
+        skip = burn_in_samples(self.series[0])
+        return [one[skip:, :seen] for one in innovations]
+
+
+def build_disturbance_response(
+    model_set: ModelSet, section: str, place: str, model: Estimate
+) -> DisturbanceResponse:
+    """Return a model of a bench, made ready to be disturbed at a place. Raises SpecError."""
+    kind = DISTURBANCE_KIND_BY_SECTION[section]
+    disturbance = disturbance_effect(kind, place)
+    placed_effect = PlacedEffect(disturbance.effect, place, f"probe_{place}"[:25])
+    torques = element_torques(model_set.automaton)
+    seen = (*model_set.output_names, *torques, placed_effect.qualified_name(DISTURBANCE_STATE))
+    document = _with_outputs(model_set.document, seen)
+    candidate = compile_candidate(
+        document,
+        model_set.project,
+        model.candidate.placed_effects,
+        (*model_set.disturbances, placed_effect),
+        seen,
+        model_set.period,
+    )
+    first, steady = _embed_gains(candidate, model, placed_effect.qualified_name(DISTURBANCE_STATE))
+    return DisturbanceResponse(model, candidate, model_set.series, torques, first, steady)
+
+
+def element_torques(automaton: Automaton) -> tuple[str, ...]:
+    """Return the names of the torques that elastic elements transmit."""
+    trees = [
+        one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
+    ]
+    return tuple(tree.path for tree in trees if isinstance(tree, Name))
+
+
+def _with_outputs(document: Document, names: Sequence[str]) -> Document:
+    """Return a document that shows some names beside its outputs."""
+    node = document.root.get("outputs")
+    assert node is not None
+    outputs = outputs_as_mapping(node)
+    span = outputs.span
+    added = {name: Entry(name, span, ScalarNode(name, span)) for name in names}
+    table = MappingNode({**added, **outputs.entries}, span)
+    root = {**document.root.entries, "outputs": Entry("outputs", span, table)}
+    return dataclasses.replace(document, root=MappingNode(root, document.root.span))
+
+
+def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
+    """Return the gains of a model, for one that has its states and signals among others."""
+    states, known = candidate.predictor.states, model.candidate.predictor
+    rows = [states.index(name) for name in known.states]
+    columns = [candidate.predictor.outputs.index(name) for name in known.outputs]
+    place = np.ix_(rows, columns)
+    first = np.zeros((len(model.gains.transient), len(states), len(candidate.predictor.outputs)))
+    steady = np.zeros((len(candidate.predictor.modes), *first.shape[1:]))
+    for k, gain in enumerate(model.gains.transient):
+        first[k][place] = gain
+    for k, mode in enumerate(candidate.predictor.modes):
+        steady[k][place] = model.gains.steady_state[known.modes.index(mode)]
+    row, column = states.index(disturbance), candidate.predictor.outputs.index(disturbance)
+    first[:, row, column] = 1.0
+    steady[:, row, column] = 1.0
+    return first, steady

@@ -1,0 +1,236 @@
+"""Formula: terms with coefficients as an effect of the language, and as a line for a reader."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.equation.disturbance_response import element_torques
+from diagnosis.equation.term_library import LibraryTerm
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.localisation.acting_scale import disturbance_unit
+from diagnosis.model.placed_effect import PlacedEffect
+from language.expressions.units import Dimension, dimension_product, parse_unit
+from language.overlays.effect_reader import external_names, read_effect
+from language.overlays.tree_types import TreeTypes, format_si_unit
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document, ScalarNode
+from language.text.project_files import parse_document
+
+Reals = NDArray[np.float64]
+RANGE_FACTOR = 10.0
+"""A coefficient may become this many times what the regression says."""
+
+
+@dataclass(frozen=True)
+class FormulaEffect:
+    """An effect made of terms: `layer` can be laid, `text` is its file, `start` where a fit begins.
+
+    `phases` are those of the recordings, by parameter.
+    """
+
+    placed_effect: PlacedEffect
+    text: str = field(repr=False)
+    terms: tuple[LibraryTerm, ...] = field(repr=False)
+    initial_values: Mapping[str, float] = field(repr=False)
+    phases: Mapping[str, tuple[float, ...]] = field(repr=False)
+
+    def format_fitted(
+        self, values: Mapping[str, Quantity], fitted: Sequence[Mapping[str, float]]
+    ) -> str:
+        """Return the formula with fitted values: `12.3 N*m * sin(3 * angle of w_w + 0.4)`."""
+        return " + ".join(
+            _format_term(
+                term,
+                k,
+                values,
+                [{n: v for n, v in one.items()} for one in fitted],
+                self.placed_effect,
+            )
+            for k, term in enumerate(self.terms, 1)
+        )
+
+
+def build_formula(
+    model_set: ModelSet,
+    section: str,
+    place: str,
+    terms: Sequence[LibraryTerm],
+    weights: Sequence[Reals],
+    number: int = 1,
+) -> FormulaEffect:
+    """Return terms with coefficients (recordings, waves) as an effect. Raises SpecError.
+
+    Its name has a `number`: a bench knows candidates by the names of their effects.
+    """
+    made = [
+        _term_text(model_set, section, place, k, *pair)
+        for k, pair in enumerate(zip(terms, weights, strict=True), 1)
+    ]
+    name = f"unknown_{number}_at_{place}"
+    text = _declare_reads(_effect_text(model_set, name, section, terms, made))
+    problems = Problems()
+    effect = read_effect(_parse_text(name, text), problems)
+    problems.raise_if_errors()
+    placed_effect = PlacedEffect(effect, place, place)
+    start, phases = {}, {}
+    for part in made:
+        start.update(
+            {
+                placed_effect.qualified_name(name): value
+                for name, value in part.initial_values.items()
+            }
+        )
+        phases.update(
+            {placed_effect.qualified_name(name): value for name, value in part.phases.items()}
+        )
+    return FormulaEffect(placed_effect, text, tuple(terms), start, phases)
+
+
+def _parse_text(name: str, text: str) -> Document:
+    return parse_document(Source(f"{name}.yaml", tuple(text.splitlines())), text)
+
+
+def _declare_reads(text: str) -> str:
+    """Return the text of an effect that says which names of the model it reads."""
+    foreign = external_names(_parse_text("formula", text).root)
+    head, sign, rest = text.partition("\nat: ")
+    place, _, more = rest.partition("\n")
+    reads = f"\nreads: [{', '.join(foreign)}]" if foreign else ""
+    return f"{head}{sign}{place}{reads}\n{more}"
+
+
+@dataclass(frozen=True)
+class _TermText:
+    """The lines of one term: by section, and its summand."""
+
+    parameters: list[str]
+    states: list[str]
+    flow: list[str]
+    equations: list[str]
+    summand: str
+    initial_values: dict[str, float]
+    phases: dict[str, tuple[float, ...]]
+
+
+def _term_text(
+    model_set: ModelSet, section: str, place: str, k: int, term: LibraryTerm, weights: Reals
+) -> _TermText:
+    a, turns, phase = f"a_{k}", f"turns_{k}", f"ph_{k}"
+    unit = _coefficient_unit(model_set, section, place, term)
+    size = float(np.sqrt(np.mean(np.sum(weights**2, axis=1)))) or 1e-6
+    value = size if term.order or term.per_recording else float(np.mean(weights[:, 0])) or 1e-6
+    each = ", per: recording" if term.per_recording else ""
+    most = f"{RANGE_FACTOR * size:.3g}"
+    parameters = [
+        f"{a}: {{value: 0, unit: {unit}, range: [-{most}, {most}], neutral: 0, "
+        f"starts: [{value:.4g}]{each}}}"
+    ]
+    own = {name: f"{name}_{k}" for name in term.states}
+    summand = f"{a} * {_rename_states(term.text, own)}" if term.text != "1" else a
+    equations = []
+    start, phases = {a: value}, {}
+    if term.per_recording:
+        phases[a] = tuple(float(one) for one in weights[:, 0])
+    if term.order:
+        parameters.append(f"{phase}: {{value: 0 rad, range: [-3.2, 3.2], per: recording}}")
+        equations.append(f"{turns}: ({term.order} * {own['th']} + {phase}) / 1 rev")
+        summand += f" * sin(({turns} - floor({turns})) * 1 rev)"
+        phases[phase] = tuple(float(np.arctan2(one[1], one[0])) for one in weights)
+    states = [f"{own[n]}: {{unit: {unit}, initial: 0}}" for n, (unit, _) in term.states.items()]
+    flow = [f"{own[n]}: {_rename_states(text, own)}" for n, (_, text) in term.states.items()]
+    return _TermText(parameters, states, flow, equations, summand, start, phases)
+
+
+def _rename_states(text: str, final_names: Mapping[str, str]) -> str:
+    for name, final in final_names.items():
+        text = re.sub(rf"(?<![\w.]){name}(?![\w(])", final, text)
+    return text
+
+
+def _coefficient_unit(model_set: ModelSet, section: str, place: str, term: LibraryTerm) -> str:
+    """Return the unit of a coefficient: that of the place over that of the term."""
+    whole = parse_unit(disturbance_unit(model_set, section, place) or "1").dimension
+    kind = TreeTypes(model_set.document.root).type_of_formula(
+        ScalarNode(term.unit_expression or term.text, Span(Source("term"), 1, 1))
+    )
+    return (
+        format_si_unit(dimension_product(whole, kind, -1))
+        if isinstance(kind, Dimension)
+        else format_si_unit(whole)
+    )
+
+
+def _effect_text(
+    model_set: ModelSet,
+    name: str,
+    section: str,
+    terms: Sequence[LibraryTerm],
+    parts: Sequence[_TermText],
+) -> str:
+    fits = {
+        "flow": "balance: {of: rate}",
+        "elements": "element: {kind: elastic}",
+        "outputs": "output: {}",
+    }
+    whole = " + ".join(part.summand for part in parts)
+    names = " and ".join(term.name for term in terms)
+    lines = [
+        "language: 1",
+        f"effect: {name}",
+        f"about: what recordings of {model_set.automaton.name} ask for beside its model, {names}",
+        f"at: {{{fits[section]}}}",
+    ]
+    equations = [line for part in parts for line in part.equations]
+    if section == "elements":
+        for name in element_torques(model_set.automaton):
+            whole = re.sub(rf"\b{name}\b", "base", whole)
+        equations.append(f"$torque: base + {whole}")
+    if section == "outputs":
+        equations.append(f"shown: $y + {whole}")
+    for key in ("parameters", "states", "flow"):
+        own = [line for part in parts for line in getattr(part, key)]
+        lines += [f"{key}:", *(f"  {line}" for line in own)] if own else []
+    lines += ["equations:", *(f"  {_quote_value(line)}" for line in equations)] if equations else []
+    if section == "flow":
+        lines += ["terms:", f"  $x: {{unknown: {_quote_flow_value(whole)}}}"]
+    if section == "outputs":
+        lines.append("redirect: {outputs: {$y: shown}}")
+    return "\n".join(lines) + "\n"
+
+
+def _quote_value(line: str) -> str:
+    key, _, value = line.partition(": ")
+    return f'{key}: "{value}"' if "," in value else line
+
+
+def _quote_flow_value(text: str) -> str:
+    return f'"{text}"' if "," in text else text
+
+
+def _format_term(
+    term: LibraryTerm,
+    k: int,
+    values: Mapping[str, Quantity],
+    fitted: Sequence[Mapping[str, float]],
+    placed_effect: PlacedEffect,
+) -> str:
+    amount = values[placed_effect.qualified_name(f"a_{k}")]
+    unit = "" if amount.unit == "1" else f" {amount.unit}"
+    own = [one[placed_effect.qualified_name(f"a_{k}")] for one in fitted]
+    number = f"{amount.value:.4g}{unit}"
+    if term.per_recording:
+        number = f"{{{', '.join(f'{one:.3g}' for one in own)}}}{unit}"
+    factor = "" if term.text == "1" else f" * {term.text}"
+    if not term.order:
+        late = f" ({term.name})" if term.states else ""
+        return number + factor + late
+    rate = next(iter(term.states.values()))[1].split("= ")[1]
+    phases = [one[placed_effect.qualified_name(f"ph_{k}")] for one in fitted]
+    phase = f"{phases[0]:.2f}" if len(phases) == 1 else "phase"
+    return f"{number}{factor} * sin({term.order} * angle of {rate} + {phase})"

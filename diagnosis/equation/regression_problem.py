@@ -1,0 +1,147 @@
+"""Excess: the innovations at a place as a regression problem, with a column for each term."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.predictor.predictions import Prediction
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.equation.disturbance_response import DisturbanceResponse, build_disturbance_response
+from diagnosis.equation.forward_regression import RegressionProblem, TermColumns, build_problem
+from diagnosis.equation.term_library import LibraryTerm, Signals, generate_terms
+from diagnosis.estimation.estimate import Estimate, with_normal_equations
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.acting_scale import place_bindings
+from diagnosis.localisation.correlate import angle_rates
+from language.expressions.units import Dimension
+from language.overlays.tree_types import TreeTypes, format_si_unit
+
+Reals = NDArray[np.float64]
+TEST_DISTURBANCE = 0.1
+"""Size of a disturbance that a term is tried with, in SI: small beside all that acts."""
+
+
+@dataclass(frozen=True)
+class EquationRegression:
+    """What is missing at a place: the regression `problem`, and `terms` with their `columns`."""
+
+    problem: RegressionProblem = field(repr=False)
+    terms: tuple[LibraryTerm, ...] = field(repr=False)
+    columns: tuple[TermColumns, ...] = field(repr=False)
+
+
+def regression_at(
+    model_set: ModelSet, model: Estimate, section: str, place: str
+) -> EquationRegression:
+    """Return what the innovations of a model ask for at a place. Raises SpecError."""
+    probe = build_disturbance_response(model_set, section, place, model)
+    zero_disturbance = [np.zeros(one.count) for one in model_set.series]
+    runs = probe.predict(zero_disturbance)
+    before = probe.innovations(runs)
+    weigh = _HuberWeights(model, before)
+    signals = _formula_signals(model_set, probe, runs)
+    shown = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
+    terms = tuple(generate_terms(signals, section, shown))
+    model = model if model.jacobian else with_normal_equations(model, model_set.series)
+    parameters = _parameter_responses(model, weigh)
+    waves: list[tuple[Reals, ...]] = []
+    columns: list[TermColumns] = []
+    free = parameters[0].shape[1]
+    for term in terms:
+        waves += [_weighted_response(probe, before, values, weigh) for values in term.values]
+        places = tuple(range(free, free + len(term.values)))
+        columns.append(TermColumns(term.name, places, term.has_recording_coefficients))
+        free += len(places)
+    rows = [np.stack(one, axis=1) for one in zip(*waves, strict=True)]
+    autocorrelation = integrated_autocorrelation(model, model_set.series)
+    problem = build_problem(weigh.weight_and_flatten(before), parameters, rows, autocorrelation)
+    return EquationRegression(problem, terms, tuple(columns))
+
+
+class _HuberWeights:
+    """Innovations over their standard deviations; those far out count less (Huber 1964)."""
+
+    def __init__(self, model: Estimate, innovations: Sequence[Reals]) -> None:
+        size = np.sqrt(model.prediction.variances)
+        limits = model.prediction.huber_limits
+        self.weights = [
+            np.where(np.isfinite(e), 1.0 / np.sqrt(np.maximum(np.abs(e) / limits, 1.0)), 0.0) / size
+            for e in innovations
+        ]
+
+    def weight_and_flatten(self, values: Sequence[Reals]) -> tuple[Reals, ...]:
+        pairs = zip(values, self.weights, strict=True)
+        return tuple((np.nan_to_num(one) * weight).reshape(-1) for one, weight in pairs)
+
+
+def _weighted_response(
+    response: DisturbanceResponse,
+    before: Sequence[Reals],
+    values: Sequence[Reals],
+    weights: _HuberWeights,
+) -> tuple[Reals, ...]:
+    """Return how the innovations fall where some values act, of each recording."""
+    size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
+    after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])
+    moved = [(a - b) * (size / TEST_DISTURBANCE) for a, b in zip(before, after, strict=True)]
+    return weights.weight_and_flatten(moved)
+
+
+def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals, ...]:
+    """Return how the innovations fall with each parameter (samples * seen, parameters)."""
+    columns = [
+        weights.weight_and_flatten(
+            [-model.jacobian[name][part] for part in model.prediction.slices]
+        )
+        for name in model.candidate.names
+    ]
+    return tuple(np.stack(one, axis=1) for one in zip(*columns, strict=True))
+
+
+def _formula_signals(
+    model_set: ModelSet, response: DisturbanceResponse, runs: Sequence[Prediction]
+) -> Signals:
+    """Return what formulas may read: states, inputs, torques and twists of elements."""
+    predictor = response.candidate.predictor
+    known = TreeTypes(model_set.document.root)
+    values: dict[str, list[Reals]] = {}
+    for name in model_set.automaton.states:
+        column = predictor.states.index(name)
+        values[name] = [one.states[:, column] for one in runs]
+    for column, name in enumerate(model_set.automaton.inputs):
+        values[name] = [one.inputs[:, column] for one in model_set.series]
+    for name in response.element_torques:
+        column = predictor.outputs.index(name)
+        values[name] = [one.outputs[:, column] for one in runs]
+    stretches = []
+    for name, element in model_set.automaton.elements.items():
+        if element.kind == "elastic":
+            twist = place_bindings(model_set, "elements", name).get("twist", "")
+            gap = place_bindings(model_set, "elements", name).get("gap", "")
+            if twist in values and gap in values:
+                text = f"({twist} - {gap})"
+                values[text] = [a - b for a, b in zip(values[twist], values[gap], strict=True)]
+                stretches.append(text)
+            elif twist in values:
+                stretches.append(twist)
+    units = {}
+    for name in values:
+        kind = known.type_of_name(name.strip("()").split(" ")[0])
+        units[name] = format_si_unit(kind) if isinstance(kind, Dimension) else "1"
+    speeds = tuple(
+        placed_effect.place
+        for placed_effect in model_set.disturbances
+        if placed_effect.place in values
+    )
+    forces = {units[name] for name in response.element_torques} | {"N*m", "N"}
+    torques = (
+        *(name for name in model_set.automaton.inputs if units[name] in forces),
+        *response.element_torques,
+    )
+    rates = tuple(name for name in angle_rates(model_set) if name in values)
+    period = float(model_set.period)
+    return Signals(values, units, speeds, torques, tuple(stretches), rates, period)

@@ -1,0 +1,1 @@
+"""Estimation of parameters and noise from recordings by the innovations likelihood."""

@@ -1,0 +1,128 @@
+"""Gains: of an observer, made from a candidate near where each of its modes was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.innovations import KalmanGains, NoiseLevels, PredictionResult
+from diagnosis.estimation.linearisation import LinearModel
+from diagnosis.estimation.operating_point import linearise_modes
+from diagnosis.model.candidate import Candidate
+
+Reals = NDArray[np.float64]
+INITIAL_STD_FRACTION = 0.01
+"""Standard deviation of a state at the start, as a part of its range."""
+MIN_INTEGRATOR_EIGENVALUE = 0.999
+"""Part of itself that an integral keeps over a sample, and what decays does not."""
+MODEL_NOISE_FRACTION = 1e-7
+"""Process noise of every state per sample, as a part of its range: no gain is ever quite 0."""
+
+
+@dataclass(frozen=True)
+class LocalModel:
+    """A candidate in one mode near where that was seen: `linear` over one sample with its process
+    noise `q` (states, states), the standard deviations `start` (states,) that its states begin
+    with, and the usual `stay` in it [samples].
+    """
+
+    linear: LinearModel
+    q: Reals
+    initial_std: Reals
+    dwell_samples: int
+
+
+def kalman_gains(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    values: Mapping[str, float],
+    noise_levels: NoiseLevels,
+    prediction: PredictionResult | None = None,
+) -> KalmanGains:
+    """Return the gains of a candidate at `values`, near where `prediction` saw each mode.
+
+    In another mode than the one that lasts longest the gain is that at the usual length of a stay,
+    which began with what was known before: in a gap it would never be steady.
+    """
+    count = burn_in_samples(series[0])
+    steady_by_mode: dict[int, Reals] = {}
+    first = np.zeros((0, len(candidate.state_ranges), len(noise_levels.outputs)))
+    covariance = np.zeros(0)
+    for mode, local in local_models(candidate, series, values, noise_levels, prediction).items():
+        model_terms = local.linear.phi, local.linear.c, local.q, noise_levels.outputs**2
+        if steady_by_mode:
+            gains = candidate.predictor.compute_gains(
+                *model_terms, covariance, 0, local.dwell_samples
+            )
+        else:
+            gains = candidate.predictor.compute_gains(
+                *model_terms, np.diag(local.initial_std**2), count
+            )
+        if gains is not None:
+            first, covariance = (first, covariance) if steady_by_mode else (gains[0], gains[2])
+            steady_by_mode[mode] = gains[1]
+    zero_gain = np.zeros((len(candidate.state_ranges), len(noise_levels.outputs)))
+    default_gain = next(iter(steady_by_mode.values()), zero_gain)
+    modes = candidate.predictor.modes
+    steady = np.array(
+        [
+            zero_gain if noise_levels.is_output_error else steady_by_mode.get(mode, default_gain)
+            for mode in modes
+        ]
+    )
+    return KalmanGains(first, np.ascontiguousarray(steady))
+
+
+def local_models(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    values: Mapping[str, float],
+    noise_levels: NoiseLevels,
+    prediction: PredictionResult | None = None,
+) -> dict[int, LocalModel]:
+    """Return a candidate at `values` near where `prediction` saw each mode, the longest stay first.
+
+    Its process noise is that of the inputs, of the drifts, and next to none of what is unsure.
+    Delays are left out of it: what is shown late would seem to know nothing of the states.
+    """
+    zero_delays = dict.fromkeys(candidate.compiled.delays, 0.0)
+    page = candidate.calibration_page({**values, **zero_delays}, series[0])
+    input_covariance, models = np.diag(noise_levels.inputs**2), {}
+    disturbance_variances = _disturbance_variances(candidate, noise_levels, float(series[0].period))
+    for mode, (linear, stay) in linearise_modes(candidate, series, page, prediction).items():
+        uncertain_ranges = np.where(
+            _is_effect_integrator(candidate, linear), 0.0, candidate.state_ranges
+        )
+        q = linear.b @ input_covariance @ linear.b.T + np.diag(
+            (MODEL_NOISE_FRACTION * uncertain_ranges) ** 2
+        )
+        for place, variance in disturbance_variances.items():
+            q[place, place] = variance
+        models[mode] = LocalModel(linear, q, INITIAL_STD_FRACTION * uncertain_ranges, stay)
+    return models
+
+
+def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[np.bool_]:
+    """Tell which states (states,) are an effect's integrals, such as an angle.
+
+    What such a one shows changes its sign as it turns: a gain made at one angle would be wrong.
+    """
+    keeps = linear.phi.diagonal() > MIN_INTEGRATOR_EIGENVALUE
+    return np.asarray(keeps & candidate.is_effect_state, dtype=np.bool_)
+
+
+def _disturbance_variances(
+    candidate: Candidate, noise_levels: NoiseLevels, period: float
+) -> dict[int, float]:
+    """Return the process noise of each state that drifts, by its place."""
+    variances = {}
+    for name, memory in zip(candidate.disturbance_states, candidate.compiled.memories, strict=True):
+        decay = np.exp(-period / memory)
+        place = candidate.predictor.states.index(name)
+        variances[place] = noise_levels.process.get(name, 0.0) ** 2 * (1.0 - decay**2)
+    return variances

@@ -1,0 +1,130 @@
+"""Bench: the base, the recordings and the effects at hand, from which candidates are made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.checkpoint import NO_CACHE, FitCache
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.model.candidate import Candidate, compile_candidate
+from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect, find_placements
+from language.expressions.units import parse_unit
+from language.model.automaton import Automaton
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project
+from language.text.diagnostic import SpecError
+from language.text.document import Document, MappingNode
+
+FitFunction = Callable[[], Estimate]
+FORCE_DIMENSIONS = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)
+"""What a balance of forces or torques is in: drifts act there, a sensor's filter is none."""
+EXCLUDED_EFFECTS = ("unknown_input", "sensor_quantisation")
+"""Effects that no parameter is fitted of: one is found as a drift, one only adds noise."""
+
+
+@dataclass(frozen=True)
+class ModelSet:
+    """A base automaton, with recordings of the same period, and effects to lay over it."""
+
+    document: Document
+    project: Project
+    automaton: Automaton
+    effects: tuple[Effect, ...]
+    series: tuple[SampledRecording, ...]
+    output_names: tuple[str, ...]
+    disturbances: tuple[PlacedEffect, ...]
+    fit_cache: FitCache = NO_CACHE
+    _compiled: dict[tuple[str, ...], Candidate] = field(default_factory=dict, repr=False)
+
+    def load_or_fit(
+        self, label: str, candidate: Candidate, dependencies: Sequence[object], fit: FitFunction
+    ) -> Estimate:
+        """Return a fit to the recordings, as it was kept or made now; it follows from `dependencies`."""
+        return self.fit_cache.load_or_fit(label, candidate, self.series, dependencies, fit)
+
+    @property
+    def period(self) -> Fraction:
+        """The time [s] between samples."""
+        return self.series[0].period
+
+    def compile_candidate(
+        self,
+        placed_effects: Sequence[PlacedEffect],
+        disturbances: Sequence[PlacedEffect] | None = None,
+    ) -> Candidate:
+        """Return the base with layers, compiled; made once. Raises SpecError."""
+        disturbances = self.disturbances if disturbances is None else disturbances
+        key = (
+            *(placed_effect.id for placed_effect in placed_effects),
+            *(placed_effect.id for placed_effect in disturbances),
+        )
+        if key not in self._compiled:
+            self._compiled[key] = compile_candidate(
+                self.document,
+                self.project,
+                placed_effects,
+                disturbances,
+                self.output_names,
+                self.period,
+            )
+        return self._compiled[key]
+
+    def applicable_effects(self) -> Iterator[PlacedEffect]:
+        """Yield every effect at every place where these recordings could tell it."""
+        candidates = (one for one in self.effects if one.name not in EXCLUDED_EFFECTS)
+        for effect in candidates:
+            for placed_effect in find_placements(self.document, effect):
+                if self._is_applicable(placed_effect):
+                    yield placed_effect
+
+    def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:
+        """Return the base with layers, None where they do not go together."""
+        try:
+            return self.compile_candidate(placed_effects)
+        except SpecError:
+            return None
+
+    def try_compile_all(
+        self, combinations: Sequence[Sequence[PlacedEffect]]
+    ) -> list[Candidate | None]:
+        """Return `possible` for each; those that are new are compiled side by side."""
+        with ThreadPoolExecutor(os.cpu_count()) as compilers:
+            return list(compilers.map(self.try_compile, combinations))
+
+    def _is_applicable(self, placed_effect: PlacedEffect) -> bool:
+        """An input must move, an output be compared, a balance be one of forces."""
+        name = placed_effect.place
+        if name in self.automaton.inputs:
+            column = list(self.automaton.inputs).index(name)
+            return any(float(one.inputs[:, column].std()) > 0.0 for one in self.series)
+        if (
+            name in self.automaton.states
+            and placed_effect.effect.place_patterns[0].kind == "balance"
+        ):
+            return _is_force_balance(self.document, self.automaton, name)
+        if placed_effect.effect.place_patterns[0].kind == "output":
+            return name in self.output_names
+        return True
+
+
+def balance_disturbances(document: Document, automaton: Automaton) -> tuple[PlacedEffect, ...]:
+    """Return a drift for each balance of forces or torques."""
+    return tuple(
+        disturbance_effect("balance", name)
+        for name in automaton.states
+        if _is_force_balance(document, automaton, name)
+    )
+
+
+def _is_force_balance(document: Document, automaton: Automaton, name: str) -> bool:
+    place = find_effect_place(document.root, disturbance_effect("balance", name).effect, name)
+    flow = document.root.get("flow")
+    if isinstance(place, PlaceMismatch) or not isinstance(flow, MappingNode):
+        return False
+    return parse_unit(str(place.holes["force"])).dimension.powers in FORCE_DIMENSIONS

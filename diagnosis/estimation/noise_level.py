@@ -1,0 +1,206 @@
+"""Level: how much an unknown disturbance may drift at each place, chosen by likelihood.
+
+A drift of one unit moves a compared signal by its own noise within `REACH` seconds. While effects
+are named it is held small: a free one would swallow the physics that is sought.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.innovations import NoiseLevels, measured_noise_levels
+from diagnosis.estimation.jacobian import Jacobian
+from diagnosis.estimation.levenberg_marquardt import iterate
+from diagnosis.estimation.noise_covariance import MAX_NOISE_RATIO, fit_noise_covariance
+from diagnosis.estimation.operating_point import linearise_near, operating_points
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter_vector import ParameterVector
+
+UNIT_RESPONSE_TIME = 0.2
+"""Seconds in which a drift of one unit shows."""
+LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
+"""Standard deviations that a drift may have, in its unit; the last is the most while naming."""
+INITIAL_LEVELS = (0.1, 0.3, 1.0)
+"""Those from which a base is fitted: a fit with much drift does not find its way to less."""
+SMALL_LEVEL = INITIAL_LEVELS[0]
+"""That from which a candidate is fitted as well."""
+HUBER_STDS = 4.0
+"""Standard deviations beyond which an innovation counts as that far."""
+NOISE_FACTOR = 1.5
+"""Factor by which the noise of inputs or of a signal is changed at a time."""
+MIN_GAIN = 2.0
+"""Another level is taken where it gains this much [nats]."""
+
+
+def disturbance_units(
+    candidate: Candidate, series: Sequence[SampledRecording], start: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the unit [SI] of each drift of a candidate, for the noise that was measured."""
+    output_noise = measured_noise_levels(series, {}).outputs
+    mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
+    page = candidate.calibration_page(start, series[0])
+    linear = linearise_near(candidate, page, mode, operating_point.states, operating_point.inputs)
+    if linear is None:
+        raise ValueError("the base is unstable where the first recording starts")
+    count = max(1, round(UNIT_RESPONSE_TIME / float(series[0].period)))
+    ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
+    units = {}
+    for name in candidate.disturbance_states:
+        noise_ratios = np.abs(ahead[:, candidate.predictor.states.index(name)]) / output_noise
+        units[name] = 1.0 / max(float(np.max(noise_ratios)), 1e-12)
+    return units
+
+
+def line_search_noise(
+    estimate: Estimate,
+    series: Sequence[SampledRecording],
+    units: Mapping[str, float],
+) -> Estimate:
+    """Return an estimate with the drifts that the recordings ask for, its parameters held.
+
+    Only drifts that have a unit are moved. What is known of the noise of inputs and signals is
+    known to a factor only: with a gain that is not the best, anything would seem to gain.
+    """
+    for name in units:
+        level_index = _nearest_level(estimate.noise_levels.process.get(name, 0.0), units[name])
+        for direction in (1, -1):
+            while 0 <= level_index + direction < len(LEVELS):
+                drifts = {
+                    **estimate.noise_levels.process,
+                    name: LEVELS[level_index + direction] * units[name],
+                }
+                noise_levels = dataclasses.replace(estimate.noise_levels, process=drifts)
+                trial = evaluate(
+                    estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
+                )
+                if not trial.cost < estimate.cost - MIN_GAIN:
+                    break
+                estimate, level_index = trial, level_index + direction
+    return _line_search_signal_noise(estimate, series)
+
+
+def _line_search_signal_noise(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return an estimate with the noise of its inputs, then of each signal, scaled.
+
+    Not far from what was measured: a model that lacks something would trust in its signals alone.
+    """
+    measured = measured_noise_levels(series, {})
+    for place in range(-1, len(estimate.noise_levels.outputs)):
+        for factor in (NOISE_FACTOR, 1.0 / NOISE_FACTOR):
+            noise_levels = _scale_noise(estimate.noise_levels, place, factor)
+            while _is_near_measured(noise_levels, measured, place):
+                trial = evaluate(
+                    estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
+                )
+                if not trial.cost < estimate.cost - MIN_GAIN:
+                    break
+                estimate, noise_levels = trial, _scale_noise(noise_levels, place, factor)
+    return estimate
+
+
+def _is_near_measured(noise_levels: NoiseLevels, reference: NoiseLevels, channel: int) -> bool:
+    """Tell whether the noise of the inputs (-1) or of a signal is near what was measured."""
+    now, measured = (
+        (noise_levels.inputs, reference.inputs)
+        if channel < 0
+        else (noise_levels.outputs[channel], reference.outputs[channel])
+    )
+    ratio = np.max(now / np.maximum(measured, 1e-300), initial=0.0, where=np.asarray(measured) > 0)
+    return bool(1.0 / MAX_NOISE_RATIO <= ratio <= MAX_NOISE_RATIO)
+
+
+def _scale_noise(noise_levels: NoiseLevels, channel: int, factor: float) -> NoiseLevels:
+    """Return noises with that of the inputs (-1) or of a signal by its place scaled."""
+    if channel < 0:
+        return dataclasses.replace(noise_levels, inputs=factor * noise_levels.inputs)
+    seen = noise_levels.outputs.copy()
+    seen[channel] *= factor
+    return dataclasses.replace(noise_levels, outputs=seen)
+
+
+def fit_with_noise(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    units: Mapping[str, float],
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
+) -> Estimate:
+    """Return parameters and levels found together, from levels that fit where parameters lead.
+
+    `jacobian` are slopes of the candidate near the start, `nearby` a model near it, if there are such.
+    """
+    now = iterate(candidate, series, noise_levels, start, jacobian=jacobian, nearby=nearby)
+    return fit_noise_covariance(line_search_noise(now, series, units), series, units)
+
+
+def fit_candidate(
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    noise_levels: NoiseLevels,
+    start: Mapping[str, float] | ParameterVector,
+    units: Mapping[str, float],
+    known_cost: float = -np.inf,
+    jacobian: Jacobian | None = None,
+    nearby: Estimate | None = None,
+) -> Estimate:
+    """Return a fit with next to no drift at first, or a better one with those that `noise_levels` has.
+
+    What a model explains it has to explain without drifts; a fit with much does not find there.
+    The other one is tried where the first does not come below a `known_cost` cost [nats].
+    """
+    small_process = {
+        **noise_levels.process,
+        **{name: SMALL_LEVEL * unit for name, unit in units.items()},
+    }
+    small_noise = dataclasses.replace(noise_levels, process=small_process)
+    first = fit_with_noise(candidate, series, small_noise, start, units, jacobian, nearby)
+    has_small_noise = all(
+        noise_levels.process.get(name, 0.0) <= small_process[name] for name in units
+    )
+    if has_small_noise or first.cost < known_cost:
+        return first
+    second = fit_with_noise(candidate, series, noise_levels, start, units, jacobian, nearby)
+    return min(first, second, key=lambda one: one.cost)
+
+
+def fit_base(
+    candidate: Candidate, series: Sequence[SampledRecording], units: Mapping[str, float]
+) -> Estimate:
+    """Return the base fitted once to recordings from where it is declared.
+
+    How far innovations usually are out, beyond which they count no more, is known after it.
+    """
+    first = fit_with_noise(candidate, series, measured_noise_levels(series, units), {}, units)
+    limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
+    return dataclasses.replace(
+        first, noise_levels=dataclasses.replace(first.noise_levels, huber_limits=limits)
+    )
+
+
+def recalibrate(
+    first: Estimate, series: Sequence[SampledRecording], units: Mapping[str, float]
+) -> Estimate:
+    """Return the base fitted to recordings from a first fit, with drifts from little to much, until
+    two come to rest alike.
+    """
+    fits: list[Estimate] = []
+    for level in INITIAL_LEVELS:
+        if len(fits) > 1 and abs(fits[-1].cost - fits[-2].cost) < MIN_GAIN:
+            break
+        drifts = {name: level * unit for name, unit in units.items()}
+        known = dataclasses.replace(first.noise_levels, process=drifts)
+        best = min(fits, key=lambda one: one.cost, default=first)
+        start, columns = best.point, best.jacobian
+        fits.append(fit_with_noise(first.candidate, series, known, start, units, columns, best))
+    return min(fits, key=lambda one: one.cost)
+
+
+def _nearest_level(value: float, unit: float) -> int:
+    return int(np.argmin([abs(level - value / unit) for level in LEVELS]))

@@ -1,0 +1,77 @@
+"""Adaptation: what each recording has of its own - a phase, a grade - found with all else held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import (
+    Estimate,
+    evaluate,
+    evaluate_with_gains_of,
+    innovations_at,
+    with_normal_equations,
+)
+from diagnosis.estimation.levenberg_marquardt import INITIAL_DAMPING, search_damping
+from diagnosis.model.parameter_vector import ParameterVector
+
+MAX_ITERATIONS = 5
+"""Most steps of what other recordings have of their own."""
+
+
+def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return a model for other recordings, with the gains that it has.
+
+    What all recordings share stays where it is; only what each has of its own is fitted, from the
+    best of its starts.
+    """
+    shared = model.point.shared
+    now = evaluate_with_gains_of(
+        model, series, ParameterVector(shared, np.tile(shared, (len(series), 1)))
+    )
+    if not any(one.per_recording for one in model.candidate.free_parameters):
+        return now
+    now = min(
+        now,
+        evaluate_with_gains_of(model, series, restart_phases(now, series).point),
+        key=lambda one: one.cost,
+    )
+    damping = INITIAL_DAMPING
+    still = np.zeros(now.prediction.stacked.shape)
+    held = {one.name: still for one in model.candidate.free_parameters if not one.per_recording}
+    for _ in range(MAX_ITERATIONS if np.isfinite(now.cost) else 0):
+        better, damping = search_damping(
+            with_normal_equations(now, series, held), series, damping, own_only=True
+        )
+        if better is None:
+            break
+        now = better
+    return now
+
+
+def restart_phases(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return an estimate with what each recording has of its own where it is, or at a better start.
+
+    A phase that was turned while others were unknown may have come to rest at a wrong one.
+    """
+    uncertain = estimate.candidate.free_parameters
+    own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
+    if not own or not np.isfinite(estimate.cost):
+        return estimate
+    variances = estimate.prediction.variances
+    best = estimate.point.per_recording.copy()
+    lowest = np.sum(estimate.prediction.runs.squared_sums / variances, axis=1)
+    for k in own:
+        trials = [best.copy() for _ in uncertain[k].starts]
+        for trial, start in zip(trials, uncertain[k].starts, strict=True):
+            trial[:, k] = uncertain[k].coordinate(start)
+        trials = [trial for trial in trials if not np.array_equal(trial, best)]
+        points = [ParameterVector(estimate.point.shared, trial) for trial in trials]
+        for trial, there in zip(trials, innovations_at(estimate, series, points), strict=True):
+            each = np.sum(there.robust_square_sums / variances, axis=1)
+            better = each < lowest
+            best[better, k], lowest[better] = trial[better, k], each[better]
+    point = ParameterVector(estimate.point.shared, best)
+    return evaluate(estimate.candidate, series, estimate.noise_levels, point, estimate.prediction)

@@ -1,0 +1,14 @@
+"""An estimated quantity with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A fitted number [unit] with its standard deviation."""
+
+    value: float
+    unit: str
+    std: float

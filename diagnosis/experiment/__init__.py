@@ -1,0 +1,1 @@
+"""Experiments that discriminate between candidates which recordings do not separate."""

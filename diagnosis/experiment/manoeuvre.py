@@ -1,0 +1,114 @@
+"""Manoeuvre: a course of the inputs that might tell candidates apart, as large as recorded ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.model_set import ModelSet
+from language.expressions.units import Dimension
+from language.overlays.tree_types import TreeTypes
+
+Reals = NDArray[np.float64]
+FORCE_UNITS = ("N*m", "N")
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """A manoeuvre as `series` without measurements but the first ones: where it starts."""
+
+    name: str
+    series: SampledRecording = field(repr=False)
+
+
+def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
+    """Return the menu for what is driven on a bench; nothing where no force or torque drives it."""
+    forces = [name for name in model_set.automaton.inputs if _is_force(model_set, name)]
+    names = list(model_set.automaton.inputs)
+    whole = np.concatenate([one.inputs for one in model_set.series])
+    moved = [name for name in forces if float(np.std(whole[:, names.index(name)])) > 0.0]
+    if not moved:
+        return []
+    both = [name for name in moved if _has_both_signs(whole[:, names.index(name)])]
+    drive = (both or moved)[0]
+    brake = next((name for name in moved if name != drive), None)
+    found = []
+    for name, course in _read_manoeuvres().items():
+        if "brake" in course and brake is None:
+            continue
+        found.append(Manoeuvre(name, _manoeuvre_series(model_set, name, course, drive, brake)))
+    return found
+
+
+@cache
+def _read_manoeuvres() -> Mapping[str, Mapping[str, Any]]:
+    text = resources.files("diagnosis").joinpath("manoeuvres.yaml").read_text("utf-8")
+    menu: Mapping[str, Mapping[str, Any]] = yaml.safe_load(text)
+    return menu
+
+
+def _is_force(model_set: ModelSet, name: str) -> bool:
+    kind = TreeTypes(model_set.document.root).type_of_name(name)
+    return isinstance(kind, Dimension) and str(kind) in FORCE_UNITS
+
+
+def _has_both_signs(values: Reals) -> bool:
+    return bool(np.min(values) < 0.0 < np.max(values))
+
+
+def _manoeuvre_series(
+    model_set: ModelSet, name: str, definition: Mapping[str, Any], drive: str, brake: str | None
+) -> SampledRecording:
+    period = float(model_set.period)
+    count = round(definition["drive"][-1][0] / period) + 1
+    time = np.arange(count) * period
+    names = list(model_set.automaton.inputs)
+    whole = np.concatenate([one.inputs for one in model_set.series])
+    inputs = np.tile(np.median(whole, axis=0), (count, 1))
+    largest = np.max(np.abs(whole), axis=0)
+    wanted = _interpolate(time, definition["drive"]) + _chirp(time, definition.get("sweep"))
+    inputs[:, names.index(drive)] = largest[names.index(drive)] * wanted
+    if brake is not None:
+        part = _interpolate(time, definition["brake"]) if "brake" in definition else np.zeros(count)
+        inputs[:, names.index(brake)] = largest[names.index(brake)] * part
+    measured = np.full((count, len(model_set.output_names)), np.nan)
+    measured[0] = _initial_outputs(model_set, definition["start"])
+    return SampledRecording(
+        name,
+        model_set.period,
+        Fraction(0),
+        inputs,
+        measured,
+        model_set.series[0].is_first_order_hold,
+    )
+
+
+def _interpolate(time: Reals, points: Sequence[Sequence[float]]) -> Reals:
+    times, values = np.array(points, dtype=float).T
+    return np.asarray(np.interp(time, times, values), dtype=np.float64)
+
+
+def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
+    if sweep is None:
+        return np.zeros(len(time))
+    low, high, amplitude, mean = sweep
+    rate = (high - low) / time[-1]
+    phase = 2.0 * np.pi * (low + 0.5 * rate * time) * time
+    return np.asarray(mean + amplitude * np.sin(phase), dtype=np.float64)
+
+
+def _initial_outputs(model_set: ModelSet, part: float) -> Reals:
+    """Return what was recorded where the first signal is a part of its largest, or nearest."""
+    rows = np.concatenate([one.measured for one in model_set.series])
+    rows = rows[np.all(np.isfinite(rows), axis=1)]
+    wanted = part * float(np.max(np.abs(rows[:, 0])))
+    return np.asarray(rows[int(np.argmin(np.abs(rows[:, 0] - wanted)))], dtype=np.float64)

@@ -1,0 +1,1 @@
+"""Localisation of a mismatch: the balance, element or output at which a disturbance acts."""

@@ -1,0 +1,79 @@
+"""Scale: how much acts at a place, so that what is missing there can be told as a part of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.placed_effect import disturbance_effect
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
+
+Reals = NDArray[np.float64]
+DISTURBANCE_KIND_BY_SECTION = {"flow": "balance", "elements": "element", "outputs": "output"}
+"""Sections of places to kinds of drifts."""
+
+
+def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -> float:
+    """Return the root mean square [SI] of what acts at a place; 0 where that cannot be told.
+
+    Of a balance what accelerates it, of an element its elastic torque, of an output the signal.
+    """
+    if section == "outputs":
+        column = model_set.output_names.index(place)
+        return float(
+            np.nanstd(np.concatenate([one.measured[:, column] for one in model_set.series]))
+        )
+    holes = place_bindings(model_set, section, place)
+    factor = _coefficient_value(
+        model_set, model, holes.get("inertia" if section == "flow" else "stiffness", "")
+    )
+    name = place if section == "flow" else holes.get("twist", "")
+    states = model.candidate.predictor.states
+    if factor is None or name not in states:
+        return 0.0
+    runs = zip(model_set.series, model.prediction.predictions, strict=True)
+    rows = [run.states[burn_in_samples(one) : run.completed] for one, run in runs]
+    if section == "flow":
+        period = float(model_set.period)
+        moved = [np.diff(one[:, states.index(name)]) / period for one in rows]
+        return factor * _rms(np.concatenate(moved))
+    gap = holes.get("gap", "")
+    slack = [one[:, states.index(gap)] if gap in states else 0.0 for one in rows]
+    twist = [one[:, states.index(name)] - free for one, free in zip(rows, slack, strict=True)]
+    return factor * _rms(np.concatenate(twist))
+
+
+def disturbance_unit(model_set: ModelSet, section: str, place: str) -> str:
+    """Return the unit of what is unknown at a place."""
+    return place_bindings(model_set, section, place).get(
+        "unit" if section == "outputs" else "force", ""
+    )
+
+
+def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, str]:
+    """Return what effects find at a place, as texts; nothing where no drift can be laid."""
+    kind = DISTURBANCE_KIND_BY_SECTION.get(section)
+    if kind is None:
+        return {}
+    found = find_effect_place(
+        model_set.document.root, disturbance_effect(kind, place).effect, place
+    )
+    if isinstance(found, PlaceMismatch):
+        return {}
+    return {name: value for name, value in found.holes.items() if isinstance(value, str)}
+
+
+def _coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float | None:
+    """Return the value of a coefficient that is a parameter."""
+    known = model.values(0).get(text)
+    declared = model_set.automaton.parameters.get(text)
+    if known is not None or declared is None or declared.value is None:
+        return known
+    return float(declared.value)
+
+
+def _rms(values: Reals) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0

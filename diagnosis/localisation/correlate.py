@@ -1,0 +1,130 @@
+"""Companion: what an unknown goes along with - a sign of a speed, its square, an order, time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from language.text.document import MappingNode, ScalarNode
+
+Reals = NDArray[np.float64]
+MAX_CORRELATES = 3
+"""Companions that are told."""
+ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
+"""Periods per turn that are looked for."""
+
+
+def find_correlates(
+    model_set: ModelSet, free_model: Estimate, disturbances: Sequence[Reals]
+) -> tuple[tuple[str, float], ...]:
+    """Return what a drift goes along with: features with their correlation, the strongest first.
+
+    Of an order of an angle, which has a phase of its own in each recording, it is the multiple
+    correlation with its sine and cosine.
+    """
+    target = [values - np.mean(values) for values in disturbances]
+    correlations = []
+    for name, parts in _features(model_set, free_model).items():
+        values = np.concatenate(_known_parts(parts, disturbances))
+        target_values = np.concatenate(disturbances)
+        if np.std(values) > 0.0 and np.std(target_values) > 0.0:
+            correlations.append((name, float(np.corrcoef(values, target_values)[0, 1])))
+    correlations.append(
+        ("the recording (not the same in each)", _recording_correlation(disturbances))
+    )
+    angles = _order_angles(model_set, free_model).items()
+    correlations += [
+        (name, _order_correlation(target, _known_parts(each, disturbances)))
+        for name, each in angles
+    ]
+    correlations = [(name, value) for name, value in correlations if np.isfinite(value)]
+    return tuple(sorted(correlations, key=lambda pair: -abs(pair[1]))[:MAX_CORRELATES])
+
+
+def order_features(rate: str) -> dict[str, int]:
+    """Return the features that are orders of the angle of a rate, with the periods per turn."""
+    return {f"order {order} of the angle of {rate}": order for order in ORDERS}
+
+
+def _known_parts(parts: Sequence[Reals], disturbances: Sequence[Reals]) -> list[Reals]:
+    """Return the part of each recording in which its drift is known: all but the start."""
+    pairs = zip(parts, disturbances, strict=True)
+    return [part[len(part) - len(values) :] for part, values in pairs]
+
+
+def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
+    columns: dict[str, list[Reals]] = {}
+    states = free_model.candidate.predictor.states
+    for one, prediction in zip(model_set.series, free_model.prediction.predictions, strict=True):
+        rows, period = prediction.states[: prediction.completed], float(one.period)
+        for name, state in model_set.automaton.states.items():
+            if state.range and name in states:
+                x = rows[:, states.index(name)]
+                scale = float(np.std(x)) or 1.0
+                sign: Reals = np.tanh(10.0 * x / scale)
+                columns.setdefault(f"the sign of {name}", []).append(sign)
+                columns.setdefault(f"the square of {name}", []).append(x * np.abs(x))
+                columns.setdefault(name, []).append(x)
+        for k, name in enumerate(model_set.automaton.inputs):
+            u = one.inputs[: prediction.completed, k]
+            columns.setdefault(name, []).append(u)
+            columns.setdefault(f"the amount of {name}", []).append(np.abs(u))
+            rate: Reals = np.asarray(np.gradient(u), dtype=np.float64) / period
+            columns.setdefault(f"the rate of {name}", []).append(rate)
+        columns.setdefault("time", []).append(
+            np.arange(prediction.completed, dtype=np.float64) * period
+        )
+    return columns
+
+
+def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
+    """Return the angles of orders of what turns: the rates that places and elements declare."""
+    states = free_model.candidate.predictor.states
+    rates = [rate for rate in angle_rates(model_set) if rate in states]
+    found = {}
+    for rate in rates:
+        column = states.index(rate)
+        period = float(model_set.period)
+        angles = [
+            np.cumsum(one.states[: one.completed, column]) * period
+            for one in free_model.prediction.predictions
+        ]
+        for name, order in order_features(rate).items():
+            found[name] = [order * angle for angle in angles]
+    return found
+
+
+def angle_rates(model_set: ModelSet) -> list[str]:
+    """Return what is the rate of an angle, as `elements` and `places` declare it."""
+    rates = []
+    for section in ("places", "elements"):
+        node = model_set.document.root.get(section)
+        for entry in node if isinstance(node, MappingNode) else ():
+            rate = entry.node.get("angle_rate") if isinstance(entry.node, MappingNode) else None
+            if isinstance(rate, ScalarNode):
+                rates.append(rate.text)
+    return list(dict.fromkeys(rates))
+
+
+def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> float:
+    whole, explained = 0.0, 0.0
+    for values, angle in zip(target, angles, strict=True):
+        waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        waves = waves - np.mean(waves, axis=0)
+        weights = np.linalg.lstsq(waves, values, rcond=None)[0]
+        whole += float(values @ values)
+        explained += float(np.sum((waves @ weights) ** 2))
+    return float(np.sqrt(explained / whole)) if whole > 0.0 else 0.0
+
+
+def _recording_correlation(disturbances: Sequence[Reals]) -> float:
+    """Return the correlation with the mean of each recording; 0 with a single one."""
+    if len(disturbances) < 2:
+        return 0.0
+    means = np.concatenate([np.full(len(values), np.mean(values)) for values in disturbances])
+    spread = float(np.std(np.concatenate(disturbances)))
+    return float(np.std(means)) / spread if spread > 0.0 else 0.0

@@ -1,0 +1,62 @@
+"""Place sentence: where something is missing, how much, when and with what, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.acting_scale import disturbance_unit
+from diagnosis.localisation.cause import balance_of
+from diagnosis.localisation.location import Location
+
+PLACE_PHRASES = {
+    "flow": "in the balance of",
+    "inputs": "at the input",
+    "outputs": "in the signal",
+    "elements": "in the element",
+}
+SCALE_PHRASES = {
+    "flow": "of what accelerates it",
+    "elements": "of what its spring transmits",
+    "outputs": "of the signal's own spread",
+}
+NO_LOCATION = "nothing asks for a torque or force that the model lacks"
+MAX_WINDOWS = 2
+MIN_CORRELATION = 0.3
+"""A correlation below this is not told."""
+
+
+def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
+    """Return where something is missing, in one sentence; the first place is told."""
+    best = locations[0] if locations else None
+    if best is None or not (best.gain > 0.0 or best.is_accepted):
+        return NO_LOCATION
+    section, _, place = balance_of(model_set, best.section, best.place).partition(".")
+    unit = disturbance_unit(model_set, section, place)
+    size = f"{best.rms:.3g} {unit}".strip() + " rms"
+    if best.fraction > 0.0:
+        size += f" ({_format_percent(best.fraction)} {SCALE_PHRASES[section]})"
+    parts = [size, *_format_windows(best), *_format_correlates(best)]
+    return f"missing {PLACE_PHRASES[best.section]} {best.place}: {', '.join(parts)}"
+
+
+def _format_percent(part: float) -> str:
+    return f"{100.0 * part:.2g} %" if part < 1.0 else f"{100.0 * part:.0f} %"
+
+
+def _format_windows(location: Location) -> list[str]:
+    found = []
+    mode = max(location.modes, key=lambda name: location.modes[name], default="")
+    if len(location.modes) > 1:
+        found.append(f"{100.0 * location.modes[mode]:.0f} % of it in mode {mode}")
+    windows = [f"{a:.2f} to {b:.2f} s of {name}" for a, b, name in location.windows[:MAX_WINDOWS]]
+    if windows:
+        found.append(f"most at {' and '.join(windows)}")
+    return found
+
+
+def _format_correlates(location: Location) -> list[str]:
+    if not location.correlates or abs(location.correlates[0][1]) < MIN_CORRELATION:
+        return ["along with no single quantity"]
+    name, correlation = location.correlates[0]
+    return [f"along with {name} (r = {correlation:.2f})"]

@@ -1,0 +1,109 @@
+"""Location: where something is missing - the place whose drift the recordings ask for most.
+
+One drift at a time is let free beside the base; the one whose freedom explains most stands where
+the model is deficient (Kristensen, Madsen, Jorgensen 2004). Where effects were accepted, their
+places lead.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.cause import attribute_causes, balance_of, is_inactive
+from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
+from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
+from language.text.document import MappingNode
+
+ABSORBED_FRACTION = 0.3
+"""Part that counts of what the small drifts of the base take up as well."""
+
+
+def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
+    """Return every place with what its freedom explains, the best first, that over time.
+
+    With each freedom the parameters are fitted anew: those of the base were bent by what it lacks,
+    and a place would have to explain the bending as well.
+    """
+    free = [
+        (section, placed_effect, free_disturbance(model_set, base, placed_effect))
+        for section, placed_effect in disturbance_locations(model_set)
+    ]
+    restricted_cost = free_disturbance(model_set, base).cost
+    finite_costs = [one.cost for *_, one in free if np.isfinite(one.cost)]
+    restricted_cost = (
+        restricted_cost if np.isfinite(restricted_cost) else max(finite_costs, default=0.0)
+    )
+    ranked = []
+    for section, placed_effect, one in free:
+        if np.isfinite(one.cost):
+            location = location_of(model_set, section, placed_effect, one)
+            ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
+    ranked.sort(key=lambda location: -location.gain)
+    return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
+
+
+def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Location]) -> float:
+    """Return what the freedom of the best place gains [nats].
+
+    What the base takes up with drifts as small as it may have counts little: a model has some
+    disturbance. All the same a load that acts on the road is one of these.
+    """
+    gain = max((location.gain for location in locations), default=0.0)
+    taken_up = min(max(0.0, free_disturbance(model_set, base).cost - base.cost), gain)
+    return (gain - (1.0 - ABSORBED_FRACTION) * taken_up) / integrated_autocorrelation(
+        base, model_set.series
+    )
+
+
+def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
+    """Return a drift for each balance of forces, each elastic element, each compared output."""
+    locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
+    elements = model_set.document.root.get("elements")
+    for entry in elements if isinstance(elements, MappingNode) else ():
+        if model_set.automaton.elements[entry.key].kind == "elastic":
+            locations.append(("elements", disturbance_effect("element", entry.key)))
+    locations += [
+        ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
+    ]
+    return locations
+
+
+def rank_accepted_first(
+    locations: Sequence[Location], paths: Sequence[str], model_set: ModelSet
+) -> tuple[Location, ...]:
+    """Return places in which those of accepted effects lead, each with what is known there."""
+    by_path = {location.path: location for location in locations}
+    first: list[Location] = []
+    for path in dict.fromkeys(paths):
+        section, _, place = path.partition(".")
+        nearest = by_path.get(path) or by_path.get(balance_of(model_set, section, place))
+        entry = nearest or Location(section, place, 0.0, 0.0)
+        entry = entry if first else with_smoothed_disturbances(model_set, entry)
+        first.append(dataclasses.replace(entry, section=section, place=place, is_accepted=True))
+    return (*first, *(location for location in locations if location.path not in paths))
+
+
+def rank_causes_first(
+    locations: Sequence[Location], nearest_paths: Iterable[str], model_set: ModelSet
+) -> tuple[Location, ...]:
+    """Return places of something unknown, led by an input or a body that acts at the first one.
+
+    What it does over time tells which; else `nearest_paths`, the paths of what comes nearest to what is
+    missing and gains enough, best first.
+    """
+    if not locations:
+        return ()
+    known = (path for path in nearest_paths if not is_inactive(model_set, locations[0], path))
+    for path in (*attribute_causes(model_set, locations[0]), *known):
+        section, _, place = path.partition(".")
+        if balance_of(model_set, section, place) == locations[0].path:
+            first = dataclasses.replace(locations[0], section=section, place=place)
+            return tuple(locations) if path == locations[0].path else (first, *locations)
+    return tuple(locations)

@@ -1,0 +1,225 @@
+"""Smoothing: the states of a model at each sample, from what was recorded before and after it.
+
+A fixed-interval smoother in the modified Bryson-Frazier form (Bierman 1973, "Fixed interval
+smoothing with discrete measurements", Int. J. Control 18, equations of section 3), which inverts no
+covariance. It smooths the deviation from the run of the observer, whose mode is known at each
+sample: one step of a Gauss-Newton search for the likeliest run (Bell 1994, SIAM J. Optim. 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.kalman_gain import LocalModel, local_models
+
+Reals = NDArray[np.float64]
+AVERAGING_TIME = 1.0
+"""Seconds over which innovations are compared with what they should be."""
+LARGEST = 1e12
+"""A deviation beyond this is no model any more."""
+
+
+@dataclass(frozen=True)
+class SmoothedStates:
+    """The states of a recording with their standard deviations [SI], (samples, states) each."""
+
+    states: Reals
+    stds: Reals
+
+
+@dataclass(frozen=True)
+class SmootherInput:
+    """What recordings, side by side, are smoothed from; those that ended see nothing any more.
+
+    `missed` (samples, recordings, seen) by the observer's run, NaN where nothing is known, which
+    `pushed` its states (samples, recordings, states); `phi`, `q` (samples, recordings, states,
+    states) to the next sample, `c` (samples, recordings, seen, states).
+    """
+
+    innovations: Reals
+    corrections: Reals
+    phi: Reals
+    q: Reals
+    c: Reals
+
+
+@dataclass(frozen=True)
+class _MeasurementUpdate:
+    """One signal at one sample, each (recordings, ...): how it shows the states, over its variance
+    where it is known; the gain; what was missed; what that squared is of its variance.
+    """
+
+    output_row: Reals
+    inverse_variance: Reals
+    gain: Reals
+    innovation: Reals
+    normalised_square: Reals
+
+
+def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> list[SmoothedStates]:
+    """Return the states of a model in each recording that it was fitted to.
+
+    Standard deviations grow where the innovations around are larger than they should be.
+    """
+    candidate, noise_levels = estimate.candidate, estimate.noise_levels
+    locals_ = local_models(candidate, series, estimate.values(0), noise_levels, estimate.prediction)
+    if not locals_:
+        raise ValueError("the model is unstable in every mode")
+    steps = _smoother_input(estimate, series, locals_)
+    start = next(iter(locals_.values())).initial_std
+    after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)
+    result = []
+    for r, run in enumerate(estimate.prediction.predictions):
+        around = max(1, round(AVERAGING_TIME / float(series[r].period)))
+        scale = np.sqrt(np.maximum(_moving_mean(ratios[: run.completed, :, r], around), 1.0))
+        states = (
+            run.states[: run.completed]
+            - steps.corrections[: run.completed, r]
+            + after[: run.completed, r]
+        )
+        result.append(SmoothedStates(states, scale[:, None] * spread[: run.completed, r]))
+    return result
+
+
+def _smoother_input(
+    estimate: Estimate, series: Sequence[SampledRecording], models: dict[int, LocalModel]
+) -> SmootherInput:
+    runs, predictor = estimate.prediction.predictions, estimate.candidate.predictor
+    shape = max(run.completed for run in runs), len(runs)
+    innovations = np.full((*shape, len(predictor.outputs)), np.nan)
+    corrections = np.zeros((*shape, len(predictor.states)))
+    places = np.zeros(shape, dtype=np.int64)
+    modes, default_model = list(predictor.modes), next(iter(models.values()))
+    first, steady = estimate.gains.transient, estimate.gains.steady_state
+    for r, run in enumerate(runs):
+        mode_indices = np.array([modes.index(int(mode)) for mode in run.modes[: run.completed]])
+        gains = steady[mode_indices]
+        gains[: len(first)] = first[: len(gains)]
+        innovations[: run.completed, r], places[: run.completed, r] = (
+            run.innovations[: run.completed],
+            mode_indices,
+        )
+        corrections[: run.completed, r] = np.einsum(
+            "kij,kj->ki", gains, np.nan_to_num(innovations[: run.completed, r])
+        )
+    models_by_mode = [models.get(mode, default_model) for mode in modes]
+    phi, c = (
+        np.array([getattr(one.linear, name) for one in models_by_mode])[places]
+        for name in ("phi", "c")
+    )
+    return SmootherInput(
+        innovations, corrections, phi, np.array([one.q for one in models_by_mode])[places], c
+    )
+
+
+def smooth_deviations(
+    data: SmootherInput, initial_std: Reals, noise_variances: Reals
+) -> tuple[Reals, Reals, Reals]:
+    """Return smoothed deviations from a run and their standard deviations, (samples, recordings,
+    states) each, and what squared innovations are of their variances (samples, seen, recordings).
+
+    From standard deviations `initial_std` (states,), with variances `noise_variances` (seen,) of what is seen.
+    """
+    before, covariances, corrections = _forward_pass(data, initial_std, noise_variances)
+    after, spread = _backward_pass(data, before, covariances, corrections)
+    return (
+        after,
+        spread,
+        np.array([[one.normalised_square for one in each] for each in corrections]),
+    )
+
+
+def _forward_pass(
+    data: SmootherInput, initial_std: Reals, noise_variances: Reals
+) -> tuple[Reals, Reals, list[list[_MeasurementUpdate]]]:
+    """Return the deviations and their covariances before each sample, and what corrected them.
+
+    Signals correct one after the other; where one is not known its gain is 0. The deviation is from
+    the run before its own correction, which is what it was pushed by.
+    """
+    samples, recordings, states = data.corrections.shape
+    means, covariances = np.empty(data.corrections.shape), np.empty(data.phi.shape)
+    mean, p = np.zeros((recordings, states)), np.tile(np.diag(initial_std**2), (recordings, 1, 1))
+    updates = []
+    for k in range(samples):
+        if k > 0:
+            phi = data.phi[k - 1]
+            mean = _batch_matvec(phi, mean)
+            p = phi @ p @ phi.swapaxes(1, 2) + data.q[k - 1]
+        means[k], covariances[k] = mean, p
+        sample_updates = []
+        for j, variance in enumerate(noise_variances):
+            one = _measurement_update(data.c[k, :, j], data.innovations[k, :, j], mean, p, variance)
+            mean = mean + one.gain * one.innovation[:, None]
+            p = p - one.gain[:, :, None] * _batch_matvec(p, one.output_row)[:, None, :]
+            sample_updates.append(one)
+        mean = mean - data.corrections[k]
+        updates.append(sample_updates)
+    return means, covariances, updates
+
+
+def _measurement_update(
+    output_row: Reals, innovation: Reals, mean: Reals, p: Reals, variance: float
+) -> _MeasurementUpdate:
+    known = np.isfinite(innovation)
+    across = _batch_matvec(p, output_row)
+    whole = _batch_dot(output_row, across) + variance
+    inverse = np.where(known, 1.0 / whole, 0.0)
+    left = np.where(known, innovation - _batch_dot(output_row, mean), 0.0)
+    ratio = np.where(known, left**2 / whole, np.nan)
+    return _MeasurementUpdate(output_row, inverse, across * inverse[:, None], left, ratio)
+
+
+def _backward_pass(
+    data: SmootherInput,
+    means: Reals,
+    covariances: Reals,
+    corrections: list[list[_MeasurementUpdate]],
+) -> tuple[Reals, Reals]:
+    """Return smoothed deviations and standard deviations, (samples, recordings, states) each."""
+    samples, recordings, states = means.shape
+    adjoint, information = np.zeros((recordings, states)), np.zeros((recordings, states, states))
+    after, spread = np.empty(means.shape), np.empty(means.shape)
+    for k in range(samples - 1, -1, -1):
+        for one in reversed(corrections[k]):
+            weight = one.inverse_variance[:, None] * one.output_row
+            left = _batch_dot(one.gain, adjoint) + one.innovation * one.inverse_variance
+            adjoint = adjoint - one.output_row * left[:, None]
+            information_gain = _batch_matvec(information, one.gain)
+            cross_terms = one.output_row[:, :, None] * information_gain[:, None, :]
+            inner = _batch_dot(one.gain, information_gain)[:, None] * one.output_row + weight
+            information = information - cross_terms - cross_terms.swapaxes(1, 2)
+            information = information + one.output_row[:, :, None] * inner[:, None, :]
+        p = covariances[k]
+        after[k] = means[k] - _batch_matvec(p, adjoint)
+        variance_reduction = np.sum((p @ information) * p, axis=2)
+        spread[k] = np.sqrt(np.maximum(np.diagonal(p, axis1=1, axis2=2) - variance_reduction, 0.0))
+        if k > 0:
+            back = data.phi[k - 1].swapaxes(1, 2)
+            adjoint = _batch_matvec(back, adjoint)
+            information = back @ information @ data.phi[k - 1]
+    return after, spread
+
+
+def _moving_mean(ratios: Reals, width: int) -> Reals:
+    """Return the mean (samples,) of what is known of `ratios` (samples, seen) around each."""
+    window = np.ones(min(width, len(ratios)))
+    known = np.isfinite(ratios)
+    sums = np.convolve(np.sum(np.where(known, ratios, 0.0), axis=1), window, "same")
+    counts = np.convolve(np.sum(known, axis=1), window, "same")
+    return np.asarray(sums / np.maximum(counts, 1.0), dtype=np.float64)
+
+
+def _batch_matvec(matrices: Reals, vectors: Reals) -> Reals:
+    return (matrices @ vectors[:, :, None])[:, :, 0]
+
+
+def _batch_dot(first: Reals, second: Reals) -> Reals:
+    found: Reals = np.add.reduce(first * second, axis=1)
+    return found

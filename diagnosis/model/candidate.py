@@ -1,0 +1,222 @@
+"""Candidate: a model with layers, compiled, with the parameters that a fit may move."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.predictor.predictor import Predictor, build_predictor, columns_of
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.model.compile_cache import CompiledModel, cache_key, load_or_compile, node_text
+from diagnosis.model.parameter import FreeParameter, free_parameters_of
+from diagnosis.model.placed_effect import (
+    DISTURBANCE_STATE,
+    PlacedEffect,
+    automaton_with_effects,
+    lower_tunable_program,
+    minimum_substeps,
+)
+from language.expressions.syntax_tree import Name, names
+from language.lowering.delay_buffers import memory_calls_by_key
+from language.model.automaton import Automaton
+from language.model.declaration import Formula, Parameter
+from language.overlays.effect_reader import added_names
+from language.overlays.expand_document import Project
+from language.text.document import Document
+
+Reals = NDArray[np.float64]
+INITIAL_VALUE_NAME = "start_of_{}"
+"""The tunable that the start value of a compared state becomes."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A compiled model: `layers` over the base, its recipe, and its library.
+
+    `levels` are those of its noises, where a fit may move these beside its parameters.
+    """
+
+    placed_effects: tuple[PlacedEffect, ...]
+    compiled: CompiledModel
+    predictor: Predictor
+    noise_parameters: tuple[FreeParameter, ...] = ()
+
+    @cached_property
+    def free_parameters(self) -> tuple[FreeParameter, ...]:
+        """What a fit may move: parameters, behind them levels."""
+        return self.compiled.uncertain + self.noise_parameters
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the uncertain parameters."""
+        return tuple(one.name for one in self.free_parameters)
+
+    @property
+    def disturbance_states(self) -> tuple[str, ...]:
+        """The states that drift."""
+        return self.compiled.drifts
+
+    @cached_property
+    def state_ranges(self) -> Reals:
+        """The width of the range of each state (states,), 1 where it has none."""
+        return np.array(self.compiled.spans)
+
+    @cached_property
+    def is_effect_state(self) -> NDArray[np.bool_]:
+        """Which states effects have brought (states,)."""
+        return np.array(self.compiled.brought, dtype=np.bool_)
+
+    @cached_property
+    def is_per_recording(self) -> NDArray[np.bool_]:
+        """Which parameters each recording has of its own (parameters,)."""
+        return np.array([one.per_recording for one in self.free_parameters], dtype=np.bool_)
+
+    @cached_property
+    def bounds(self) -> Reals:
+        """The ranges as coordinates (parameters, 2)."""
+        ranges = [one.bounds for one in self.free_parameters]
+        return np.array(ranges, dtype=np.float64).reshape(-1, 2)
+
+    def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
+        """Return the calibration for one recording: values, and where its states start."""
+        return np.asarray(
+            self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
+        )
+
+    def calibration_pages(
+        self, values: Sequence[Mapping[str, float]], first_measured: Reals
+    ) -> Reals:
+        """Return the calibration for each recording (recordings, tunables) from its values.
+
+        `first_measured` (recordings, seen) are the values that its signals start with, NaN if unknown.
+        """
+        is_shared = all(own is values[0] for own in values)
+        rows = [
+            list({**self._default_page, **own}.values())
+            for own in (values[:1] if is_shared else values)
+        ]
+        width = len(self._default_page)
+        pages = np.array([row[:width] for row in rows])
+        pages = np.repeat(pages, len(values), axis=0) if is_shared else pages
+        columns, places = self._initial_value_columns
+        initial_values = first_measured[:, columns]
+        known = np.isfinite(initial_values)
+        pages[:, places] = (
+            initial_values if known.all() else np.where(known, initial_values, pages[:, places])
+        )
+        return pages
+
+    @cached_property
+    def _default_page(self) -> dict[str, float]:
+        return dict(self.predictor.page)
+
+    @cached_property
+    def _initial_value_columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The columns of compared signals, and of the page where each one's state starts."""
+        places = {name: place for place, name in enumerate(self.predictor.page)}
+        fresh = [
+            (k, INITIAL_VALUE_NAME.format(name)) for k, name in enumerate(self.predictor.outputs)
+        ]
+        known = [(k, places[name]) for k, name in fresh if name in places]
+        columns, starts = np.array(known, dtype=np.intp).reshape(-1, 2).T
+        return columns, starts
+
+
+def compile_candidate(
+    document: Document,
+    project: Project,
+    placed_effects: Sequence[PlacedEffect],
+    disturbances: Sequence[PlacedEffect],
+    output_names: Sequence[str],
+    period: Fraction,
+) -> Candidate:
+    """Return the base with layers and drifts, compiled for a period [s] between samples.
+
+    Raises SpecError, ToolMissing.
+    """
+    all_layers = [*placed_effects, *disturbances]
+    parts = [
+        f"{placed_effect.id} {placed_effect.suffix} {node_text(placed_effect.effect.body)}"
+        for placed_effect in all_layers
+    ]
+    key = cache_key(node_text(document.root), *parts, *output_names, str(period))
+
+    def make() -> tuple[CompiledModel, bytes]:
+        made = automaton_with_effects(document, project, all_layers)
+        return _compile(made, placed_effects, disturbances, output_names, period)
+
+    recipe, library = load_or_compile(key, make)
+    return Candidate(tuple(placed_effects), recipe, Predictor(recipe.columns, library))
+
+
+def _compile(
+    automaton: Automaton,
+    placed_effects: Sequence[PlacedEffect],
+    disturbances: Sequence[PlacedEffect],
+    output_names: Sequence[str],
+    period: Fraction,
+) -> tuple[CompiledModel, bytes]:
+    effect_parameters = [
+        placed_effect.qualified_name(name)
+        for placed_effect in placed_effects
+        for name in added_names(placed_effect.effect.body)
+    ]
+    uncertain = free_parameters_of(automaton, effect_parameters)
+    with_initial_values = _with_tunable_initial_values(automaton, output_names)
+    initial_value_names = [
+        name for name in with_initial_values.parameters if name not in automaton.parameters
+    ]
+    names = [*(one.name for one in uncertain), *initial_value_names]
+    min_count = minimum_substeps(automaton, placed_effects, output_names, period)
+    program, substeps = lower_tunable_program(
+        with_initial_values, names, effect_parameters, period, min_count
+    )
+    columns = columns_of(program, output_names)
+    ranges = [automaton.states[name].range for name in columns.states]
+    recipe = CompiledModel(
+        columns,
+        substeps,
+        tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
+        uncertain,
+        tuple(placed_effect.qualified_name(DISTURBANCE_STATE) for placed_effect in disturbances),
+        tuple(
+            float(automaton.parameters[placed_effect.qualified_name("memory")].value or 1)
+            for placed_effect in disturbances
+        ),
+        _delay_parameters(automaton),
+        tuple(name in effect_parameters for name in columns.states),
+    )
+    with build_predictor(program, columns) as library:
+        return recipe, library.read_bytes()
+
+
+def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:
+    """Return the uncertain parameters that are the time of a `delay`."""
+    times = [tree.arguments[1] for tree in memory_calls_by_key(automaton, ("delay",)).values()]
+    read = {part.path for time in times for part in names(time)}
+    return tuple(name for name in automaton.parameters if name in read)
+
+
+def _with_tunable_initial_values(automaton: Automaton, output_names: Sequence[str]) -> Automaton:
+    """Return an automaton in which each compared state starts at a tunable of its own.
+
+    Also where an effect shows something else in its place: it starts near it.
+    """
+    parameters, states = dict(automaton.parameters), dict(automaton.states)
+    for output in output_names:
+        state = states.get(output)
+        if state is not None:
+            fresh = INITIAL_VALUE_NAME.format(output)
+            key, span = f"parameters.{fresh}", state.span
+            parameters[fresh] = Parameter(
+                fresh, "fixed", state.unit, Fraction(0), None, None, key, span
+            )
+            formula = Formula(Name(fresh, span), state.initial.key)
+            states[output] = dataclasses.replace(state, initial=formula)
+    return dataclasses.replace(automaton, parameters=parameters, states=states)

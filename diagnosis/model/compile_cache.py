@@ -1,0 +1,144 @@
+"""Recipe: what is known of a compiled candidate, kept beside its library for the next run.
+
+Laying effects, checking, lowering and printing take a second, a fit takes less: in a study the same
+candidates come again with each case.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import codegen
+import diagnosis
+import language
+from codegen.predictor.predictor import PredictorColumns
+from codegen.toolchain.build_cache import cache_subfolder
+from diagnosis.model.parameter import FreeParameter
+from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+
+COMPILATION_MODULES = ("candidate", "layers", "recipe", "series", "uncertain")
+"""The files of diagnosis that candidates are made by."""
+
+
+@dataclass(frozen=True)
+class CompiledModel:
+    """A candidate but for its library: `columns` of its arrays, `substeps` of a sample, `spans` of
+    its states, `uncertain` parameters, `drifts` (states) and their `memories` [s]; `delays` are
+    parameters that are one, and `brought` tells which states the effects have.
+    """
+
+    columns: PredictorColumns
+    substeps: int
+    spans: tuple[float, ...]
+    uncertain: tuple[FreeParameter, ...]
+    drifts: tuple[str, ...]
+    memories: tuple[float, ...]
+    delays: tuple[str, ...] = ()
+    brought: tuple[bool, ...] = ()
+
+
+def cache_key(*parts: str) -> str:
+    """Return the key of what candidates of this code are made from."""
+    digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
+    for part in parts:
+        digest.update(part.encode() + b"\\0")
+    return digest.hexdigest()
+
+
+def node_text(node: YamlNode | None) -> str:
+    """Return a tree of a document as one text, without places."""
+    if isinstance(node, ScalarNode):
+        return json.dumps(node.text)
+    if isinstance(node, SequenceNode):
+        return f"[{','.join(node_text(item) for item in node.nodes)}]"
+    if isinstance(node, MappingNode):
+        return f"{{{','.join(f'{json.dumps(e.key)}:{node_text(e.node)}' for e in node)}}}"
+    return ""
+
+
+def load_or_compile(
+    key: str, compile_model: Callable[[], tuple[CompiledModel, bytes]]
+) -> tuple[CompiledModel, Path]:
+    """Return the recipe and the library of a key; both are made and kept where they are not."""
+    folder = _cache_folder()
+    recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        metadata = json.loads(recipe_path.read_text())
+        if hashlib.sha256(library.read_bytes()).hexdigest() == metadata.pop("library"):
+            return _from_json(metadata), library
+    recipe, data = compile_model()
+    library_digest = hashlib.sha256(data).hexdigest()
+    text = json.dumps({**dataclasses.asdict(recipe), "library": library_digest})
+    write_atomically(library, data)
+    write_atomically(recipe_path, text.encode())
+    return recipe, library
+
+
+@cache
+def _cache_folder() -> Path:
+    """The user's own folder of candidates; one for this process alone where there is none."""
+    return cache_subfolder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
+
+
+@cache
+def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
+    """Return the hash of the code that fits follow from: of `patterns` files of diagnosis (patterns)."""
+    digest = hashlib.sha256()
+    files = [
+        file for package in (language, codegen) for file in _source_files(_package_folder(package))
+    ]
+    files += [file for name in patterns for file in _source_files(_package_folder(diagnosis), name)]
+    for path in sorted(files):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _package_folder(package: ModuleType) -> Path:
+    return Path(str(package.__file__)).parent
+
+
+def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
+    for ending in ("py", "jinja", "yaml", "lark"):
+        yield from folder.glob(f"**/{name}.{ending}")
+
+
+def _from_json(data: dict[str, Any]) -> CompiledModel:
+    given: dict[str, Any] = data["columns"]
+    columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+    uncertain = tuple(
+        FreeParameter(**{**u, "starts": tuple(u["starts"])}) for u in data["uncertain"]
+    )
+    return CompiledModel(
+        PredictorColumns(**columns),
+        int(data["substeps"]),
+        tuple(data["spans"]),
+        uncertain,
+        tuple(data["drifts"]),
+        tuple(data["memories"]),
+        tuple(data["delays"]),
+        tuple(data["brought"]),
+    )
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write a file of the cache: all of it or nothing."""
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(name, 0o700)
+        os.replace(name, path)
+    except OSError:
+        Path(name).unlink(missing_ok=True)
+        raise

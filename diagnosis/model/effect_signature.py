@@ -1,0 +1,154 @@
+"""Signature: how an effect shows - a base and the same with the effect, under steps of an input."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from diagnosis.model.parameter import free_parameters_of
+from diagnosis.model.placed_effect import (
+    PlacedEffect,
+    automaton_with_effects as laid_automaton,
+    effect_names,
+)
+from engine.results.mode_band import PALETTE
+from engine.results.plot import Picture
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import single_instance_system
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project
+from language.overlays.tree_types import format_si_unit
+from language.text.diagnostic import Source
+from language.text.document import Document
+from language.text.project_files import parse_document
+
+HORIZON = 4
+"""Time of the manoeuvre [s]: forwards, from 1 s backwards, from 2.5 s forwards again."""
+DEFAULT_STEP_HEIGHTS = {"N*m": "40", "N": "100"}
+"""Height of the steps by the unit of the input, 1 for others."""
+MAX_OUTPUTS = 4
+BLUE, RED, *_ = PALETTE
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Runs of a base without and with an effect; `values` are its parameters, with units."""
+
+    placed_effect: PlacedEffect
+    step: str
+    values: Mapping[str, str]
+    without_effect: Trajectory
+    with_effect: Trajectory
+
+
+def simulate_signature(
+    document: Document,
+    project: Project,
+    placed_effect: PlacedEffect,
+    step: tuple[str, str] | None = None,
+) -> Signature:
+    """Return an effect's signature over an expanded base; `step` is an input and its height.
+
+    Raises SpecError, ValueError.
+    """
+    base = laid_automaton(document, project, ())
+    name, height = step or _default_step(base, placed_effect)
+    if name not in base.inputs:
+        raise ValueError(f"`{base.name}` has no input `{name}`: {', '.join(base.inputs)}")
+    whole, values = _with_visible_effect(
+        laid_automaton(document, project, (placed_effect,)), placed_effect
+    )
+    text = _scenario_text(base, name, height)
+    runs = [_simulate(one, project, text) for one in (base, whole)]
+    return Signature(placed_effect, f"{name} = {height}", values, *runs)
+
+
+def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, str]:
+    """Return the input that the effect is laid on, else the first one that has no default."""
+    if not base.inputs:
+        raise ValueError(f"`{base.name}` has no input to step")
+    free = [name for name, one in base.inputs.items() if one.default is None]
+    name = (
+        placed_effect.place
+        if placed_effect.place in base.inputs
+        else next(iter([*free, *base.inputs]))
+    )
+    unit = format_si_unit(base.inputs[name].unit.dimension)
+    return name, f"{DEFAULT_STEP_HEIGHTS.get(unit, '1')} {unit}"
+
+
+def _with_visible_effect(
+    whole: Automaton, placed_effect: PlacedEffect
+) -> tuple[Automaton, dict[str, str]]:
+    """Return an automaton in which the effect's parameters are away from where it vanishes."""
+    brought = effect_names(placed_effect)
+    parameters, values = dict(whole.parameters), dict[str, str]()
+    for one in free_parameters_of(whole, list(brought)):
+        if one.name in brought:
+            neutral = parameters[one.name].fitting.neutral
+            is_neutral = neutral == parameters[one.name].value
+            value = one.starts[-1] if one.starts and is_neutral else one.start
+            exact = Fraction(repr(value))
+            parameters[one.name] = dataclasses.replace(parameters[one.name], value=exact)
+            unit = "" if one.unit == "1" else f" {one.unit}"
+            values[one.name.removesuffix(f"_{placed_effect.suffix}")] = f"{value:.5g}{unit}"
+    return dataclasses.replace(whole, parameters=parameters), values
+
+
+def _scenario_text(base: Automaton, input_name: str, height: str) -> str:
+    back = height.removeprefix("-") if height.startswith("-") else f"-{height}"
+    lines = ["language: 1", "scenario: signature", f"of: {base.name}", f"horizon: {HORIZON} s"]
+    lines.append("inputs:")
+    for name, one in base.inputs.items():
+        if name == input_name:
+            lines.append(f"  {name}: {{start: {height}, steps: {{1 s: {back}, 2.5 s: {height}}}}}")
+        elif one.default is None:
+            lines.append(f"  {name}: 0 {format_si_unit(one.unit.dimension)}")
+    return "\n".join([*lines, "record: {every: 5 ms}", ""])
+
+
+def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
+    system = single_instance_system(automaton)
+    document = parse_document(Source("signature", tuple(text.splitlines())), text)
+    return simulate(system, read_scenario(document, project, system))
+
+
+def draw_signature(signature: Signature) -> Picture:
+    """Return both runs, output by output, and beneath each what the effect changes."""
+    names = [
+        name
+        for name in signature.without_effect.signals
+        if name not in signature.without_effect.modes
+    ]
+    names = names[:MAX_OUTPUTS]
+    figure = Figure(figsize=(8.5, 1.0 + 2.1 * len(names)), layout="constrained")
+    rows = figure.subplots(
+        2 * len(names), 1, sharex=True, squeeze=False, height_ratios=[1.7, 1.0] * len(names)
+    )
+    for k, name in enumerate(names):
+        above, beneath = rows[2 * k][0], rows[2 * k + 1][0]
+        one, other = signature.without_effect, signature.with_effect
+        above.plot(one.times, one.signals[name], "--", color=RED, lw=1.2, label="without")
+        above.plot(other.times, other.signals[name], color=BLUE, lw=1.2, label="with the effect")
+        count = min(len(one.times), len(other.times))
+        change = np.asarray(other.signals[name][:count], float) - one.signals[name][:count]
+        beneath.plot(one.times[:count], change, color=BLUE, lw=1.1)
+        beneath.axhline(0.0, color="black", lw=0.6)
+        label = f"{name.partition('.')[2] or name} [{signature.without_effect.units[name]}]"
+        above.set_ylabel(label, fontsize=9, parse_math=False)
+        beneath.set_ylabel("change", fontsize=9)
+        for axis in (above, beneath):
+            axis.grid(alpha=0.3)
+    rows[0][0].legend(loc="best", fontsize=8)
+    values = ", ".join(f"{name} = {text}" for name, text in signature.values.items())
+    title = f"{signature.placed_effect.id}: {values or 'no parameter'}; steps of {signature.step}"
+    rows[0][0].set_title(title, loc="left", fontsize=11, parse_math=False)
+    rows[-1][0].set_xlabel("time [s]")
+    return Picture(figure)

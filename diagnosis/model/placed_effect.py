@@ -1,0 +1,261 @@
+"""Layers: effects and drifts laid over the automaton under diagnosis, and its Program.
+
+A drift is a slow unknown disturbance at one place (an Ornstein-Uhlenbeck process): with it an
+observer follows what the model leaves out, and the place at which it is needed is where something
+is missing (Kristensen, Madsen, Jorgensen 2004).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import resources
+from pathlib import Path
+
+from diagnosis.data.sampled_recording import has_feedthrough
+from language.expressions.units import parse_unit
+from language.ir.program import Program
+from language.loading.load import automaton_of, program_of
+from language.lowering.delay_buffers import memory_calls_by_key, uses_function
+from language.model.automaton import Automaton
+from language.overlays.apply_effect import apply_effect
+from language.overlays.effect_place import PlaceMismatch, find_effect_place
+from language.overlays.effect_reader import Effect, EffectApplication, added_names, read_effect
+from language.overlays.expand_document import Project, read_document
+from language.overlays.tree_types import formula_entries
+from language.programs.continuous_program import stable_step_limits
+from language.text.diagnostic import Problems, Source, Span
+from language.text.document import Document, MappingNode, ScalarNode
+
+DISTURBANCE_STATE = "drift"
+
+SLOWLY_VARYING_FORMS = ("constant_or_random_walk",)
+"""Forms of an effect's parameter that may change along a recording."""
+
+TIME_DIMENSION = parse_unit("s").dimension.powers
+
+KINDS = ("balance", "element", "output")
+
+PLACE_KIND_BY_SECTION = {
+    "flow": "balance",
+    "inputs": "input",
+    "elements": "element",
+    "outputs": "output",
+}
+"""The kind of place that the names of a section are."""
+
+MAX_STEP = Fraction(5, 1000)
+"""Longest major step [s] of a prediction; events inside it are located."""
+
+STABLE_FRACTION = Fraction(1, 2)
+"""A step is at most this part of the largest stable one: parameters move while they are fitted."""
+
+PARAMETER_FACTOR = Fraction(4)
+"""How far an effect's parameter may move while it is fitted, as a factor."""
+
+MIN_DELAY_STEPS = 4
+"""Fewest major steps between two samples of a model with a delay: none is shorter than a step."""
+
+MAX_ANGLE_STEP = Fraction(1, 1000)
+"""Longest major step [s] of one with an input that goes along with an angle: motors turn by much in
+a sample. A tone of 12 periods a turn at 100 rad/s then has five steps a period."""
+
+MAX_STEPS = 40
+"""Most major steps between two samples."""
+
+
+@dataclass(frozen=True)
+class PlacedEffect:
+    """An effect at a place; `ending` is what its names end with."""
+
+    effect: Effect
+    place: str
+    suffix: str
+
+    @property
+    def id(self) -> str:
+        """`effect@place`, as it stands in a variant."""
+        return f"{self.effect.name}@{self.place}"
+
+    def qualified_name(self, name: str) -> str:
+        """Return the name that one of the effect's own names has in the automaton."""
+        return f"{name}_{self.suffix}"
+
+
+def has_parameters(placed_effect: PlacedEffect) -> bool:
+    """Tell whether an effect has numbers to fit; one that has none follows anything at all."""
+    return placed_effect.effect.body.get("parameters") is not None
+
+
+def varies_slowly(placed_effect: PlacedEffect) -> bool:
+    """Tell whether a number of an effect may change slowly along a recording."""
+    known = placed_effect.effect.body.get("parameters")
+    entries = known if isinstance(known, MappingNode) else ()
+    forms = [one.node.get("form") for one in entries if isinstance(one.node, MappingNode)]
+    return any(isinstance(one, ScalarNode) and one.text in SLOWLY_VARYING_FORMS for one in forms)
+
+
+def read_effects(folder: Path) -> tuple[Effect, ...]:
+    """Return the effects of a folder, by name. Raises SpecError."""
+    problems = Problems()
+    found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
+    problems.raise_if_errors()
+    return tuple(found)
+
+
+def shipped_effects() -> tuple[Effect, ...]:
+    """Return the effects that come with the product."""
+    return read_effects(Path(str(resources.files("spec"))) / "effects")
+
+
+def disturbance_effect(kind: str, place: str) -> PlacedEffect:
+    """Return the drift of a balance, an element or an output."""
+    path = Path(str(resources.files("diagnosis"))) / "drifts" / f"drift_of_{kind}.yaml"
+    return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
+
+
+def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
+    """Return an effect at every place of an automaton where it can be laid."""
+    root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
+    names = [
+        name
+        for name, own in _place_kinds(document).items()
+        if own & kinds and not isinstance(find_effect_place(root, effect, name), PlaceMismatch)
+    ]
+    return tuple(PlacedEffect(effect, name, name) for name in names)
+
+
+def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
+    """Return an expanded document with layers laid over it, in their order. Raises SpecError."""
+    problems = Problems()
+    root = document.root
+    span = Span(Source("diagnosis"), 1, 1)
+    for placed_effect in placed_effects:
+        laying = EffectApplication(
+            placed_effect.effect, placed_effect.place, placed_effect.suffix, {}, {}, span
+        )
+        root = apply_effect(root, laying, problems)
+        problems.raise_if_errors()
+    return dataclasses.replace(document, root=root)
+
+
+def automaton_with_effects(
+    document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
+) -> Automaton:
+    """Return the checked automaton with layers laid over it. Raises SpecError."""
+    return automaton_of(overlay_effects(document, placed_effects), project)
+
+
+def lower_tunable_program(
+    automaton: Automaton,
+    names: Sequence[str],
+    effect_parameters: Sequence[str],
+    period: Fraction,
+    at_least: int = 1,
+) -> tuple[Program, int]:
+    """Return the Program in which `names` are tunable, and its steps in a period [s].
+
+    The step is a whole part of the period, one of at least `at_least`; it is stable for parameters
+    that effects `effect_parameters` at a quarter and at four times their value, and no longer than a time
+    that they brought: where a rate is limited, stability is not known beforehand.
+    """
+    scaled = [
+        _scale_parameters(automaton, effect_parameters, factor)
+        for factor in (PARAMETER_FACTOR, 1 / PARAMETER_FACTOR)
+    ]
+    variants = [one for one in scaled if one.parameters != automaton.parameters]
+    stable = [_stable_step(one, MAX_STEP) for one in (automaton, *variants)]
+    longest = min(*stable, *_time_values(automaton, effect_parameters), MAX_STEP)
+    substeps = min(max(at_least, -(-period // longest)), MAX_STEPS)
+    parameters = {
+        name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
+        for name, parameter in automaton.parameters.items()
+    }
+    with_tunables = dataclasses.replace(automaton, parameters=parameters, step=period / substeps)
+    return program_of(with_tunables), int(substeps)
+
+
+def _time_values(automaton: Automaton, names: Sequence[str]) -> list[Fraction]:
+    """Return the values [s] of those parameters that are times."""
+    known = [automaton.parameters[name] for name in names if name in automaton.parameters]
+    return [
+        parameter.value
+        for parameter in known
+        if parameter.value and parameter.unit.dimension.powers == TIME_DIMENSION
+    ]
+
+
+def minimum_substeps(
+    automaton: Automaton,
+    placed_effects: Sequence[PlacedEffect],
+    output_names: Sequence[str],
+    period: Fraction,
+) -> int:
+    """Return how many major steps there are to be in a period [s] between two samples at least.
+
+    Several where what is `output_names` shows an input at once as well: it is held within a step.
+    """
+    at_input = any(
+        placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
+    )
+    if at_input and uses_function(automaton, "floor"):
+        return int(-(-period // MAX_ANGLE_STEP))
+    is_short = memory_calls_by_key(automaton, ("delay",)) or has_feedthrough(
+        automaton, output_names
+    )
+    return MIN_DELAY_STEPS if is_short else 1
+
+
+def _stable_step(automaton: Automaton, max_step: Fraction) -> Fraction:
+    for limit in () if automaton.is_sampled else stable_step_limits(automaton):
+        stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
+        max_step = min(max_step, STABLE_FRACTION * stable)
+    return max(max_step, Fraction(1, 10**6))
+
+
+def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
+    """Return an automaton with some parameters scaled, within their ranges."""
+    parameters = dict(automaton.parameters)
+    for name in names:
+        parameter = parameters.get(name)
+        if parameter and parameter.range and parameter.value and parameter.type == "real":
+            low, high = parameter.range
+            value = min(max(parameter.value * factor, low), high)
+            parameters[name] = dataclasses.replace(parameter, value=value)
+    return dataclasses.replace(automaton, parameters=parameters)
+
+
+def _place_kinds(document: Document) -> dict[str, set[str]]:
+    """Return what effects may be laid on, with the kinds of place that each could be."""
+    found: dict[str, set[str]] = {}
+    for section, kind in PLACE_KIND_BY_SECTION.items():
+        node = document.root.get(section)
+        names = [entry.key for entry in getattr(node, "entries", {}).values()]
+        names += [item.text for item in getattr(node, "nodes", ()) if hasattr(item, "text")]
+        for name in names:
+            found.setdefault(name, set()).add(kind)
+    for name, _ in formula_entries(document.root, "flow"):
+        found.get(name, set()).add("balance")
+    return found
+
+
+SECTION_BY_PLACE_KIND = {
+    "balance": "flow",
+    "input": "inputs",
+    "output": "outputs",
+    "element": "elements",
+}
+
+
+def place_path(placed_effect: PlacedEffect) -> str:
+    """Return `section.name` of where an effect is laid."""
+    return f"{SECTION_BY_PLACE_KIND[placed_effect.effect.place_patterns[0].kind]}.{placed_effect.place}"
+
+
+def effect_names(placed_effect: PlacedEffect) -> dict[str, str]:
+    """Return the names that an effect brings into a model, with those that it has for them."""
+    return {
+        placed_effect.qualified_name(name): name for name in added_names(placed_effect.effect.body)
+    }

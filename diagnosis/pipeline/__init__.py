@@ -1,0 +1,1 @@
+"""The whole procedure: usable recordings, calibration, selection, decision, validation."""

@@ -1,0 +1,108 @@
+"""Case: what is diagnosed - a model, a map, recordings - and how its recordings are read."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
+from diagnosis.data.sampled_recording import SampledRecording, sample_windows
+from diagnosis.estimation.checkpoint import FitCache, hash_of
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.model.compile_cache import node_text
+from diagnosis.model.placed_effect import shipped_effects
+from engine.recordings.recording import Recording, read_recording
+from engine.recordings.recording_window import file_of
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project
+from language.text.document import Document
+
+BootstrapMode = Literal["never", "kept", "made"]
+"""Whether thresholds of a bootstrap are used: never, where one has left them, always."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is diagnosed: an expanded automaton, a map, and recordings.
+
+    `names` are those of files whose bare name is not theirs alone, `read` what was read already,
+    `opened` what is read on the way.
+    In the folder `stages` it is kept what was found, so that a diagnosis that was ended goes on
+    from there. `before` is called before each fit: it may raise what ends the diagnosis.
+    """
+
+    document: Document
+    project: Project
+    mapping: RecordingMap
+    train: tuple[Path, ...]
+    held_out: tuple[Path, ...] = ()
+    effects: tuple[Effect, ...] | None = None
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
+    bootstrap: BootstrapMode = "never"
+    names: Mapping[Path, str] = field(default_factory=dict)
+    recordings: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
+    opened_recordings: dict[Path, Recording] = field(default_factory=dict, repr=False)
+    checkpoint_folder: Path | None = None
+    before_fit: Callable[[], None] = lambda: None
+
+    def name_of(self, path: Path) -> str:
+        """Return what a recording is called."""
+        return self.names.get(path, path.name)
+
+
+def read_series(
+    path: Path, case: Case, automaton: Automaton, output_names: Sequence[str]
+) -> tuple[SampledRecording, ...]:
+    """Return a recording of a case on its grid, a series for each window that is used of it.
+
+    Raises SpecError, ValueError, ToolMissing.
+    """
+    used = [
+        column.name
+        for column in case.mapping.columns.values()
+        if column.to in automaton.inputs or column.compare in output_names
+    ]
+    recording = case.recordings.get(path)
+    if recording is None or not recording.channels.keys() >= set(used):
+        recording = case.opened_recordings[path] = read_recording(path, case.mapping, used)
+    named = dataclasses.replace(recording, name=case.name_of(path))
+    return sample_windows(named, case.mapping, automaton, output_names)
+
+
+def build_model_set(
+    case: Case,
+    automaton: Automaton,
+    series: Sequence[SampledRecording],
+    output_names: tuple[str, ...],
+) -> ModelSet:
+    """Return the bench of a case for some recordings as they were read."""
+    effects = case.effects if case.effects is not None else shipped_effects()
+    drifts = balance_disturbances(case.document, automaton)
+    bodies = [f"{one.name} {node_text(one.body)}" for one in effects]
+    fit_cache = FitCache(
+        case.checkpoint_folder, hash_of(node_text(case.document.root), bodies), case.before_fit
+    )
+    return ModelSet(
+        case.document,
+        case.project,
+        automaton,
+        effects,
+        tuple(series),
+        output_names,
+        drifts,
+        fit_cache,
+    )
+
+
+def file_digests(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
+    """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
+    return {
+        case.name_of(path): hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]
+        for path in files
+    }

@@ -1,0 +1,259 @@
+"""Diagnose: recordings against a model - recalibrate, locate, name, model, show.
+
+Selection knows the training recordings alone. What is held out is opened after that is final; it
+can confirm the verdict or not, and change nothing else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
+from diagnosis.data.sampled_recording import SampledRecording, compared_outputs, resample
+from diagnosis.equation.discovery import DiscoveredEquation
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.per_recording import reestimate_per_recording
+from diagnosis.experiment.discrimination import ExperimentPlan, plan_experiment
+from diagnosis.localisation.location import Location
+from diagnosis.localisation.location_text import format_location
+from diagnosis.localisation.ranking import rank_accepted_first, rank_causes_first
+from diagnosis.model.placed_effect import PlacedEffect, place_path
+from diagnosis.pipeline.case import Case, build_model_set, read_series
+from diagnosis.pipeline.decision import decide
+from diagnosis.result.effect_naming import named_effect_of, verdict_id
+from diagnosis.result.verdict import DecisionOutcome, NamedEffect, RankedCandidate, Verdict
+from diagnosis.selection.candidate_search import CandidateFit, LogCallback
+from diagnosis.selection.confusion_set import near_best
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.selection.intersample import recalibrate_by_hold
+from diagnosis.validation.free_simulation import compare_misfits
+from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
+from engine.recordings.recording_window import file_of, overlap
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.text.diagnostic import SpecError
+
+MAX_WORSE_RATIO = 1.1
+"""Part of the misfit of simulation from which on a signal is simulated worse."""
+CONFIRMATION_RATIO = 0.8
+"""Part of the misfit of simulation that is left at most where an effect is confirmed by it."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with the models behind it; `bench` holds the training recordings.
+
+    `description` is the formula that an unknown was turned into: it then is what was accepted.
+    `plan` is what would tell an accepted effect from those that do nearly as well. `shuffles` is
+    what follows the largest step: of the base, then of the model with what was accepted.
+    """
+
+    verdict: Verdict
+    selection: Selection = field(repr=False)
+    model_set: ModelSet = field(repr=False)
+    held_out: tuple[SampledRecording, ...] = field(repr=False)
+    equation: DiscoveredEquation | None = field(default=None, repr=False)
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
+    plan: ExperimentPlan | None = field(default=None, repr=False)
+    oscillations: tuple[Oscillation, ...] = field(default=(), repr=False)
+    unread: tuple[str, ...] = ()
+
+
+def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
+    """Return the diagnosis of a case. Raises SpecError, ValueError, ToolMissing."""
+    start_time = time.monotonic()
+    automaton = automaton_of(case.document, case.project)
+    seen = compared_outputs(case.mapping, automaton)
+    if not seen:
+        raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
+    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    raw = build_model_set(case, automaton, series, seen)
+    ways = recalibrate_by_hold(raw, log)
+    decision = decide(case, raw, ways, log)
+    model_set, selection, locations = decision.model_set, decision.selection, decision.locations
+    plan = plan_experiment(model_set, _models_to_discriminate(selection, automaton))
+    if plan is not None:
+        log(plan.format_sentence())
+    locations = rank_accepted_first(
+        locations, [place_path(tried.placed_effect) for tried in selection.accepted], model_set
+    )
+    if decision.outcome == "unknown":
+        candidates = _candidates_above(selection, decision.thresholds.default)
+        selection = dataclasses.replace(selection, rivals=near_best(candidates))
+        locations = rank_causes_first(
+            locations, [place_path(one.placed_effect) for one in candidates], model_set
+        )
+    fit = {"train": compare_misfits(decision.base, selection.model, model_set.series)}
+    verdict = _build_verdict(decision.outcome, selection, locations, automaton, fit)
+    hashes = {case.name_of(path): _file_digest(path) for path in case.train}
+    verdict = dataclasses.replace(
+        verdict, inputs=hashes, messages=(format_location(locations, model_set),)
+    )
+    held_out, unread = _read_held_out(
+        case, automaton, seen, model_set.series[0].is_first_order_hold
+    )
+    for text in unread:
+        log(text)
+    if held_out:
+        log(
+            "held out: "
+            + ", ".join(f"{case.name_of(path)} {_file_digest(path)}" for path in case.held_out)
+        )
+        held_out = choose_initial_inputs(
+            selection.base, [average_initial_inputs(one) for one in held_out]
+        )
+        verdict = _confirm(verdict, selection, held_out)
+    verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - start_time)
+    shuffles = _oscillations(selection, model_set)
+    details = decision.equation, decision.thresholds, plan, shuffles
+    return Diagnosis(verdict, selection, model_set, held_out, *details, unread=unread)
+
+
+def _read_held_out(
+    case: Case, automaton: Automaton, output_names: Sequence[str], is_first_order_hold: bool
+) -> tuple[tuple[SampledRecording, ...], tuple[str, ...]]:
+    """Open what is held out; what cannot be read is told, for the verdict stands without it."""
+    recordings: list[SampledRecording] = []
+    unread = []
+    for k, path in enumerate(case.held_out):
+        known = next((o for o in (*case.train, *case.held_out[:k]) if overlap(path, o)), None)
+        if known is not None:
+            named = f"{case.name_of(path)} was held out and cannot be used"
+            unread.append(f"{named}: it is a copy of {case.name_of(known)}")
+            continue
+        try:
+            recordings += resample(
+                read_series(path, case, automaton, output_names),
+                automaton,
+                output_names,
+                is_first_order_hold,
+            )
+        except (SpecError, ValueError) as error:
+            why = error.problems[0].label if isinstance(error, SpecError) else str(error)
+            unread.append(f"{case.name_of(path)} was held out and cannot be used: {why}")
+    return tuple(recordings), tuple(unread)
+
+
+def _oscillations(selection: Selection, model_set: ModelSet) -> tuple[Oscillation, ...]:
+    models = [selection.base, *([selection.model] if selection.accepted else [])]
+    found = [analyse_oscillation(model, model_set.series) for model in models]
+    return tuple(one for one in found if one is not None) if found[0] is not None else ()
+
+
+def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFit]:
+    """Return the candidates that gain more than the `min_gain` [nats], best first."""
+    rounds = selection.first_round
+    near = [
+        one for one in rounds if one.likelihood_gain and one.likelihood_gain.penalised > min_gain
+    ]
+    return sorted(near, key=lambda one: -one.score)
+
+
+def _models_to_discriminate(
+    selection: Selection, automaton: Automaton
+) -> list[tuple[str, Estimate]]:
+    """Return the first accepted effect and its rivals, by name."""
+    some = (*selection.accepted[:1], *selection.rivals)
+    return [
+        ("@".join(_verdict_name(tried.placed_effect, automaton)), tried.estimate)
+        for tried in some
+        if tried.estimate is not None and tried.estimate.normal_equations is not None
+    ]
+
+
+def _build_verdict(
+    outcome: DecisionOutcome,
+    selection: Selection,
+    locations: Sequence[Location],
+    automaton: Automaton,
+    fit: dict[str, dict[str, Misfit]],
+) -> Verdict:
+    effects = tuple(
+        named_effect_of(tried.placed_effect, selection.model, automaton)
+        for tried in selection.accepted
+    )
+    rivals = _name_rivals(selection, automaton)
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    base = {name: (before[name], after.get(name, before[name])) for name in before}
+    return Verdict(
+        outcome,
+        effects if outcome == "effect" else (),
+        _rank_candidates(selection, automaton),
+        selection.probabilities()["other"],
+        (*effects, *rivals) if outcome == "ambiguous" else rivals,
+        tuple(locations),
+        fit,
+        base,
+        None,
+        0.0,
+    )
+
+
+def _verdict_name(placed_effect: PlacedEffect, automaton: Automaton) -> tuple[str, str]:
+    """Return how verdicts name an effect, and its place."""
+    return verdict_id(placed_effect, automaton), place_path(placed_effect)
+
+
+def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[RankedCandidate, ...]:
+    """Return the fitted candidates, best first: forms of one name at one place are one."""
+    probabilities = selection.probabilities()
+    found: dict[tuple[str, str], RankedCandidate] = {}
+    for tried in selection.first_round:
+        if tried.likelihood_gain is None:
+            continue
+        name, each = _verdict_name(tried.placed_effect, automaton), tried.likelihood_gain
+        std = float(np.std(each.by_recording) * np.sqrt(len(each.by_recording)))
+        new = RankedCandidate(*name, probabilities[tried.placed_effect.id], each.penalised, std)
+        old = found.setdefault(name, new)
+        if old is not new:
+            both = old.probability + new.probability
+            found[name] = dataclasses.replace(old, probability=both)
+    return tuple(found.values())
+
+
+def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffect, ...]:
+    """Return the rivals as verdicts name them, but for other forms of what is named already."""
+    taken = [_verdict_name(one.placed_effect, automaton) for one in selection.accepted]
+    found: dict[tuple[str, str], NamedEffect] = {}
+    for tried in selection.rivals:
+        name = _verdict_name(tried.placed_effect, automaton)
+        if name not in taken and tried.estimate is not None:
+            found.setdefault(name, named_effect_of(tried.placed_effect, tried.estimate, automaton))
+    return tuple(found.values())
+
+
+def _confirm(
+    verdict: Verdict, selection: Selection, held_out: tuple[SampledRecording, ...]
+) -> Verdict:
+    """Return the verdict with what the held out recordings say of it.
+
+    They confirm it where they are foreseen better and no signal is simulated worse, or each much
+    better: a base that drifts may foresee as well without knowing why.
+    """
+    base = reestimate_per_recording(selection.base, held_out)
+    model = reestimate_per_recording(selection.model, held_out)
+    shown = compare_misfits(base, model, held_out)
+    fit = {**verdict.fit, "held_out": shown}
+    left = [one.nrmse_after / one.nrmse_before for one in shown.values() if one.nrmse_before]
+    is_foreseen = (
+        model.negative_log_likelihood < base.negative_log_likelihood
+        and max(left, default=0.0) < MAX_WORSE_RATIO
+    )
+    is_better = is_foreseen or max(left, default=1.0) < CONFIRMATION_RATIO
+    confirmed = is_better if selection.accepted else None
+    return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
+
+
+def _file_digest(path: Path) -> str:
+    return hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]

@@ -1,0 +1,190 @@
+"""Fit: parameters of an automaton from recordings, and how well these determine them.
+
+What each recording has of its own - where states start, slow disturbances - is taken up by the
+observer that foresees it from sample to sample, not by the parameters.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from diagnosis.data.sampled_recording import compared_outputs
+from diagnosis.estimation.covariance import correlations_of, quantities_of
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.model.parameter import FreeParameter
+from diagnosis.model.parameter_text import format_value
+from diagnosis.model.parameter_vector import vector_of
+from diagnosis.pipeline.case import Case, build_model_set, file_digests, read_series
+from diagnosis.selection.candidate_search import LogCallback
+from diagnosis.selection.intersample import best_hold, recalibrate_by_hold
+from diagnosis.validation.free_simulation import compare_misfits
+from diagnosis.validation.misfit import Misfit
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.text.diagnostic import Problems, Source, Span, suggest_name
+from language.text.document import Document, MappingNode
+from language.text.node_edit import put_node
+
+BOUND_TOLERANCE = 1e-3
+"""Part of its range from an end within which a parameter is at it."""
+UNDETERMINED_RATIO = 0.8
+"""Part of the prior's standard deviation that is left where data say next to nothing."""
+STRONG_CORRELATION = 0.9
+"""Correlation from which two parameters are hardly told apart."""
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A fitted parameter: what was declared, its value [SI], and how far data determine it.
+
+    `left` is its standard deviation as a part of its prior's: 1 where data say nothing. `strongest`
+    is the parameter that it is correlated with most, with the correlation.
+    """
+
+    name: str
+    declared: float
+    quantity: Quantity
+    prior_ratio: float
+    note: str
+    strongest_correlation: tuple[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters fitted to recordings; `misfits` of free simulation, as declared and as fitted.
+
+    `correlations` are those of pairs, the strongest first; `inputs` are hashes of the files.
+    """
+
+    automaton: Automaton
+    parameters: tuple[FittedParameter, ...]
+    correlations: Mapping[tuple[str, str], float]
+    misfits: Mapping[str, Misfit]
+    inputs: Mapping[str, str]
+    estimate: Estimate = field(repr=False)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """The parameters of which these data say next to nothing."""
+        return tuple(
+            one.name for one in self.parameters if not one.prior_ratio <= UNDETERMINED_RATIO
+        )
+
+    def calibration(self, name: str, date: str = "") -> str:
+        """Return the fit as a calibration file, values in SI."""
+        lines = ["language: 1", f"calibration: {name}", f"of: {self.automaton.name}"]
+        lines.append(f"from: {json.dumps(', '.join(self.inputs), ensure_ascii=False)}")
+        lines += [f"date: {date}"] if date else []
+        lines.append("parameters:")
+        for one in self.parameters:
+            value = format_value(one.quantity.value, self.automaton.parameters[one.name])
+            unit = "" if one.quantity.unit == "1" else f" {one.quantity.unit}"
+            note = f"  # {one.note}" if one.note else ""
+            std = f", std: {one.quantity.std:.3g}{unit}" if math.isfinite(one.quantity.std) else ""
+            text = f"{{value: {value}{std}}}"
+            lines.append(f"  {one.name}: {text}{note}")
+        return "\n".join(lines) + "\n"
+
+
+def fit(
+    case: Case, parameters: Sequence[str] | None = None, log: LogCallback = lambda text: None
+) -> Fit:
+    """Return a case's parameters (all that have a range, or those named) fitted to its recordings.
+
+    Raises SpecError, ValueError, ToolMissing.
+    """
+    automaton = automaton_of(case.document, case.project)
+    if parameters is not None:
+        document = restrict_free_parameters(case.document, automaton, parameters)
+        case = dataclasses.replace(case, document=document)
+        automaton = automaton_of(document, case.project)
+    seen = compared_outputs(case.mapping, automaton)
+    if not seen:
+        raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
+    case = dataclasses.replace(case, effects=())
+    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    model_set, estimate = best_hold(
+        recalibrate_by_hold(build_model_set(case, automaton, series, seen), log)
+    )
+    if not estimate.candidate.free_parameters:
+        raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
+    start = vector_of(estimate.candidate, len(model_set.series), {})
+    declared = evaluate(estimate.candidate, model_set.series, estimate.noise_levels, start)
+    return Fit(
+        automaton,
+        _fitted_parameters(automaton, estimate),
+        correlations_of(estimate),
+        compare_misfits(declared, estimate, model_set.series),
+        file_digests(case, case.train),
+        estimate,
+    )
+
+
+def restrict_free_parameters(
+    document: Document, automaton: Automaton, names: Sequence[str]
+) -> Document:
+    """Return an expanded document in which no other parameters have a range. Raises SpecError."""
+    problems = Problems()
+    for name in names:
+        parameter = automaton.parameters.get(name)
+        if parameter is None:
+            label = f"`{automaton.name}` has no parameter `{name}`"
+            hint = suggest_name(name, automaton.parameters)
+            asked = Source("command line", (name,))
+            problems.error("name", Span(asked, 1, 1, max(1, len(name))), label, hint)
+        elif parameter.range is None or parameter.value is None:
+            label = f"`{name}` has no range to be fitted in"
+            problems.error("range", parameter.span, label, "`range: [low, high]` beside its value")
+    problems.raise_if_errors()
+    root = document.root
+    for name in automaton.parameters:
+        table = _parameter_table(root, name)
+        if name not in names and table is not None and "range" in table.entries:
+            rest = {key: entry for key, entry in table.entries.items() if key != "range"}
+            root = put_node(root, ("parameters", name), MappingNode(rest, table.span))
+    return dataclasses.replace(document, root=root)
+
+
+def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:
+    section = root.get("parameters")
+    node = section.get(name) if isinstance(section, MappingNode) else None
+    return node if isinstance(node, MappingNode) else None
+
+
+def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[FittedParameter, ...]:
+    strongest: dict[str, tuple[str, float]] = {}
+    for (first, second), together in correlations_of(estimate).items():
+        strongest.setdefault(first, (second, together))
+        strongest.setdefault(second, (first, together))
+    coordinates = {one.name: one for one in estimate.candidate.free_parameters}
+    fitted = []
+    for name, quantity in quantities_of(estimate).items():
+        value = automaton.parameters[name].value
+        assert value is not None
+        one = coordinates[name]
+        left, note = prior_std_ratio(quantity, one), parameter_note(quantity, one)
+        fitted.append(
+            FittedParameter(name, float(value), quantity, left, note, strongest.get(name))
+        )
+    return tuple(fitted)
+
+
+def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
+    """Return what is to be said of a fitted parameter; empty where there is nothing."""
+    width = BOUND_TOLERANCE * (coordinate.high - coordinate.low)
+    if min(fitted_value.value - coordinate.low, coordinate.high - fitted_value.value) < width:
+        return "at the end of its range"
+    if not prior_std_ratio(fitted_value, coordinate) <= UNDETERMINED_RATIO:
+        return "these data do not determine it"
+    return ""
+
+
+def prior_std_ratio(fitted_value: Quantity, coordinate: FreeParameter) -> float:
+    """Return the standard deviation of a fitted parameter as a part of its prior's."""
+    slope = coordinate.sd * (fitted_value.value if coordinate.is_log else 1.0)
+    return fitted_value.std / abs(slope) if slope else 1.0

@@ -1,0 +1,1 @@
+"""Checks of recordings against a model: units, signs, clocks, columns, excitation."""

@@ -1,0 +1,279 @@
+"""Mistakes: columns of a recording with a wrong clock or sign, by how well the model foresees it.
+
+Each column is shifted against the others, or turned over; where the model as it is declared
+foresees far better then, that is what is wrong with the column. Loads that are not known, wrong
+parameters and missing physics make the forecasts worse with and without it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from codegen.toolchain.compiler import BuildError
+from diagnosis.data.sampled_recording import (
+    Reals,
+    SampledRecording,
+    compared_outputs,
+    require_equal_periods,
+    resample,
+    sample_windows,
+)
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.innovations import measured_noise_levels, predict_at_points
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.estimation.noise_level import disturbance_units
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter_vector import vector_of
+from diagnosis.quality.finding import Finding
+from engine.recordings.recording import Recording
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping, RecordingMap
+from language.overlays.expand_document import Project
+from language.text.diagnostic import MissingToolError, SpecError
+from language.text.document import Document
+
+MAX_LAG, LAG_STEP = 0.48, 0.04
+"""Largest offset of clocks looked for, and the distance of those that are tried [s]."""
+MIN_LAG = 0.1
+"""Offsets [s] from which they are a mistake: actuators and sensors lag by less."""
+MIN_GAIN, MIN_GAIN_PER_SAMPLE = 100.0, 0.2
+"""Nats that undoing a mistake has to gain in a recording, and nats per sample of it."""
+HARMLESS_GAIN_FACTOR = 1.5
+"""Times the gain of what is no mistake that it has to gain: of a small lag, of an unused input."""
+OTHER_COLUMN_FACTOR = 1.15
+"""The same for another column: a late torque and an early speed look alike."""
+SHARED_FRACTION = 0.6
+"""Share of the recordings that tell of a clock from which it is that of all of them."""
+CLOCK_TOLERANCE = 0.06
+"""Lags nearer than this are one offset [s]."""
+HIGH_PASS_TIME = 0.4
+"""Seconds over which the mean of innovations is taken out: what is slow tells no time."""
+UNUSED_FACTOR = 1e-6
+"""What an input is scaled by, to see whether the model is better off without it; its sign stays."""
+
+
+@dataclass(frozen=True)
+class ColumnHypothesis:
+    """A column - the inputs first, then what is compared - set earlier by `lag` [s], or turned
+    over (`factor` -1), or an input not used (`factor` 0).
+    """
+
+    column: int
+    lag: float = 0.0
+    factor: int = 1
+
+    @property
+    def is_error(self) -> bool:
+        """Tell whether this is a mistake of the data, not a lag that machines have."""
+        return self.factor < 0 or abs(self.lag) >= MIN_LAG
+
+    def is_similar(self, other: ColumnHypothesis) -> bool:
+        """Tell whether two of them are the same mistake."""
+        near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
+        return near and (self.column, self.factor) == (other.column, other.factor)
+
+
+@dataclass(frozen=True)
+class ColumnError:
+    """What undoes a mistake in one recording or, where it is "", in all."""
+
+    hypothesis: ColumnHypothesis
+    recording: str
+
+
+def find_clock_and_sign_errors(
+    document: Document,
+    project: Project,
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding] | None:
+    """Return the wrong clocks and signs of recordings; None where they cannot be found."""
+    seen = compared_outputs(mapping, automaton)
+    series = [
+        one
+        for recording in recordings
+        for one in sample_windows(recording, mapping, automaton, seen)
+    ]
+    series = list(resample(series, automaton, seen, False))
+    drifts = balance_disturbances(document, automaton)
+    model_set = ModelSet(document, project, automaton, (), tuple(series), seen, drifts)
+    try:
+        require_equal_periods(series)
+        found = find_column_errors(model_set.compile_candidate(()), series)
+    except (SpecError, MissingToolError, BuildError, ValueError, OSError):
+        return None
+    names = [*automaton.inputs, *seen]
+    columns = {column.to or column.compare: column for column in mapping.columns.values()}
+    return [_to_finding(columns[names[one.hypothesis.column]], one) for one in found]
+
+
+def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
+    called = f"input `{column.name}`" if column.to else f"`{column.name}`"
+    if error.hypothesis.factor < 0:
+        text = f"{called} has the wrong sign: it moves against what the model gives"
+        return Finding("sign", error.recording, column.name, text, "error")
+    way = "late" if error.hypothesis.lag > 0.0 else "early"
+    text = f"the clock of {called} is {abs(error.hypothesis.lag):.2f} s {way}"
+    return Finding("clock_offset", error.recording, column.name, text, "error")
+
+
+def find_column_errors(
+    candidate: Candidate, series: Sequence[SampledRecording]
+) -> list[ColumnError]:
+    """Return the mistakes of all recordings, or of single ones."""
+    series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
+    if not series:
+        return []
+    gains = hypothesis_gains(candidate, series)
+    min_gains = [max(MIN_GAIN, MIN_GAIN_PER_SAMPLE * one.count) for one in series]
+    own = [
+        _clearest_hypothesis({hypothesis: float(g[k]) for hypothesis, g in gains.items()}, least)
+        for k, least in enumerate(min_gains)
+    ]
+    whole = {hypothesis: float(np.sum(g[np.isfinite(g)])) for hypothesis, g in gains.items()}
+    shared = _clearest_hypothesis(whole, sum(min_gains)) if len(series) > 1 else None
+    errors = [one for one in own if one]
+    similar = [one for one in errors if shared and one.is_similar(shared)]
+    if (
+        shared
+        and len(similar) > SHARED_FRACTION * len(errors)
+        and len(similar) >= max(2.0, len(series) / 3.0)
+    ):
+        lag = median(one.lag for one in similar)
+        return [ColumnError(dataclasses.replace(shared, lag=lag), "")]
+    named = zip(own, series, strict=True)
+    return [
+        ColumnError(hypothesis, one.name)
+        for hypothesis, one in named
+        if hypothesis and _is_uniform(hypothesis, own)
+    ]
+
+
+def _is_uniform(
+    hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
+) -> bool:
+    """Tell whether a column is off alike wherever it is: what differs is rather physics."""
+    return all(
+        one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
+    )
+
+
+def hypothesis_gains(
+    candidate: Candidate, series: Sequence[SampledRecording]
+) -> Mapping[ColumnHypothesis, Reals]:
+    """Return what undoing each mistake gains [nats] in each recording.
+
+    An input that rests in some recordings is not judged: there it has no clock.
+    """
+    inputs = series[0].inputs.shape[1]
+    moving_inputs = [
+        k for k in range(inputs) if all(float(s.inputs[:, k].std()) > 0.0 for s in series)
+    ]
+    seen = range(inputs, inputs + series[0].measured.shape[1])
+    reference = [apply_hypothesis(one, ColumnHypothesis(0)) for one in series]
+    base = _evaluate_declared(candidate, reference)
+    before = _high_pass_costs(base, reference)
+    count = round(MAX_LAG / LAG_STEP)
+    lags = [k * LAG_STEP for k in range(-count, count + 1) if k]
+    hypotheses = [ColumnHypothesis(k, lag) for k in (*moving_inputs, *seen) for lag in lags]
+    hypotheses += [ColumnHypothesis(k, factor=-1) for k in (*moving_inputs, *seen)]
+    hypotheses += [ColumnHypothesis(k, factor=0) for k in moving_inputs]
+    found = {}
+    for hypothesis in hypotheses:
+        right = [apply_hypothesis(one, hypothesis) for one in series]
+        model = base if hypothesis.factor == 1 else _evaluate_declared(candidate, right)
+        found[hypothesis] = _finite_gains(before, _high_pass_costs(model, right))
+    return found
+
+
+def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
+    """Return the inner part of a recording as it would be without a mistake.
+
+    The outer `LARGEST_LAG` s are not used, so that there is a value for every lag.
+    """
+    margin = round(MAX_LAG / float(series.period))
+    late = round(hypothesis.lag / float(series.period))
+    inside = slice(margin, series.count - margin)
+    moved = slice(inside.start + late, inside.stop + late)
+    factor = hypothesis.factor or UNUSED_FACTOR
+    inputs, measured = series.inputs[inside].copy(), series.measured[inside].copy()
+    count = inputs.shape[1]
+    if hypothesis.column < count:
+        inputs[:, hypothesis.column] = factor * series.inputs[moved, hypothesis.column]
+    else:
+        measured[:, hypothesis.column - count] = (
+            factor * series.measured[moved, hypothesis.column - count]
+        )
+    return dataclasses.replace(series, inputs=inputs, measured=measured)
+
+
+def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return the model as it is declared, with drifts that let it follow the recordings."""
+    noise_levels = measured_noise_levels(series, {})
+    noise_levels = dataclasses.replace(
+        noise_levels, process=disturbance_units(candidate, series, {})
+    )
+    return evaluate(candidate, series, noise_levels, vector_of(candidate, len(series), {}))
+
+
+def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    """Return the negative log likelihood [nats] of the quick part of each recording."""
+    values, found = [model.values(0)] * len(series), []
+    (there,) = predict_at_points(
+        model.candidate, series, [values], model.gains, model.noise_levels.huber_limits
+    )
+    for one, done, missed, counts in zip(
+        series, there.done.tolist(), there.by_recording, there.counts, strict=True
+    ):
+        quick = _high_pass(missed, float(one.period))
+        spread = np.log(np.maximum(_column_means(quick**2), 1e-300))
+        whole = done == one.count
+        found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
+    return np.array(found)
+
+
+def _column_means(squares: Reals) -> Reals:
+    """Return the mean of what is known of each column."""
+    if np.isnan(squares).any():
+        return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
+    found: Reals = squares.sum(axis=0) / len(squares)
+    return found
+
+
+def _high_pass(innovations: Reals, period: float) -> Reals:
+    """Return innovations without their slow part."""
+    width = max(1, round(HIGH_PASS_TIME / period))
+    known = np.where(np.isfinite(innovations), innovations, 0.0)
+    kernel = np.ones(width) / width
+    slow = np.array([np.convolve(column, kernel, mode="same") for column in known.T]).T
+    found: Reals = innovations - slow
+    return found
+
+
+def _finite_gains(before: Reals, after: Reals) -> Reals:
+    """Return the gains; none where the model does not follow a recording one way or the other."""
+    known = np.isfinite(before) & np.isfinite(after)
+    found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
+    return np.where(known, found, -np.inf)
+
+
+def _clearest_hypothesis(
+    gains: Mapping[ColumnHypothesis, float], min_gain: float
+) -> ColumnHypothesis | None:
+    """Return the trial that gains most, if it undoes a mistake and nothing small gains as much."""
+    best = max(gains, key=lambda one: gains[one])
+    if not best.is_error or gains[best] < min_gain:
+        return None
+    small = max([0.0, *[gain for one, gain in gains.items() if not one.is_error]])
+    other = max([0.0, *[gain for one, gain in gains.items() if one.column != best.column]])
+    return (
+        best
+        if gains[best] > max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
+        else None
+    )

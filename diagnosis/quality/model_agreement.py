@@ -1,0 +1,210 @@
+"""Consistency: how recorded outputs move with those simulated under the recorded inputs.
+
+Compared are smoothed rates of change: wrong loads and start values, which drift, matter little.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.quality.free_run import OutputComparison
+from diagnosis.quality.reference_model import ReferenceModel
+from engine.recordings.recording import Channel, Recording, crop, split_by_windows
+
+Reals = NDArray[np.float64]
+
+GRID_STEP = 0.01
+"""Step of the grid on which rates of change are compared [s]."""
+SMOOTHING_STD = 0.04
+"""Standard deviation of the smoothing [s]: what is left is below about 4 Hz."""
+GAIN_SMOOTHING_STD = 0.15
+"""The same for gains, which resonances shall not change: below about 1 Hz."""
+MAX_LAG = 1.0
+"""Largest offset of clocks looked for [s]."""
+TRANSIENT_TIME = 0.8
+"""Time after the start that is left out: start values are not those of the recording [s]."""
+MIN_CORRELATION = 0.75
+"""Correlation from which two signals are taken for the same motion."""
+REVERSAL_MARGIN = 0.15
+"""How much better the reversed signal has to fit: half a period of a sweep looks alike."""
+LAG_MARGIN = 0.02
+"""How much better than without a lag the correlation has to be, to believe in the lag."""
+MAX_PIECE, MIN_PIECE = Fraction(10), Fraction(4)
+MAX_SIMULATED_TIME = Fraction(24)
+"""Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
+
+
+@dataclass(frozen=True)
+class OutputAgreement:
+    """How a measured output goes with the simulated one: measured = gain * simulated(t - lag).
+
+    Of the gain of fast and of slow motion that is taken which is nearer to 1. `level` is how large
+    it is against the simulated one once both have found to each other.
+    """
+
+    recording: str
+    channel: str
+    gain: float
+    lag: float
+    correlation: float
+    correlation_without_lag: float
+    level: float = 1.0
+
+    @property
+    def is_clear(self) -> bool:
+        """Tell whether both are the same motion."""
+        return abs(self.correlation) >= MIN_CORRELATION
+
+    @property
+    def correlation_gain(self) -> float:
+        """How much better the correlation is with the lag."""
+        return abs(self.correlation) - abs(self.correlation_without_lag)
+
+    @property
+    def significant_lag(self) -> float:
+        """The lag [s], 0 where no lag would do as well."""
+        return self.lag if self.is_clear and self.correlation_gain > LAG_MARGIN else 0.0
+
+
+def compare_with_simulation(
+    recordings: Sequence[Recording], reference: ReferenceModel
+) -> list[OutputAgreement]:
+    """Return how the outputs of each piece go with a simulation under the recorded inputs."""
+    agreements: list[OutputAgreement] = []
+    remaining_time = MAX_SIMULATED_TIME
+    piece_length = min(MAX_PIECE, max(MIN_PIECE, MAX_SIMULATED_TIME / max(1, len(recordings))))
+    for recording in recordings:
+        for piece in split_by_windows(recording):
+            if remaining_time <= 0:
+                return agreements
+            part = _decimate_inputs(most_excited_piece(piece, piece_length))
+            remaining_time -= part.end - part.start
+            for name, compared in reference.simulate(part).comparisons.items():
+                agreement = compare_signals(part.name, name, compared)
+                if agreement:
+                    agreements.append(agreement)
+    return agreements
+
+
+def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
+    """Return the most lively stretch of a piece that is no longer than `max_length`."""
+    if piece.end - piece.start <= max_length:
+        return piece
+    count = int(2 * (piece.end - piece.start) / max_length)
+    starts = [piece.start + k * max_length / 2 for k in range(count)]
+    best = max(starts, key=lambda start: _excitation_level(piece, start, start + max_length))
+    return crop(piece, (best, min(piece.end, best + max_length)))
+
+
+def _decimate_inputs(piece: Recording) -> Recording:
+    """Return a recording with every n-th sample of its inputs: 100 Hz are enough for this."""
+    channels = dict(piece.channels)
+    for name, channel in piece.channels.items():
+        span = channel.times[-1] - channel.times[0]
+        every = int(len(channel.times) / (span / Fraction(GRID_STEP))) if span else 1
+        if channel.column.to is not None and every > 1:
+            channels[name] = Channel(
+                channel.column, channel.times[::every], channel.values[::every]
+            )
+    return dataclasses.replace(piece, channels=channels)
+
+
+def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
+    total = 0.0
+    for channel in piece.channels.values():
+        inside = (channel.seconds >= float(start)) & (channel.seconds <= float(end))
+        spread = float(np.std(channel.array)) or 1.0
+        if inside.sum() > 2 and channel.column.to is not None:
+            total += float(np.std(np.diff(channel.array[inside]))) / spread
+    return total
+
+
+def _smoothed_rate(
+    times: Reals, values: Reals, grid: Reals, spread: float = SMOOTHING_STD
+) -> Reals:
+    """Return the smoothed rate of change on a grid."""
+    width = _kernel_size(spread) // 2
+    kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID_STEP / spread) ** 2)
+    even = np.interp(grid, times, values)
+    smooth = np.convolve(even, kernel / kernel.sum(), mode="valid")
+    return np.gradient(smooth, GRID_STEP)
+
+
+def _kernel_size(spread: float) -> int:
+    """Return how many samples of a grid one smoothed value is made of."""
+    return 2 * math.ceil(4.0 * spread / GRID_STEP) + 1
+
+
+def compare_signals(
+    recording: str, name: str, comparison: OutputComparison, spread: float = SMOOTHING_STD
+) -> OutputAgreement | None:
+    """Return how two signals, smoothed by `spread` [s], go together; None for too short ones."""
+    start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
+    if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
+        return None
+    grid = np.arange(start, end, GRID_STEP)
+    measured = _smoothed_rate(comparison.times, comparison.measured, grid, spread)
+    simulated = _smoothed_rate(comparison.times, comparison.simulated, grid, spread)
+    max_shift = min(round(MAX_LAG / GRID_STEP), len(grid) // 4)
+    if len(measured) < 3 * max_shift or not measured.std() or not simulated.std():
+        return None
+    lags = range(-max_shift, max_shift + 1)
+    pairs = {lag: _overlap(measured, simulated, lag) for lag in lags}
+    correlations = {lag: _correlation(*pair) for lag, pair in pairs.items()}
+    best = max(lags, key=lambda lag: correlations[lag])
+    reversed_lag = min(lags, key=lambda lag: correlations[lag])
+    if -correlations[reversed_lag] > correlations[best] + REVERSAL_MARGIN:
+        best = reversed_lag
+    gains = [
+        _spread_ratio(pair) for pair in (pairs[best], *_low_frequency_rates(comparison, grid, best))
+    ]
+    gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
+    late = comparison.times > 0.5 * (start + end)
+    level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
+    both = correlations[best], correlations[0]
+    return OutputAgreement(recording, name, gain, best * GRID_STEP, *both, level)
+
+
+def _low_frequency_rates(
+    comparison: OutputComparison, grid: Reals, lag: int
+) -> list[tuple[Reals, Reals]]:
+    """Return both rates below the resonances, or nothing where that takes more than there is.
+
+    A fast sweep has little there but drift.
+    """
+    shifted = grid + lag * GRID_STEP
+    kept = (shifted >= grid[0]) & (shifted <= grid[-1])
+    if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):
+        return []
+    y = _smoothed_rate(comparison.times, comparison.measured, shifted[kept], GAIN_SMOOTHING_STD)
+    return [
+        (y, _smoothed_rate(comparison.times, comparison.simulated, grid[kept], GAIN_SMOOTHING_STD))
+    ]
+
+
+def _spread_ratio(pair: tuple[Reals, Reals]) -> float:
+    """Return the ratio of the spreads, held within what any mistake of units makes."""
+    return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
+
+
+def _rms(values: Reals) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _overlap(measured: Reals, simulated: Reals, lag: int) -> tuple[Reals, Reals]:
+    if lag >= 0:
+        return measured[lag:], simulated[: len(simulated) - lag]
+    return measured[:lag], simulated[-lag:]
+
+
+def _correlation(y: Reals, x: Reals) -> float:
+    y, x = y - y.mean(), x - x.mean()
+    size = float(np.sqrt((y @ y) * (x @ x)))
+    return float(y @ x) / size if size else 0.0

@@ -1,0 +1,64 @@
+"""Digits: numbers as a reader wants them - as many digits as count, and a unit."""
+
+from __future__ import annotations
+
+import math
+
+from diagnosis.estimation.quantity import Quantity
+
+DIMENSIONLESS = ("1", "")
+
+
+def format_with_std(value: float, std: float) -> str:
+    """Return a value and its standard deviation: two digits of the latter, and as many places."""
+    if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
+        return format_significant(value, 4)
+    std = float(f"{std:.2g}")
+    places = max(0, 1 - math.floor(math.log10(std)))
+    if places > 8 or abs(value) >= 1e6:
+        return f"{value:.6g} ± {std:.2g}"
+    if places == 0:
+        step = 10 ** (math.floor(math.log10(std)) - 1)
+        return f"{round(value / step) * step:.0f} ± {round(std / step) * step:.0f}"
+    return f"{value:.{places}f} ± {std:.{places}f}"
+
+
+def format_quantity(quantity: Quantity) -> str:
+    """Return a fitted number as `3.77 ± 0.05 N*m`."""
+    text = format_with_std(quantity.value, quantity.std)
+    return text if quantity.unit in DIMENSIONLESS else f"{text} {quantity.unit}"
+
+
+def format_significant(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits that count, without an exponent where it can be read."""
+    if not math.isfinite(value):
+        return "-"
+    value = float(f"{value:.{digits}g}")
+    if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    return f"{value:.{max(0, places)}f}"
+
+
+def format_percent(part: float) -> str:
+    """Return a part as `0.96 %`, `3.2 %` or `45 %`."""
+    value = 100.0 * part
+    if not math.isfinite(value):
+        return "-"
+    size = abs(value)
+    return f"{value:.{2 if size < 1.0 else 1 if size < 10.0 else 0}f} %"
+
+
+def format_change(before: float, after: float) -> str:
+    """Return how much a misfit has changed: `-52 %`, `+7 %`, `as before`."""
+    if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
+        return "-"
+    part = 100.0 * (after / before - 1.0)
+    return "as before" if abs(part) < 0.5 else f"{part:+.0f} %".replace("-", "\N{MINUS SIGN}")
+
+
+def format_probability(share: float) -> str:
+    """Return a probability; what is beyond a tenth of a per cent is not told."""
+    if share < 0.001:
+        return "< 0.1 %"
+    return "> 99.9 %" if share > 0.999 else f"{100.0 * share:.1f} %"

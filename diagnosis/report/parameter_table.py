@@ -1,0 +1,103 @@
+"""Parameter list: what a diagnosis did to each parameter, as texts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.pipeline.parameter_fit import parameter_note
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.number_text import format_change, format_with_std
+from diagnosis.selection.forward_selection import Selection
+from language.text.document import MappingNode, ScalarNode
+
+MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
+"""Part of a value, and standard deviations, from which recalibration was led astray; most told."""
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter: its values as texts, how far they are from what was declared, what it is."""
+
+    name: str
+    unit: str
+    declared: str
+    before: str
+    after: str
+    change: str
+    about: str
+    note: str
+
+
+def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
+    """Return each fitted parameter: declared, recalibrated, and with what was found."""
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    brought = {
+        placed_effect.qualified_name(own): text_of(entry, "about")
+        for placed_effect in (tried.placed_effect for tried in selection.accepted)
+        for own, entry in _parameter_tables(placed_effect.effect.body)
+    }
+    coordinates = {one.name: one for one in selection.model.candidate.free_parameters}
+    rows = []
+    for name, now in after.items():
+        declared = report.automaton.parameters.get(name)
+        value = None if declared is None or declared.value is None else float(declared.value)
+        rows.append(
+            ParameterRow(
+                name,
+                "" if now.unit == "1" else now.unit,
+                "new" if value is None else f"{value:.5g}",
+                format_with_std(before[name].value, before[name].std) if name in before else "",
+                format_with_std(now.value, now.std),
+                "" if value is None else _format_change(value, now.value),
+                about_of(report, "parameters", name) or brought.get(name, ""),
+                parameter_note(now, coordinates[name]),
+            )
+        )
+    return rows
+
+
+def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
+    table = body.get("parameters")
+    entries = table if isinstance(table, MappingNode) else ()
+    return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, MappingNode)]
+
+
+def format_biased_parameters(selection: Selection) -> str:
+    """Return how far recalibration without the effects takes parameters, the farthest first."""
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    found = []
+    for name, one in before.items():
+        now = after.get(name)
+        if now is None or now.value <= 0.0 or one.value <= 0.0:
+            continue
+        part = one.value / now.value - 1.0
+        if abs(part) >= MIN_BIAS and abs(one.value - now.value) > MIN_BIAS_STDS * now.std:
+            found.append((abs(part), f"{name} {format_change(now.value, one.value)}"))
+    return ", ".join(text for _, text in sorted(found, reverse=True)[:MAX_BIASED])
+
+
+def _format_change(declared: float, current: float) -> str:
+    return format_change(declared, current) if declared > 0.0 else ""
+
+
+def about_of(report: DiagnosisReport, section: str, name: str) -> str:
+    """Return what the spec says a parameter, input or state is; empty where it says nothing."""
+    table = report.case.document.root.get(section)
+    entry = table.get(name) if isinstance(table, MappingNode) else None
+    return text_of(entry, "about") if isinstance(entry, MappingNode) else ""
+
+
+def text_of(table: MappingNode, key: str) -> str:
+    """Return the text of a key; empty where there is none."""
+    node = table.get(key)
+    return node.text if isinstance(node, ScalarNode) else ""
+
+
+def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
+    """Return the parameters that have no range, with their values: they were taken as exact."""
+    return [
+        f"{name} = {float(one.value):.5g}"
+        for name, one in report.automaton.parameters.items()
+        if one.range is None and one.value is not None and one.type == "real"
+    ]

@@ -1,0 +1,110 @@
+"""Rerun: how to use what was found - the worst window as a scenario, and the commands."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.variant_file import missing_effects, variant_name
+from diagnosis.validation.worst_window import WorstWindow
+from language.overlays.tree_types import format_si_unit
+
+VARIANT = "variant.yaml"
+WINDOW = "window.csv"
+SCENARIO = "scenario.yaml"
+
+
+def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
+    """Return a window as CSV, in SI: inputs, what was recorded, and both simulations.
+
+    `inputs` are names with units. What was not recorded is blank.
+    """
+    seen = window.signals
+    names = ["t_s", *inputs, *seen]
+    names += [f"{name}_{word}" for word in ("without", "with") for name in seen]
+    parts = (window.times[:, None], window.inputs, window.measured, window.before, window.after)
+    rows = [
+        ",".join(_format_value(value) for value in row) for row in np.concatenate(parts, axis=1)
+    ]
+    return "\n".join([",".join(names), *rows]) + "\n"
+
+
+def _format_value(value: float) -> str:
+    return f"{value:.9g}" if math.isfinite(value) else ""
+
+
+def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
+    """Return a scenario that runs the variant through a window, beside whose table it stands.
+
+    Inputs are held from sample to sample: C can be given them like this too.
+    """
+    automaton = report.automaton
+    fed = {name: format_si_unit(one.unit.dimension) for name, one in automaton.inputs.items()}
+    lines = [
+        "language: 1",
+        f"scenario: {variant_name(report.name, '_window')}",
+        f"of: {VARIANT}",
+        f"about: {json.dumps(window.title, ensure_ascii=False)}",
+        "horizon: recording",
+        "recording:",
+        f"  file: {WINDOW}",
+        "  time: {column: t_s, unit: s}",
+        "  columns:",
+        *(
+            f"    {name}: {{to: {name}, unit: {unit}, hold: previous}}"
+            for name, unit in fed.items()
+        ),
+    ]
+    starts = []
+    for name, unit in zip(window.signals, window.units, strict=True):
+        lines.append(f"    {name}: {{compare: {name}, unit: {unit}, blank: skip}}")
+        if name in automaton.states:
+            starts.append(f"{name}: column({name})")
+    if starts:
+        lines.append(f"initial: {{{', '.join(starts)}}}")
+    return "\n".join(lines) + "\n"
+
+
+def reproduction_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
+    """Return what can be done with the variant: words, and the command."""
+    variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
+    found = [
+        *_effect_copy_commands(report, folder),
+        ("look for problems", f"modewright check {variant}"),
+    ]
+    if report.diagnosis is not None:
+        run = f"{variant} -s {scenario}"
+        found += [
+            ("simulate the worst window", f"modewright simulate {run} --plot run.png"),
+            ("print it as C", f"modewright generate {variant} --out build"),
+            ("compare engine and C, bit by bit", f"modewright lockstep {run}"),
+            ("list what differs", f"modewright explain {report.name} {variant}"),
+        ]
+    return found
+
+
+def _effect_copy_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
+    """Return how effects that the project does not have are put where a variant finds them."""
+    formula = report.diagnosis.equation if report.diagnosis else None
+    own = formula.formula.placed_effect.effect.name if formula else ""
+    found = []
+    for effect in missing_effects(report):
+        file = folder / f"{own}.yaml" if effect.name == own else effect.body.span.source.name
+        found.append(("lay its effect below spec/", f"cp {shlex.quote(str(file))} spec/"))
+    return found
+
+
+def report_command(report: DiagnosisReport, folder: Path) -> str:
+    """Return the command that makes this report."""
+    words = ["modewright", "diagnose", report.name]
+    for path in report.case.train:
+        words += ["--train", str(path)]
+    for path in report.case.held_out:
+        words += ["--held-out", str(path)]
+    return shlex.join([*words, "--out", str(folder)])

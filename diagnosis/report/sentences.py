@@ -1,0 +1,231 @@
+"""Wording: a diagnosis in plain words, for the console and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnosis.criterion.threshold import Thresholds
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
+from diagnosis.model.placed_effect import PlacedEffect, place_path
+from diagnosis.quality.finding import format_findings
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.number_text import format_quantity
+from diagnosis.result.effect_naming import verdict_id
+from diagnosis.result.verdict import NamedEffect
+from diagnosis.selection.candidate_search import (
+    ENTRY_THRESHOLD,
+    MAX_FITS,
+    PRUNING_FRACTION,
+    CandidateFit,
+)
+from diagnosis.selection.confusion_set import CONFUSION_GAIN, is_confusable
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.validation.misfit import Misfit as FitMisfit
+
+MAX_NAMED = 4
+"""Most rivals, windows or findings told in a sentence."""
+
+
+def format_headline(report: DiagnosisReport) -> str:
+    """Return the verdict in one sentence."""
+    verdict = report.verdict
+    if report.end_reason:
+        return f"Nothing is concluded yet: {report.end_reason}."
+    if report.diagnosis is None:
+        return "Nothing is concluded about the physics: these recordings are not usable."
+    if verdict.verdict == "effect":
+        named = " and ".join(_format_effect_values(one) for one in verdict.effects)
+        return f"`{report.name}` lacks {named}."
+    if verdict.verdict == "ambiguous":
+        names = [format_effect(one) for one in verdict.ambiguous_with]
+        return (
+            f"`{report.name}` lacks something, and these recordings cannot tell which of these "
+            f"it is: {'; '.join(names)}."
+        )
+    if verdict.verdict == "unknown":
+        like = _format_equation(report) or _format_nearest(report)
+        return f"`{report.name}` lacks something that none of the effects tried explains{like}."
+    return (
+        f"`{report.name}` lacks nothing that these recordings show: with its parameters "
+        f"recalibrated no effect gains the {report.case.thresholds.text} nats asked for."
+    )
+
+
+def _format_equation(report: DiagnosisReport) -> str:
+    """Return what an unknown was turned into, as the end of a sentence."""
+    found = report.diagnosis.equation if report.diagnosis else None
+    if found is None:
+        return ""
+    return f"; it is like `{found.text}` {PLACE_PHRASES[found.location.section]} {found.location.place}"
+
+
+def _format_nearest(report: DiagnosisReport) -> str:
+    """Return the effects that come nearest to what is unknown, as the end of a sentence."""
+    names = [format_effect(one) for one in report.verdict.ambiguous_with]
+    return f"; the nearest is {' or '.join(names[:MAX_NAMED])}" if names else ""
+
+
+def format_effect(effect: NamedEffect) -> str:
+    """Return an effect with its place in words."""
+    section, _, name = effect.place.partition(".")
+    return f"{effect.id.replace('_', ' ')} {PLACE_PHRASES[section]} {name}"
+
+
+def _format_effect_values(effect: NamedEffect) -> str:
+    values = ", ".join(
+        f"{name} = {format_fitted_quantity(q)}" for name, q in effect.parameters.items()
+    )
+    return f"{format_effect(effect)} ({values})" if values else format_effect(effect)
+
+
+def format_fitted_quantity(fitted: Quantity) -> str:
+    """Return a value with its standard deviation and unit."""
+    return format_quantity(fitted)
+
+
+def format_rounded(value: float) -> str:
+    """Return a number with two digits that count, `100` and not `1e+02`."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def format_improvement(report: DiagnosisReport) -> str:
+    """Return what the model gains in free simulation, in one sentence; empty without a fit."""
+    fit = report.verdict.fit
+    parts = [
+        f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
+        for name, signals in fit.items()
+        if signals
+    ]
+    if not parts:
+        return ""
+    confirmed = {True: " - confirmed", False: " - not confirmed", None: ""}
+    return f"misfit of free simulation, {'; '.join(parts)}{confirmed[report.verdict.confirmed]}"
+
+
+def _format_misfits(signals: Mapping[str, FitMisfit]) -> str:
+    found = []
+    for name, one in signals.items():
+        before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
+        found.append(f"{name} {before}" if before == after else f"{name} {before} to {after}")
+    return ", ".join(found)
+
+
+def format_missing_location(report: DiagnosisReport) -> str:
+    """Return where something is missing, in one sentence; empty where nothing is."""
+    found = report.diagnosis
+    if found is None or report.verdict.verdict == "nothing_missing":
+        return ""
+    return format_location(report.verdict.location, found.model_set)
+
+
+def format_separation(report: DiagnosisReport) -> list[str]:
+    """Return what would separate what was found from what it is confused with."""
+    if report.diagnosis is None:
+        return []
+    selection = report.diagnosis.selection
+    lines = [format_experiment(report)] if format_experiment(report) else []
+    for tried in (*selection.accepted, *selection.rivals):
+        effect = tried.placed_effect.effect
+        if effect.separated_by and effect.confused_with:
+            name = verdict_id(tried.placed_effect, report.automaton)
+            others = ", ".join(effect.confused_with)
+            lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
+    return lines
+
+
+def format_oscillation(report: DiagnosisReport) -> str:
+    """Return until when the model follows the largest step; empty where nothing is missing."""
+    found = report.diagnosis.oscillations if report.diagnosis else ()
+    if not found or not found[0].has_other_frequency or report.verdict.verdict == "nothing_missing":
+        return ""
+    text = found[0].format_sentence()
+    if len(found) > 1:
+        after = found[1]
+        end = (
+            "to the end"
+            if after.followed_time >= after.length
+            else f"until t = {after.followed_time:.2f} s"
+        )
+        text += f"; with what was found it fits {end}"
+    return text
+
+
+def format_experiment(report: DiagnosisReport) -> str:
+    """Return what to record to be sure, as it was simulated; empty where there is no doubt."""
+    found = report.diagnosis.plan if report.diagnosis else None
+    return found.format_sentence() if found else ""
+
+
+def format_reason(
+    candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
+) -> str:
+    """Return why a candidate was accepted or not; `rank` is its rank."""
+    ids = {one.placed_effect.id for one in selection.accepted}
+    if candidate_fit.placed_effect.id in ids:
+        return "accepted"
+    if candidate_fit.placed_effect.id in {one.placed_effect.id for one in selection.rivals}:
+        if not selection.accepted:
+            return "the nearest, but not what is missing"
+        if is_confusable(candidate_fit, selection.accepted[0]):
+            return f"cannot be told from the accepted one: within {CONFUSION_GAIN:g} nats of it"
+        return "may be it as well: gains nearly as much as the best"
+    known = candidate_fit.likelihood_gain
+    if known is None:
+        if candidate_fit.screening_gain < ENTRY_THRESHOLD:
+            return f"not fitted: promises less than {ENTRY_THRESHOLD:g} nats"
+        best = max(
+            (t.likelihood_gain.penalised for t in selection.first_round if t.likelihood_gain),
+            default=0.0,
+        )
+        if candidate_fit.screening_gain < PRUNING_FRACTION * best:
+            return (
+                f"not fitted: promises less than {100 * PRUNING_FRACTION:g} % of what another gains"
+            )
+        return f"not fitted: {MAX_FITS} others promise more"
+    threshold = thresholds.threshold_of(candidate_fit.placed_effect)
+    if known.penalised <= threshold:
+        return f"gains less than {threshold:.0f} nats in training"
+    if known.cross_validated <= threshold:
+        return f"gains less than {threshold:.0f} nats on parts that were left out"
+    if not selection.accepted:
+        return "ranked behind one that was not accepted"
+    return "explains less than what was accepted" if rank else "not needed beside the others"
+
+
+def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str:
+    """Return the name of a candidate as verdicts have it."""
+    return f"{verdict_id(placed_effect, report.automaton)}@{place_path(placed_effect)}"
+
+
+def summary_lines(report: DiagnosisReport) -> list[str]:
+    """Return at most four lines: verdict, place, what else is to be told, improvement, doubt.
+
+    Where all five are to be told, the second and third are one.
+    """
+    is_ambiguous = report.verdict.verdict == "ambiguous"
+    more = format_experiment(report) if is_ambiguous else format_oscillation(report)
+    place, doubt = format_missing_location(report), _format_caveat(report)
+    if place and more and doubt:
+        place, more = f"{place}; {more}", ""
+    lines = [format_headline(report), place, more, format_improvement(report), doubt]
+    return [line for line in lines if line]
+
+
+def _format_caveat(report: DiagnosisReport) -> str:
+    """Return what a reader has to know before believing the verdict."""
+    worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
+    if worst:
+        more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
+        return f"recordings: {worst[0][1]}{more}"
+    verdict = report.verdict
+    if verdict.verdict == "effect" and verdict.ambiguous_with:
+        return (
+            f"nearly as good: {_join_first([format_effect(one) for one in verdict.ambiguous_with])}"
+        )
+    return ""
+
+
+def _join_first(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+    return ", ".join(names[:MAX_NAMED]) + more

@@ -1,0 +1,138 @@
+"""Cards: what a reader wants to know first, in four short answers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from diagnosis.quality.finding import format_findings
+from diagnosis.report import sentences as wording
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.number_text import format_change, format_percent, format_probability
+from diagnosis.report.tables import location_rows
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.validation.whiteness import WhitenessTest
+
+MAX_LINES = 4
+
+
+@dataclass(frozen=True)
+class Card:
+    """A question and its answer, line by line."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+def summary_cards(
+    report: DiagnosisReport, residual_tests: Sequence[WhitenessTest] = ()
+) -> list[Card]:
+    """Return the answers: where, how sure, how much better, what to keep in mind.
+
+    `residual_tests` is what the model with what was found leaves over, signal by signal.
+    """
+    if report.diagnosis is None:
+        return []
+    selection = report.diagnosis.selection
+    cards = [
+        _location_card(report),
+        _confidence_card(report, selection),
+        _improvement_card(report),
+        _caveat_card(report, residual_tests),
+    ]
+    return [card for card in cards if card.lines]
+
+
+def _location_card(report: DiagnosisReport) -> Card:
+    verdict = report.verdict
+    named = verdict.effects or verdict.ambiguous_with
+    lines = [wording.format_effect(one) for one in named]
+    if verdict.verdict == "unknown":
+        lines = [f"most at {one.path}" for one in verdict.location[:1] if one.gain > 0.0]
+    if not lines:
+        return Card("Where", ("nowhere: no place asks for more than the model has",))
+    rows = dict(location_rows(verdict.location[0], 2)) if verdict.location else {}
+    lines = [*dict.fromkeys(lines)][:MAX_LINES]
+    lines += [f"{words} {rows[words]}" for words in ("by mode", "strongest in") if words in rows]
+    return Card("Where", tuple(lines))
+
+
+def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
+    fitted = [one for one in selection.first_round if one.likelihood_gain]
+    count = f"{len(selection.first_round)} candidates, {len(fitted)} fitted in full"
+    lines = []
+    if selection.accepted:
+        shares = selection.probabilities()
+        for one in (selection.accepted[0], *selection.rivals):
+            if one.placed_effect.id in shares:
+                lines.append(
+                    f"{format_probability(shares[one.placed_effect.id])} probable: {one.placed_effect.id}"
+                )
+        lines += [f"best of {count}", *(_format_gain(one) for one in selection.accepted)]
+        lines.append(f"{report.case.thresholds.text} nats are needed")
+    else:
+        lines.append(f"none of {count}, gains enough")
+        best = max(fitted, key=_smaller_gain, default=None)
+        if best is not None:
+            lines += [
+                f"best: {_format_gain(best)}",
+                f"{report.case.thresholds.text} nats are needed in both",
+            ]
+    confirmed = {
+        True: "better on recordings that were held out, too",
+        False: "not better on recordings that were held out",
+        None: "",
+    }[report.verdict.confirmed]
+    return Card("How sure", (*lines, confirmed) if confirmed else tuple(lines))
+
+
+def _smaller_gain(candidate_fit: CandidateFit) -> float:
+    return candidate_fit.likelihood_gain.smaller if candidate_fit.likelihood_gain else 0.0
+
+
+def _format_gain(candidate_fit: CandidateFit) -> str:
+    assert candidate_fit.likelihood_gain
+    known = candidate_fit.likelihood_gain
+    return f"{candidate_fit.placed_effect.id}: {known.penalised:.0f} nats in training, {known.cross_validated:.0f} left out"
+
+
+def _improvement_card(report: DiagnosisReport) -> Card:
+    fit = report.verdict.fit
+    part = "held_out" if fit.get("held_out") else "train"
+    lines = []
+    has_model = bool(report.diagnosis and report.diagnosis.selection.accepted)
+    for name, one in fit.get(part, {}).items():
+        before, after = format_percent(one.nrmse_before), format_percent(one.nrmse_after)
+        if has_model:
+            moved = format_change(one.nrmse_before, one.nrmse_after)
+            lines.append(f"{name}: {before} \N{RIGHTWARDS ARROW} {after} ({moved})")
+        else:
+            lines.append(f"{name}: {before}")
+    title = "How much better" if has_model else "How well it fits"
+    words = "held-out" if part == "held_out" else "training"
+    return Card(title, (f"misfit of free simulation, {words} recordings", *lines))
+
+
+def _caveat_card(report: DiagnosisReport, residual_tests: Sequence[WhitenessTest]) -> Card:
+    verdict = report.verdict
+    coloured = [one.signal for one in residual_tests if one.rating == "coloured"]
+    lines = []
+    if coloured:
+        lines.append(f"{', '.join(coloured)}: what is left is not noise alone")
+    if verdict.verdict == "ambiguous":
+        lines.append("more than one effect explains it: see what to record to be sure")
+    if verdict.verdict == "effect":
+        rivals = [wording.format_effect(one) for one in verdict.ambiguous_with]
+        lines.append(
+            f"nearly as good: {', '.join(rivals)}"
+            if rivals
+            else "no rival that was fitted comes close"
+        )
+    findings = [text for severity, text in format_findings(report.findings) if severity != "note"]
+    lines += [findings[0].replace("`", "")] if findings else ["nothing odd in the recordings"]
+    lacking = sum(not one.is_testable for one in report.check.excitation.effects)
+    if lacking:
+        whole = len(report.check.excitation.effects)
+        lines.append(f"{lacking} of {whole} effects are hardly testable with these recordings")
+    return Card("Keep in mind", tuple(lines[:MAX_LINES]))

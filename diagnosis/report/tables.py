@@ -1,0 +1,257 @@
+"""Listing: the tables of a report, as texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from diagnosis.localisation.location import Location
+from diagnosis.report import sentences as wording
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.number_text import (
+    format_change,
+    format_percent,
+    format_probability,
+    format_significant,
+)
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.validation.whiteness import WhitenessTest
+from diagnosis.validation.worst_window import FreeRuns, rms_by_recording
+
+MAX_WINDOWS = 6
+
+MIN_CORRELATION = 0.3
+"""A correlation below this is not told."""
+
+CHANGE_TOLERANCE = 0.02
+"""Part of a misfit below which a change is none."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A misfit without and with what was found, what has changed, and whether to the `better`."""
+
+    before: str
+    after: str
+    change: str
+    trend: str
+
+
+@dataclass(frozen=True)
+class FitRow:
+    """Misfits of one recording, or of a whole set, signal by signal."""
+
+    name: str
+    words: str
+    cells: tuple[Cell, ...]
+    is_sum: bool = False
+
+
+def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
+    """Return the misfits [SI] of each recording of a set, then those of all over their spread."""
+    rows = []
+    for name, before, after in rms_by_recording(runs):
+        pairs = zip(before, after, strict=True)
+        cells = tuple(_misfit_cell(float(a), float(b), format_significant) for a, b in pairs)
+        rows.append(FitRow(name, label, cells))
+    whole = report.verdict.fit.get(dataset, {})
+    sums = tuple(
+        _misfit_cell(one.nrmse_before, one.nrmse_after, format_percent) for one in whole.values()
+    )
+    return [*rows, FitRow("all together, over the spread of the signal", label, sums, True)]
+
+
+def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
+    part = after / before - 1.0 if before > 0.0 else 0.0
+    trend = "same" if abs(part) < CHANGE_TOLERANCE else "better" if part < 0.0 else "worse"
+    return Cell(text(before), text(after), format_change(before, after), trend)
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A candidate: `bar` is its gain as a part of the largest, in per cent."""
+
+    effect: str
+    place: str
+    train: str
+    left_out: str
+    probability: str
+    bar: float
+    reason: str
+    is_accepted: bool
+
+
+def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
+    """Return those that were fitted: what was accepted first, then by rank."""
+    ids = {one.placed_effect.id for one in selection.accepted}
+    first = [one for one in selection.first_round if one.placed_effect.id not in ids]
+    listed = [one for one in (*selection.accepted, *first) if one.likelihood_gain]
+    most = max([one.likelihood_gain.penalised for one in listed if one.likelihood_gain] + [1.0])
+    shares = selection.probabilities()
+    return [_candidate_row(report, selection, one, k, most, shares) for k, one in enumerate(listed)]
+
+
+def _candidate_row(
+    report: DiagnosisReport,
+    selection: Selection,
+    candidate_fit: CandidateFit,
+    rank: int,
+    largest: float,
+    shares: Mapping[str, float],
+) -> CandidateRow:
+    assert candidate_fit.likelihood_gain
+    known, share = candidate_fit.likelihood_gain, shares.get(candidate_fit.placed_effect.id)
+    is_accepted = candidate_fit.placed_effect.id in {
+        one.placed_effect.id for one in selection.accepted
+    }
+    reason = wording.format_reason(candidate_fit, rank, selection, report.case.thresholds)
+    if is_accepted and report.verdict.verdict == "ambiguous":
+        reason = "best, but not told from others: laid in what is shown here"
+    if is_accepted and report.verdict.verdict == "unknown":
+        reason = "a formula, no effect of the library: laid in what is shown here"
+    effect, _, place = wording.candidate_title(candidate_fit.placed_effect, report).partition("@")
+    return CandidateRow(
+        effect,
+        place,
+        _format_nats(known.penalised),
+        _format_nats(known.cross_validated),
+        "" if share is None else format_probability(share),
+        100.0 * max(known.penalised, 0.0) / largest,
+        reason,
+        is_accepted,
+    )
+
+
+def _format_nats(gain: float) -> str:
+    return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
+
+
+def unfitted_candidates(
+    report: DiagnosisReport, selection: Selection
+) -> list[tuple[str, list[str]]]:
+    """Return why the other candidates were not fitted, each reason with their names."""
+    found: dict[str, list[str]] = {}
+    ids = {one.placed_effect.id for one in selection.accepted}
+    for tried in selection.first_round:
+        if not tried.likelihood_gain and tried.placed_effect.id not in ids:
+            why = wording.format_reason(tried, 0, selection, report.case.thresholds)
+            found.setdefault(why, []).append(wording.candidate_title(tried.placed_effect, report))
+    return list(found.items())
+
+
+def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tuple[str, str]]:
+    """Return what is known of what is missing at a place: modes, windows, companions."""
+    modes = sorted(location.modes.items(), key=lambda pair: -pair[1])
+    shares = [f"{name} {format_percent(share)}" for name, share in modes if share >= 0.005]
+    shares = shares if len(modes) > 1 else []
+    windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in location.windows]
+    more = len(windows) - max_windows
+    told = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
+    along = [
+        f"{name} (correlation {r:.2f})"
+        for name, r in location.correlates
+        if abs(r) >= MIN_CORRELATION
+    ]
+    rows = [
+        ("strongest in", told),
+        ("by mode", ", ".join(shares)),
+        ("goes along with", ", ".join(along)),
+    ]
+    return [row for row in rows if row[1]]
+
+
+def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
+    """Return name, length, rate, lost samples and findings of each training recording."""
+    check = report.check
+    rows: list[tuple[str, ...]] = []
+    for name in dict.fromkeys(one.recording for one in check.channels):
+        channels = [one for one in check.channels if one.recording == name]
+        length = max(one.end for one in channels) - min(one.start for one in channels)
+        rates = sorted({round(one.rate) for one in channels if math.isfinite(one.rate)})
+        lost = max(one.dropped for one in channels)
+        found = [one.severity for one in check.findings if one.recording == name]
+        worst = ", ".join(f"{found.count(s)} {s}" for s in ("error", "warning") if s in found)
+        used = "not used" if name in report.unused_recordings else "training"
+        if report.diagnosis is None:
+            used = "not used"
+        rate = "-".join(f"{rate}" for rate in (rates[:1] + rates[1:][-1:]))
+        rows.append(
+            (
+                name,
+                used,
+                f"{length:.1f} s",
+                f"{rate} Hz",
+                format_percent(lost) if lost else "none",
+                worst or "none",
+            )
+        )
+    return rows
+
+
+def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
+    """Return what recordings would have to show, and the effects that ask for it."""
+    lacking: dict[str, list[str]] = {}
+    for one in report.check.excitation.effects:
+        if one.lacking:
+            lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
+    return [(needs, ", ".join(names)) for needs, names in lacking.items()]
+
+
+def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
+    """Return the noise of the recorded signals: no model misses less."""
+    noise = selection.base.noise_levels.outputs
+    parts = zip(signals, noise, units, strict=True)
+    return ", ".join(
+        f"{name} {format_significant(float(sd), 2)} {unit}" for name, sd, unit in parts
+    )
+
+
+def split_code_spans(text: str) -> list[tuple[str, bool]]:
+    """Return a sentence in parts, with whether each stood between back quotes."""
+    return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
+
+
+def whiteness_rows(
+    before: Sequence[WhitenessTest],
+    after: Sequence[WhitenessTest],
+    units: Sequence[str],
+    is_base_only: bool,
+) -> list[tuple[str, ...]]:
+    """Return a row by signal and model: size, what its past tells, lags outside, chance."""
+    models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
+    rows: list[tuple[str, ...]] = []
+    for k, unit in enumerate(units):
+        for words, found in models:
+            one = found[k]
+            chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
+            rows.append(
+                (
+                    one.signal,
+                    words,
+                    f"{format_significant(one.rms)} {unit}",
+                    format_percent(one.predictable_fraction),
+                    f"{one.lags_outside_band} of {len(one.lags)}",
+                    chance,
+                    one.rating,
+                )
+            )
+    return rows
+
+
+def describe_residuals(
+    before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
+) -> list[tuple[str, str]]:
+    """Return for each signal what is left of it, in words."""
+    says = {
+        "white": "noise",
+        "nearly white": "next to nothing but noise",
+        "coloured": "not noise alone: something else is still missing, or slow",
+    }
+    found = []
+    for old, new in zip(before, after, strict=True):
+        was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
+        told = f"its past tells {format_percent(new.predictable_fraction)} of it{was}"
+        found.append((new.signal, f"{says[new.rating]}; {told}"))
+    return found

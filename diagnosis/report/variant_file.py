@@ -1,0 +1,132 @@
+"""Variant: what a diagnosis has found, as a variant of the base that every command runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+from codegen.toolchain.templates import product_version
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.model.parameter_text import format_value
+from diagnosis.model.placed_effect import automaton_with_effects as laid_automaton
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.sentences import format_rounded
+from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.forward_selection import Selection
+from language.model.automaton import Automaton
+from language.overlays.effect_reader import Effect, added_names
+from language.overlays.expand_document import read_document
+
+NAME_SUFFIX = "_diagnosed"
+
+MAX_NAME_LENGTH = 31
+
+MIN_RELATIVE_CHANGE = 1e-6
+"""Relative change below which a parameter is not written down."""
+
+
+def variant_name(base: str, ending: str = NAME_SUFFIX) -> str:
+    """Return the name of the variant of a base, or of what goes with it."""
+    return base[: MAX_NAME_LENGTH - len(ending)] + ending
+
+
+def format_variant(report: DiagnosisReport, extends: str) -> str:
+    """Return the variant as YAML: `extends` names the base, or its file.
+
+    Values are in SI; standard deviations and what was declared stand beside them as comments.
+    """
+    lines = [
+        "language: 1",
+        f"variant: {variant_name(report.name)}",
+        f"extends: {extends}",
+        f"about: {json.dumps(_about_text(report), ensure_ascii=False)}",
+    ]
+    if report.diagnosis is None:
+        return "\n".join(lines) + "\n"
+    lines += [f"# {text}" for text in missing_effect_notes(report)]
+    selection = report.diagnosis.selection
+    fitted = quantities_of(selection.model)
+    lines += _parameter_lines(report.automaton, fitted)
+    lines += _effect_lines(report, selection, fitted)
+    return "\n".join(lines) + "\n"
+
+
+def missing_effect_notes(report: DiagnosisReport) -> list[str]:
+    """Return what has to be done before the variant can be read: its effects found by name."""
+    names = [effect.body.span.source.name for effect in missing_effects(report)]
+    return [f"{name} has to be below spec/: the variant lays this effect by name" for name in names]
+
+
+def missing_effects(report: DiagnosisReport) -> list[Effect]:
+    """Return the accepted effects that the project does not have, or has with another text."""
+    project = report.case.project
+    accepted = report.diagnosis.selection.accepted if report.diagnosis else ()
+    found = []
+    for effect in (tried.placed_effect.effect for tried in accepted):
+        own = effect.body.span.source
+        files = [read_document(path) for path in project.effect_index.get(effect.name, ())]
+        if not any(file.source.lines == own.lines for file in files):
+            found.append(effect)
+    return found
+
+
+def _about_text(report: DiagnosisReport) -> str:
+    verdict = report.verdict
+    found = [f"{one.id}@{one.place}" for one in verdict.effects]
+    says = ", ".join([verdict.verdict, *found])
+    files = ", ".join(f"{name} {digest}" for name, digest in verdict.inputs.items())
+    return f"diagnosed by modewright {product_version()}: {says}; fitted to {files}"
+
+
+def _parameter_lines(automaton: Automaton, fitted: Mapping[str, Quantity]) -> list[str]:
+    lines = []
+    for name, quantity in fitted.items():
+        parameter = automaton.parameters.get(name)
+        if parameter is None or parameter.value is None:
+            continue
+        was = float(parameter.value)
+        if abs(quantity.value - was) > MIN_RELATIVE_CHANGE * abs(was):
+            text = format_value(quantity.value, parameter)
+            told = f"sd {format_rounded(quantity.std)}, declared {was:.6g}"
+            lines.append(f"  {name}: {{value: {text}}}  # {told}")
+    return ["parameters:", *lines] if lines else []
+
+
+def _effect_lines(
+    report: DiagnosisReport, selection: Selection, fitted: Mapping[str, Quantity]
+) -> list[str]:
+    if not selection.accepted:
+        return []
+    placed_effects = selection.model.candidate.placed_effects
+    whole = laid_automaton(report.case.document, report.case.project, placed_effects)
+    lines = ["effects:"]
+    for tried in selection.accepted:
+        lines += _single_effect_lines(tried, whole, selection, fitted)
+    return lines
+
+
+def _single_effect_lines(
+    candidate_fit: CandidateFit,
+    whole: Automaton,
+    selection: Selection,
+    fitted: Mapping[str, Quantity],
+) -> list[str]:
+    placed_effect, brought = (
+        candidate_fit.placed_effect,
+        added_names(candidate_fit.placed_effect.effect.body),
+    )
+    lines = [f"  {placed_effect.id}:  # {placed_effect.effect.about}"]
+    each = [selection.model.values(k) for k in range(len(selection.model.point.per_recording))]
+    values = []
+    for final, quantity in fitted.items():
+        own = final.removesuffix(f"_{placed_effect.suffix}")
+        parameter = whole.parameters.get(final)
+        if own not in brought or placed_effect.qualified_name(own) != final or parameter is None:
+            continue
+        text = format_value(quantity.value, parameter)
+        note = f"sd {format_rounded(quantity.std)}"
+        if parameter.fitting.per == "recording":
+            note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
+        values.append(f"      {own}: {text}  # {note}")
+    return [*lines, "    values:", *values] if values else [f"  {placed_effect.id}: {{}}"]

@@ -1,0 +1,1 @@
+"""Results of a diagnosis: the verdict and the names of effects."""

@@ -1,0 +1,112 @@
+"""Verdict: what a diagnosis says, as data; its JSON has the format `modewright-verdict/1`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.localisation.location import Location
+from diagnosis.validation.misfit import Misfit
+
+FORMAT = "modewright-verdict/1"
+
+DecisionOutcome = Literal["effect", "nothing_missing", "unknown", "ambiguous"]
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect at a place (`section.name`) with its fitted parameters."""
+
+    id: str
+    place: str
+    parameters: Mapping[str, Quantity]
+
+
+@dataclass(frozen=True)
+class RankedCandidate:
+    """A candidate: its probability, and what it gained in training [nats], give or take `std`."""
+
+    id: str
+    place: str
+    probability: float
+    train_gain: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found: see docs/diagnosis.md for each part.
+
+    `fit` is by set (`train`, `held_out`) and signal; `base` are the recalibrated parameters before
+    and after the effects were accepted.
+    """
+
+    verdict: DecisionOutcome
+    effects: tuple[NamedEffect, ...]
+    candidates: tuple[RankedCandidate, ...]
+    other: float
+    ambiguous_with: tuple[NamedEffect, ...]
+    location: tuple[Location, ...]
+    fit: Mapping[str, Mapping[str, Misfit]]
+    base: Mapping[str, tuple[Quantity, Quantity]]
+    confirmed: bool | None
+    runtime_s: float
+    messages: tuple[str, ...] = ()
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict as written to `verdict.json`."""
+        locations = [
+            location for location in self.location if location.gain > 0.0 or location.is_accepted
+        ]
+        worst = locations[0] if locations else None
+        return {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "effects": [_effect_to_json(one) for one in self.effects],
+            "candidates": [
+                {
+                    "id": one.id,
+                    "place": one.place,
+                    "probability": one.probability,
+                    "train_gain": one.train_gain,
+                    "std": one.std,
+                }
+                for one in self.candidates
+            ],
+            "other": self.other,
+            "ambiguous_with": [{"id": one.id, "place": one.place} for one in self.ambiguous_with],
+            "location": {
+                "places": [location.path for location in locations],
+                "signals": [name for name, _ in worst.correlates] if worst else [],
+                "modes": dict(worst.modes) if worst else {},
+                "windows": [list(window) for window in worst.windows] if worst else [],
+            },
+            "fit": {
+                part: {signal: dataclasses.asdict(one) for signal, one in signals.items()}
+                for part, signals in self.fit.items()
+            },
+            "base": {
+                name: {"before": _quantity_to_json(before), "after": _quantity_to_json(after)}
+                for name, (before, after) in self.base.items()
+            },
+            "confirmed": self.confirmed,
+            "messages": list(self.messages),
+            "inputs": dict(self.inputs),
+            "runtime_s": self.runtime_s,
+        }
+
+
+def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
+    return {
+        "id": effect.id,
+        "place": effect.place,
+        "parameters": {name: _quantity_to_json(q) for name, q in effect.parameters.items()},
+    }
+
+
+def _quantity_to_json(quantity: Quantity) -> dict[str, Any]:
+    return {"value": quantity.value, "unit": quantity.unit, "std": quantity.std}

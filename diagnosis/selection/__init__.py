@@ -1,0 +1,1 @@
+"""Selection of effects: screening, forward selection, elimination, exchange, thresholds."""

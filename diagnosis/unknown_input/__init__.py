@@ -1,0 +1,1 @@
+"""Detection of an unknown input that acts in intervals."""

@@ -1,0 +1,108 @@
+"""Stirring: whether what is unknown is loud when known inputs move, or near rest.
+
+A hidden input comes when it likes. What a model gets wrong of its actuator, shaft or tyre is heard
+whenever the known inputs change, what it gets wrong of a friction near rest: it is no input,
+whatever its sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples
+
+Reals = NDArray[np.float64]
+WINDOW_TIMES = (0.3, 1.0)
+"""Seconds in which an answer to a moved input is heard: at once, or as long as a limit acts."""
+SMOOTHING_TIME = 0.05
+"""Seconds over which an input is averaged before its rate is taken: it has noise."""
+STANDSTILL_STDS = 0.1
+"""Standard deviations of a signal within which it is near rest."""
+
+
+def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[Reals]) -> float:
+    """Return how loudness goes with the movement or the amount of an input: a correlation.
+
+    `disturbances` (samples,) in each recording is known from where its states were found.
+    """
+    pairs = list(zip(series, disturbances, strict=True))
+    columns = range(series[0].inputs.shape[1])
+    return max(
+        (
+            _amplitude_correlation(
+                series, disturbances, [found(one, k, len(u)) for one, u in pairs], within
+            )
+            for k in columns
+            for found in (_input_rate, _input_amplitude)
+            for within in WINDOW_TIMES
+        ),
+        default=0.0,
+    )
+
+
+def standstill_dependence(
+    series: Sequence[SampledRecording], disturbances: Sequence[Reals]
+) -> float:
+    """Return how loudness goes with a compared signal being near rest, at most: a correlation."""
+    most = 0.0
+    for column in range(series[0].measured.shape[1]):
+        spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
+        near = [
+            _nearness_to_standstill(one, column, len(u), STANDSTILL_STDS * float(spread))
+            for one, u in zip(series, disturbances, strict=True)
+        ]
+        most = max(most, _amplitude_correlation(series, disturbances, near, WINDOW_TIMES[0]))
+    return most
+
+
+def _amplitude_correlation(
+    series: Sequence[SampledRecording],
+    disturbances: Sequence[Reals],
+    features: Sequence[Reals],
+    window: float,
+) -> float:
+    """Return the correlation of loudness with something else, 0 where one of both is still.
+
+    Both are averaged over some seconds around each sample.
+    """
+    loud = [
+        _moving_mean(np.abs(u), one, window) for u, one in zip(disturbances, series, strict=True)
+    ]
+    near = [_moving_mean(values, one, window) for values, one in zip(features, series, strict=True)]
+    whole, along = np.concatenate(loud), np.concatenate(near)
+    if np.std(along) > 0.0 and np.std(whole) > 0.0:
+        return float(np.corrcoef(whole, along)[0, 1])
+    return 0.0
+
+
+def _nearness_to_standstill(
+    series: SampledRecording, column: int, count: int, width: float
+) -> Reals:
+    """Return 1 where a compared signal is at rest, 0 far from it (count,)."""
+    values = series.measured[burn_in_samples(series) : burn_in_samples(series) + count, column]
+    near = np.exp(-((np.nan_to_num(values, nan=np.inf) / max(width, 1e-300)) ** 2))
+    return np.asarray(near, dtype=np.float64)
+
+
+def _input_rate(series: SampledRecording, column: int, count: int) -> Reals:
+    """Return how much an input moves at each sample (count,)."""
+    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
+    even = _moving_mean(values, series, SMOOTHING_TIME)
+    return np.asarray(np.abs(np.diff(even, prepend=even[:1])), dtype=np.float64)
+
+
+def _input_amplitude(series: SampledRecording, column: int, count: int) -> Reals:
+    """Return how large an input is at each sample (count,)."""
+    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
+    return np.asarray(np.abs(values), dtype=np.float64)
+
+
+def _moving_mean(values: Reals, series: SampledRecording, seconds: float) -> Reals:
+    """Return means over some seconds around each sample."""
+    count = max(3, round(seconds / float(series.period)))
+    padded = np.pad(values, (count // 2, count - 1 - count // 2), mode="edge")
+    return np.asarray(np.convolve(padded, np.full(count, 1.0 / count), "valid"), dtype=np.float64)

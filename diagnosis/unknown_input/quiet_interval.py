@@ -1,0 +1,105 @@
+"""Silence: parameters from where a hidden input is silent, for what it does where it is not.
+
+While it is free everywhere it takes up what a wrong mass or drag leaves over, and nothing tells the
+two apart. Where it is silent the model has to follow without it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.noise_level import INITIAL_LEVELS, disturbance_units, fit_with_noise
+from diagnosis.localisation.free_disturbance import (
+    ALL_LEVELS,
+    SMALL_LEVEL,
+    scan_level,
+    with_disturbance_levels,
+)
+from diagnosis.model.parameter_vector import ParameterVector
+
+Booleans = NDArray[np.bool_]
+MARGIN = 0.5
+"""Seconds before and behind it in which an input is not yet silent."""
+MIN_DURATION = 2.0
+"""Seconds that a silence lasts at least: the states have to be found in it."""
+START_LEVELS = (INITIAL_LEVELS[0], INITIAL_LEVELS[-1])
+"""Levels of all drifts from which the silences are fitted."""
+MIN_QUIET_FRACTION = 1.0 / 3.0
+"""Part of the recordings that silences have at least, if parameters are to follow from them."""
+
+
+def refit_on_quiet_intervals(
+    model: Estimate, series: Sequence[SampledRecording], active: Sequence[Booleans], name: str
+) -> Estimate:
+    """Return a model whose drift of a `name` is free, its parameters from where that is not `active`,
+    told for each recording behind its burn-in (samples,).
+
+    As it is where there is not silence enough.
+    """
+    pieces, places = _quiet_recordings(series, active)
+    if sum(one.count for one in pieces) < MIN_QUIET_FRACTION * sum(one.count for one in series):
+        return model
+    units = disturbance_units(model.candidate, series, model.values(0))
+    recording_indices = [places.index(r) if r in places else 0 for r in range(len(series))]
+    start = ParameterVector(model.point.shared, model.point.per_recording[places])
+    fits = []
+    for level in START_LEVELS:
+        noise_levels = with_disturbance_levels(
+            model.noise_levels, units, dict.fromkeys(units, level)
+        )
+        fits.append(fit_with_noise(model.candidate, pieces, noise_levels, start, units))
+    best = min(fits, key=lambda one: one.cost)
+    point = ParameterVector(best.point.shared, best.point.per_recording[recording_indices])
+    small_noise = with_disturbance_levels(
+        model.noise_levels, units, dict.fromkeys(units, SMALL_LEVEL)
+    )
+    free = evaluate(model.candidate, series, small_noise, point)
+    return scan_level(free, series, units, name, ALL_LEVELS)
+
+
+def _quiet_recordings(
+    series: Sequence[SampledRecording], active: Sequence[Booleans]
+) -> tuple[list[SampledRecording], list[int]]:
+    """Return the silences, each as a recording, the longest first, and where they are from."""
+    found = []
+    for r, (one, there) in enumerate(zip(series, active, strict=True)):
+        around = np.ones(2 * round(MARGIN / float(one.period)) + 1)
+        near = (
+            np.convolve(np.pad(there, (burn_in_samples(one), 0)).astype(float), around, "same")
+            > 0.5
+        )
+        found += [(part, r) for part in _quiet_parts(one, near)]
+    found.sort(key=lambda pair: -pair[0].count)
+    return [part for part, _ in found], [r for _, r in found]
+
+
+def _quiet_parts(series: SampledRecording, active: Booleans) -> list[SampledRecording]:
+    """Return the silent parts of a recording, each from where all signals are known."""
+    edges = [0, *(np.flatnonzero(np.diff(active)) + 1).tolist(), series.count]
+    known = np.flatnonzero(np.all(np.isfinite(series.measured), axis=1))
+    found = []
+    for low, high in pairwise(edges):
+        first = known[np.searchsorted(known, low) :][:1]
+        if (
+            not active[low]
+            and len(first)
+            and (high - first[0]) * float(series.period) >= MIN_DURATION
+        ):
+            part = slice(int(first[0]), high)
+            found.append(
+                dataclasses.replace(
+                    series,
+                    start=series.start + series.period * part.start,
+                    inputs=np.ascontiguousarray(series.inputs[part]),
+                    measured=np.ascontiguousarray(series.measured[part]),
+                )
+            )
+    return found

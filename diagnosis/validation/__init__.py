@@ -1,0 +1,1 @@
+"""Validation of a diagnosis: residual autocorrelation, constancy, free simulation."""

@@ -1,0 +1,232 @@
+"""Shuffle: the oscillation after the largest step - how long a model follows it, and cycle by cycle
+its frequency and damping over its amplitude, as recorded and as simulated.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.innovations import predict
+
+Reals = NDArray[np.float64]
+OBSERVED_TIME = 0.5
+"""Seconds before the step that an observer needs at least."""
+MAX_TIME = 2.5
+"""Seconds after it that are looked at."""
+STEP_TIME = 0.06
+"""Seconds in which a step is over."""
+MIN_FREQUENCY, MAX_FREQUENCY = 1.0, 25.0
+"""Frequencies [Hz] that are looked for."""
+MIN_NOISE_RATIO = 8.0
+"""A cycle counts where its amplitude is so many times the noise."""
+MAX_ERROR_FRACTION = 0.35
+"""The model fits while it misses less than this part of the amplitude of the time: its phase is 20
+degrees off then, which is seen where both are drawn over each other.
+"""
+LARGE_AMPLITUDE, SMALL_AMPLITUDE = 0.5, 0.25
+"""Cycles are compared above and below these parts of the largest amplitude."""
+FREQUENCY_TOLERANCE = 0.02
+"""Frequencies that differ by less, as a part, are the same."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """The cycles of an oscillation: `times` [s] after the step, `rates` [Hz], `amplitudes`.
+
+    One begins at every crossing of zero: each overlaps the next by a half.
+    """
+
+    times: Reals
+    frequencies: Reals
+    amplitudes: Reals
+
+    def mean_frequency_after(self, time: float) -> float:
+        """Return the mean frequency [Hz] of the cycles from a time on; NaN without any."""
+        late = self.frequencies[self.times >= time]
+        return float(np.mean(late)) if len(late) else float("nan")
+
+    def frequency_trend(self) -> float:
+        """Return the part by which small cycles are faster than large ones; NaN without both."""
+        part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
+        large, little = (
+            self.frequencies[part > LARGE_AMPLITUDE],
+            self.frequencies[part < SMALL_AMPLITUDE],
+        )
+        if not len(large) or not len(little):
+            return float("nan")
+        return float(np.mean(little) / np.mean(large) - 1.0)
+
+    def damping_ratio(self) -> float:
+        """Return the damping ratio from how the amplitudes fall; NaN with fewer than three."""
+        if len(self.amplitudes) < 3:
+            return float("nan")
+        slope = np.polyfit(np.arange(len(self.amplitudes)), np.log(self.amplitudes), 1)[0]
+        return float(-slope / np.pi)
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """What follows the step at `start` [s] of a recording: `until` [s] after it the model fits.
+
+    `signal` is the one in which it shows most; cycles as recorded and as simulated.
+    """
+
+    recording: str
+    start: float
+    signal: str
+    followed_time: float
+    length: float
+    recorded: Cycles = field(repr=False)
+    simulated: Cycles = field(repr=False)
+
+    @property
+    def has_other_frequency(self) -> bool:
+        """Whether the model leaves the recording, and by another frequency."""
+        rates = [
+            one.mean_frequency_after(self.followed_time) for one in (self.recorded, self.simulated)
+        ]
+        known = all(np.isfinite(rates)) and self.followed_time < self.length
+        return bool(known and abs(rates[0] / rates[1] - 1.0) > FREQUENCY_TOLERANCE)
+
+    def format_sentence(self) -> str:
+        """Return until when the model fits, then both frequencies, in one sentence."""
+        begin = f"after the step at {self.start:.2f} s of {self.recording}"
+        if self.followed_time >= self.length:
+            return f"{self.signal} fits to the end, {self.length:.2f} s {begin}"
+        measured = self.recorded.mean_frequency_after(self.followed_time)
+        model = self.simulated.mean_frequency_after(self.followed_time)
+        if not (np.isfinite(measured) and np.isfinite(model)):
+            return f"{self.signal} fits until t = {self.followed_time:.2f} s {begin}"
+        text = (
+            f"{self.signal} fits until t = {self.followed_time:.2f} s {begin}, then the shuffle's "
+            f"frequency is {measured:.2f} Hz in the recording and {model:.2f} Hz in the model"
+        )
+        return text + self._format_trend() + self._format_damping()
+
+    def _format_trend(self) -> str:
+        """Return how the recorded frequency goes with the amplitude, against the model's."""
+        more = [one.frequency_trend() for one in (self.recorded, self.simulated)]
+        if not all(np.isfinite(more)) or abs(more[0] - more[1]) < FREQUENCY_TOLERANCE:
+            return ""
+        word = "growing" if more[0] > more[1] else "falling"
+        parts = [f"{100.0 * one:+.0f} %" for one in more]
+        return f", {word} as the amplitude falls ({parts[0]}, in the model {parts[1]})"
+
+    def _format_damping(self) -> str:
+        dampings = [100.0 * one.damping_ratio() for one in (self.recorded, self.simulated)]
+        if not all(np.isfinite(dampings)) or abs(dampings[0] - dampings[1]) < 0.5:
+            return ""
+        return f"; its damping {dampings[0]:.1f} % and {dampings[1]:.1f} %"
+
+
+def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> Oscillation | None:
+    """Return what follows the largest step of some recordings; None without an oscillation."""
+    place = _largest_step(series)
+    if place is None:
+        return None
+    recording, start, end = place
+    one = series[recording]
+    masked = one.measured.copy()
+    masked[start:end] = np.nan
+    alone = dataclasses.replace(one, measured=np.ascontiguousarray(masked))
+    values = model.values(recording)
+    run = predict(model.candidate, [alone], [values], model.gains, model.noise_levels.huber_limits)
+    if not run.is_complete:
+        return None
+    period, names = float(one.period), model.candidate.predictor.outputs
+    measured, simulated = one.measured[start:end], run.predictions[0].outputs[start:end]
+    width = _cycle_samples(simulated[:, 0], period)
+    if width is None:
+        return None
+    waves = [_remove_moving_mean(measured[:, k], width) for k in range(len(names))]
+    noise = model.noise_levels.outputs
+    clear = [float(np.nanstd(wave)) / noise[k] for k, wave in enumerate(waves)]
+    k = int(np.argmax(clear))
+    cycles_pair = [
+        _find_cycles(_remove_moving_mean(x[:, k], width), period, MIN_NOISE_RATIO * noise[k])
+        for x in (measured, simulated)
+    ]
+    if not all(len(cycles.times) >= 2 for cycles in cycles_pair):
+        return None
+    times = np.arange(end - start) * period
+    amplitude = np.interp(times, cycles_pair[0].times, cycles_pair[0].amplitudes)
+    least = np.maximum(MAX_ERROR_FRACTION * amplitude, MIN_NOISE_RATIO * noise[k])
+    missed = np.abs(measured[:, k] - simulated[:, k]) > least
+    lasting = np.flatnonzero(missed[1:] & missed[:-1])
+    length = (end - start) * period
+    followed_time = float(lasting[0] * period) if len(lasting) else length
+    start_time = float(one.start) + start * period
+    return Oscillation(one.name, start_time, names[k], followed_time, length, *cycles_pair)
+
+
+def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | None:
+    """Return the recording of the largest step of an input, its sample, and the next one's."""
+    scale = np.max([np.ptp(one.inputs, axis=0) for one in series], axis=0)
+    scale = np.where(scale > 0.0, scale, np.inf)
+    best, found = 0.0, None
+    for k, one in enumerate(series):
+        period = float(one.period)
+        few, first = max(1, round(STEP_TIME / period)), round(OBSERVED_TIME / period)
+        steps = np.max(np.abs(one.inputs[few:] - one.inputs[:-few]) / scale, axis=1)
+        last = one.count - round(0.5 / period)
+        if last <= first or not np.max(steps[first:last], initial=0.0) > best:
+            continue
+        start = first + int(np.argmax(steps[first:last]))
+        best = float(steps[start])
+        later = np.flatnonzero(steps[start + 3 * few :] > 0.3 * best)
+        end = start + 3 * few + int(later[0]) if len(later) else one.count
+        found = (k, start, min(end, one.count, start + round(MAX_TIME / period)))
+    return found
+
+
+def _cycle_samples(values: Reals, period: float) -> int | None:
+    """Return the samples of one cycle of the strongest oscillation (samples,)."""
+    time = np.arange(len(values))
+    rest = values - np.polyval(np.polyfit(time, values, 3), time)
+    rates = np.fft.rfftfreq(len(rest), period)
+    power = np.abs(np.fft.rfft(rest * np.hanning(len(rest)))) ** 2
+    power[(rates < MIN_FREQUENCY) | (rates > MAX_FREQUENCY)] = 0.0
+    if not np.max(power) > 0.0:
+        return None
+    width = round(1.0 / (float(rates[int(np.argmax(power))]) * period))
+    return width if 4 <= width < len(values) // 2 else None
+
+
+def _remove_moving_mean(values: Reals, width: int) -> Reals:
+    """Return what oscillates: values less their means over one cycle around; NaN at the ends."""
+    known = np.isfinite(values)
+    if not np.any(known):
+        return np.full(len(values), np.nan)
+    whole = np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
+    kernel = np.full(width + 1 - width % 2, 1.0)
+    if width % 2 == 0:
+        kernel[0] = kernel[-1] = 0.5
+    mean = np.convolve(whole, kernel / np.sum(kernel), mode="same")
+    found = whole - mean
+    found[: width // 2] = np.nan
+    found[len(found) - width // 2 :] = np.nan
+    return found
+
+
+def _find_cycles(wave: Reals, period: float, min_gain: float) -> Cycles:
+    """Return the cycles between crossings of zero, until one is smaller than `min_gain`."""
+    known = np.flatnonzero(np.isfinite(wave))
+    x, offset = wave[known], int(known[0]) if len(known) else 0
+    places = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0.0)
+    crossings = places + x[places] / (x[places] - x[places + 1])
+    times, rates, amplitudes = [], [], []
+    for low, high in zip(crossings[:-2], crossings[2:], strict=True):
+        amplitude = float(np.max(np.abs(x[int(low) + 1 : int(high) + 1]), initial=0.0))
+        if amplitude < min_gain:
+            break
+        times.append((offset + 0.5 * (low + high)) * period)
+        rates.append(1.0 / ((high - low) * period))
+        amplitudes.append(amplitude)
+    return Cycles(np.array(times), np.array(rates), np.array(amplitudes))

@@ -1,0 +1,182 @@
+"""Constancy: whether the parameters of an effect are the same in each recording.
+
+Physics is: a constant of a machine does not change with the manoeuvre. What imitates an effect that
+the library lacks finds another value in each that comes nearest to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.criterion.cross_validation import STEP_FRACTIONS
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.innovations import PredictionResult, predict
+from diagnosis.model.parameter_vector import bounds_of
+from diagnosis.model.placed_effect import TIME_DIMENSION, PlacedEffect, effect_names
+from diagnosis.selection.candidate_search import CandidateFit
+from language.expressions.units import parse_unit
+from language.text.document import MappingNode, ScalarNode
+
+Reals = NDArray[np.float64]
+Integers = NDArray[np.int64]
+VARIATION_GAIN, VARIATION_FRACTION = 20.0, 0.012
+"""Nats that values of its own in each recording would gain for an effect, and part of what it
+gained, from which on its parameters vary."""
+REJECTION_FRACTION, DELAY_REJECTION_FRACTION = 0.2, 0.06
+"""The same part from which on they are no constants of a machine: right ones have 0.17 at most. A
+lag or a delay alone has 0.01 (two of fifty 0.03 and 0.05): nothing beside it makes its time
+another."""
+
+
+def rejects_constancy(
+    model: Estimate,
+    candidate_fit: CandidateFit,
+    series: Sequence[SampledRecording],
+    is_only_effect: bool,
+) -> bool:
+    """Tell whether they differ so much that the effect is another one: the normal equations foresee
+    it, and runs with values of their own show it.
+    """
+    part = (
+        DELAY_REJECTION_FRACTION
+        if is_only_effect and is_lag_or_delay(candidate_fit.placed_effect)
+        else REJECTION_FRACTION
+    )
+    most = max(VARIATION_GAIN, part * candidate_fit.gain)
+    if not heterogeneity_score(model, candidate_fit.placed_effect, series) > most:
+        return False
+    return simulated_heterogeneity(model, candidate_fit.placed_effect, series) > most
+
+
+def is_lag_or_delay(placed_effect: PlacedEffect) -> bool:
+    """Tell whether an effect is a lag or a delay: it has a time, without which it is absent."""
+    known = placed_effect.effect.body.get("parameters")
+    entries = known if isinstance(known, MappingNode) else ()
+    return any(
+        isinstance(one.node, MappingNode) and _is_time_with_absent_neutral(one.node)
+        for one in entries
+    )
+
+
+def _is_time_with_absent_neutral(parameter: MappingNode) -> bool:
+    neutral, value = parameter.get("neutral"), parameter.get("value")
+    if (
+        not isinstance(neutral, ScalarNode)
+        or not isinstance(value, ScalarNode)
+        or neutral.text != "absent"
+    ):
+        return False
+    unit = value.text.partition(" ")[2]
+    return bool(unit) and parse_unit(unit).dimension.powers == TIME_DIMENSION
+
+
+def has_varying_parameters(
+    model: Estimate, candidate_fit: CandidateFit, series: Sequence[SampledRecording]
+) -> bool:
+    """Tell whether the parameters of an effect that a model holds are not the same in each."""
+    return heterogeneity_score(model, candidate_fit.placed_effect, series) > max(
+        VARIATION_GAIN, VARIATION_FRACTION * candidate_fit.gain
+    )
+
+
+def heterogeneity_score(
+    model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
+) -> float:
+    """Return what values of their own in each recording would gain [nats] for the parameters of an
+    effect, beyond what noise gives them: the normal equations foresee it, all else held.
+
+    (The score test of Rao 1948, of parameters that are the same against some that are not.)
+    """
+    steps = _recording_steps(model, placed_effect, series)
+    return sum(step.predicted_gain - step.expected_gain for step in steps)
+
+
+def simulated_heterogeneity(
+    model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
+) -> float:
+    """Return what they gain [nats] where the recordings are run with them, beyond what noise gives.
+
+    A step that does a recording no good is shortened: what bends is not foreseen far.
+    """
+    steps = _recording_steps(model, placed_effect, series)
+    if not steps:
+        return 0.0
+    effective_fraction = 1.0 / integrated_autocorrelation(model, series)
+    before, best = _recording_costs(model, model.prediction), np.zeros(len(steps))
+    for part in STEP_FRACTIONS:
+        moved = [step.point_at(part) for step in steps]
+        values = [step.values(model, z) for step, z in zip(steps, moved, strict=True)]
+        run = predict(model.candidate, series, values, model.gains, model.noise_levels.huber_limits)
+        distance = np.array(
+            [0.5 * float(np.sum((z - s.start) ** 2)) for s, z in zip(steps, moved, strict=True)]
+        )
+        best = np.maximum(
+            best, effective_fraction * (before - _recording_costs(model, run)) - distance
+        )
+    return float(np.sum(best)) - sum(step.expected_gain for step in steps)
+
+
+@dataclass(frozen=True)
+class _RecordingStep:
+    """How far an effect's parameters, the `places` of a model, would go in one recording from where
+    they are `at` in all; what that is foreseen to gain [nats], and what noise gives it by chance.
+    """
+
+    recording: int
+    indices: Integers
+    start: Reals
+    step: Reals
+    predicted_gain: float
+    expected_gain: float
+    bounds: Reals
+
+    def point_at(self, part: float) -> Reals:
+        """Return where a part of the step leads, within the ranges (parameters,)."""
+        low, high = self.bounds
+        return np.clip(self.start + part * self.step, low, high)
+
+    def values(self, model: Estimate, z: Reals) -> dict[str, float]:
+        """Return the parameters [SI] of the recording with those of the effect at some point."""
+        known = [model.candidate.free_parameters[k] for k in self.indices]
+        own = {one.name: one.value(float(at)) for one, at in zip(known, z, strict=True)}
+        return {**model.values(self.recording), **own}
+
+
+def _recording_steps(
+    model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
+) -> list[_RecordingStep]:
+    """Return how far the parameters that all share of an effect would go in each recording."""
+    if model.normal_equations is None:
+        return []
+    brought = effect_names(placed_effect)
+    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
+    indices = np.flatnonzero(is_brought & ~model.normal_equations.own)
+    effective_fraction, steps = 1.0 / integrated_autocorrelation(model, series), []
+    at, bounds = model.point.shared[indices], bounds_of(model.candidate)[indices].T
+    for recording in np.unique(model.normal_equations.of).tolist():
+        is_recording = model.normal_equations.of == recording
+        known = (
+            effective_fraction
+            * model.normal_equations.a[is_recording].sum(axis=0)[np.ix_(indices, indices)]
+        )
+        slope = effective_fraction * model.normal_equations.g[is_recording].sum(axis=0)[indices]
+        whole = known + np.eye(len(indices))
+        by_chance = 0.5 * float(np.trace(np.linalg.solve(whole, known)))
+        step = -np.linalg.solve(whole, slope)
+        gain = -0.5 * float(slope @ step)
+        steps.append(_RecordingStep(recording, indices, at, step, gain, by_chance, bounds))
+    return steps
+
+
+def _recording_costs(model: Estimate, prediction: PredictionResult) -> Reals:
+    """Return half the squares of each recording, over what a model leaves (recordings,); without
+    bound where one leaves all bounds.
+    """
+    costs = 0.5 * np.sum(prediction.runs.squared_sums / model.prediction.variances, axis=1)
+    return np.where(prediction.runs.completed == np.diff(prediction.runs.starts), costs, np.inf)

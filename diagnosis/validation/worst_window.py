@@ -1,0 +1,113 @@
+"""Worst window: where free simulation of the base misses most, with the model beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.validation.free_simulation import FREE_TIME, OBSERVED_TIME, is_free, simulate_free
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorstWindow:
+    """A window of a recording: times [s] (n,), `inputs` (n, fed), and `measured`, `before`, `after`
+    (n, seen) in SI.
+
+    The model is alone from `alone` [s] on. `units` are those of the signals; `words` say which
+    recordings it is the worst of.
+    """
+
+    recording: str
+    title: str
+    free_from: float
+    times: Reals
+    inputs: Reals
+    measured: Reals
+    before: Reals
+    after: Reals
+    signals: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FreeRuns:
+    """Free simulations of recordings: `before` and `after`, (samples, seen) of each, in SI."""
+
+    series: Sequence[SampledRecording]
+    before: Sequence[Reals]
+    after: Sequence[Reals]
+    signals: tuple[str, ...]
+
+
+def simulate_free_runs(
+    base: Estimate, model: Estimate, series: Sequence[SampledRecording]
+) -> FreeRuns:
+    """Return how both models go where they are alone."""
+    names = tuple(base.candidate.predictor.outputs)
+    return FreeRuns(series, simulate_free(base, series), simulate_free(model, series), names)
+
+
+def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
+    """Return name and root mean squares of what is missed, before and after (seen,), in SI."""
+    found = []
+    for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
+        alone = is_free(one)
+        missed = [np.nanmean((one.measured - run)[alone] ** 2, axis=0) for run in (before, after)]
+        found.append((one.name, np.sqrt(missed[0]), np.sqrt(missed[1])))
+    return found
+
+
+def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
+    """Return the window in which the base, alone, misses most: squares over those of a signal.
+
+    `label` says in words which recordings these are.
+    """
+    series, before, after = runs.series, runs.before, runs.after
+    spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
+    scale = np.maximum(spread, 1e-12)
+    most, place = -1.0, (0, 0)
+    for k, one in enumerate(series):
+        for start in _window_starts(one):
+            window = _window_slice(one, start)
+            alone = slice(start + _sample_count(one, OBSERVED_TIME), window.stop)
+            missed = (one.measured[alone] - before[k][alone]) / scale
+            squares = float(np.nansum(missed**2))
+            if squares > most:
+                most, place = squares, (k, start)
+    k, start = place
+    one, window = series[k], _window_slice(series[k], start)
+    period = float(one.period)
+    times = float(one.start) + np.arange(window.start, window.stop) * period
+    return WorstWindow(
+        one.name,
+        f"worst window of the {label} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
+        float(one.start) + (start + _sample_count(one, OBSERVED_TIME)) * period,
+        times,
+        one.inputs[window],
+        one.measured[window],
+        before[k][window],
+        after[k][window],
+        runs.signals,
+        tuple(units),
+    )
+
+
+def _sample_count(series: SampledRecording, seconds: float) -> int:
+    return round(seconds / float(series.period))
+
+
+def _window_starts(series: SampledRecording) -> range:
+    """Return the first samples of the windows that have a part in which the model is alone."""
+    last = max(1, series.count - _sample_count(series, OBSERVED_TIME) - 1)
+    return range(0, last, max(1, _sample_count(series, OBSERVED_TIME + FREE_TIME)))
+
+
+def _window_slice(series: SampledRecording, start: int) -> slice:
+    return slice(start, min(series.count, start + _sample_count(series, OBSERVED_TIME + FREE_TIME)))

@@ -1,0 +1,1 @@
+"""The public functions: simulate, check, generate, diagnose, sweep and others."""

@@ -1,0 +1,228 @@
+"""Calibrations: pages of automata written for, and read from, calibration tools."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from codegen.exchange.calibration.calibration_page import (
+    page_characteristics,
+    page_constants,
+    page_name,
+)
+from codegen.exchange.calibration.characteristic import PageFile
+from codegen.exchange.calibration.formats import FORMATS, read_page
+from codegen.exchange.calibration.import_context import Remark
+from codegen.exchange.calibration.name_filter import NameFilter
+from codegen.exchange.calibration.page_import import ImportedValues, import_values
+from language.ir.program import Constant, Program
+from language.loading.load import automaton_of, program_of
+from language.model.automaton import Automaton
+from language.overlays.expand_document import Project
+from language.overlays.literal_format import (
+    format_calibration,
+    format_value_in_unit,
+    is_exact_literal,
+)
+from language.text.diagnostic import Problem, Problems, Source, Span
+from language.text.document import Document, ScalarNode, YamlNode
+from language.text.node_edit import format_inline
+from modewright.api.documents import Values, load_calibrated_document, parse_values as as_scalars
+
+
+@dataclass(frozen=True)
+class CalibrationPage:
+    """The page of an automaton, its solved numbers solved for the values that it holds."""
+
+    automaton: Automaton = field(repr=False)
+    program: Program = field(repr=False)
+
+    @property
+    def tunable(self) -> tuple[Constant, ...]:
+        """The tunable parameters in the order of the page."""
+        return tuple(c for c in page_constants(self.program) if c.kind == "tunable")
+
+    @property
+    def solved(self) -> tuple[Constant, ...]:
+        """The solved numbers in the order of the page."""
+        return tuple(c for c in page_constants(self.program) if c.kind == "solved")
+
+    def text(self, form: str) -> str:
+        """Return the page as a file: `dcm`, `cdfx` or `csv`."""
+        name, number = self.program.name, self.program.number_type
+        heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
+        return FORMATS[form].write(
+            name, heading, page_characteristics(self.automaton, self.program)
+        )
+
+
+@dataclass(frozen=True)
+class SolvedChange:
+    """A solved number that is another one now; `relative` is |change| over the larger size."""
+
+    name: str
+    before: float
+    after: float
+
+    @property
+    def relative(self) -> float:
+        """How large the change is."""
+        size = max(abs(self.after), abs(self.before))
+        return abs(self.after / size - self.before / size)
+
+
+@dataclass(frozen=True)
+class ImportedPage:
+    """What a file of calibration data says of an automaton.
+
+    `values` are literals of the language by parameter; `stale` are solved numbers of the file that
+    were solved for other values; `warnings` are about the file.
+    """
+
+    page: CalibrationPage
+    values: Mapping[str, str]
+    remarks: tuple[Remark, ...]
+    stale: tuple[SolvedChange, ...]
+    warnings: tuple[Problem, ...]
+
+    def calibration(self, name: str, origin: str = "", date: str = "") -> str:
+        """Return the calibration file of the language with these values."""
+        return format_calibration(name, self.page.program.name, origin, date, self.values)
+
+
+@dataclass(frozen=True)
+class ResolvedPage:
+    """A page that was solved anew, the solved numbers that changed, and those that were absent."""
+
+    page: CalibrationPage
+    changes: tuple[SolvedChange, ...]
+    added: tuple[str, ...]
+    remarks: tuple[Remark, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+
+
+def export_calibration(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> CalibrationPage:
+    """Return the calibration page of an automaton. Raises SpecError."""
+    project = Project(root or Path())
+    return _build_page(
+        load_calibrated_document(reference, project, calibrations), project, as_scalars(values)
+    )
+
+
+def import_calibration(
+    file: Path,
+    of: str,
+    root: Path | None = None,
+    form: str | None = None,
+    own_only: bool = False,
+) -> ImportedPage:
+    """Return what a file of calibration data says of an automaton. Raises SpecError.
+
+    With `own_only` names of other functions of the ECU are passed over.
+    """
+    project = Project(root or Path())
+    return _import_page(
+        file, form, load_calibrated_document(of, project, ()), project, {}, own_only
+    )
+
+
+def resolve_calibration(
+    reference: str,
+    page: Path | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    form: str | None = None,
+) -> ResolvedPage:
+    """Return the page of an automaton solved anew, for the values of a file or a calibration.
+
+    Changes are those since the file, without one since the spec as it stands. Raises SpecError.
+    """
+    project = Project(root or Path())
+    document, scalars = (
+        load_calibrated_document(reference, project, calibrations),
+        as_scalars(values),
+    )
+    if page:
+        imported = _import_page(page, form, document, project, scalars)
+        absent = [remark.name for remark in imported.remarks if remark.kind == "missing"]
+        solved = {page_name(imported.page.program, c) for c in imported.page.solved}
+        added = tuple(name for name in absent if name in solved)
+        remarks = tuple(remark for remark in imported.remarks if remark.name not in added)
+        return ResolvedPage(imported.page, imported.stale, added, remarks, imported.warnings)
+    before = _build_page(load_calibrated_document(reference, project, ()), project, {})
+    after = _build_page(document, project, scalars)
+    known = {constant.name: constant.value for constant in before.solved}
+    added = tuple(page_name(after.program, c) for c in after.solved if c.name not in known)
+    return ResolvedPage(after, _changed_constants(known, after), added)
+
+
+def _import_page(
+    file: Path,
+    form: str | None,
+    document: Document,
+    project: Project,
+    scalars: Mapping[str, ScalarNode],
+    own_only: bool = False,
+) -> ImportedPage:
+    problems = Problems()
+    automaton = automaton_of(document, project, scalars)
+    program = program_of(automaton)
+    owned = NameFilter(program.name if own_only else "")
+    page_file: PageFile = read_page(file, problems, form, owned)
+    found: ImportedValues = import_values(page_file, automaton, program, problems, owned)
+    page = _build_page(document, project, {**scalars, **found.values})
+    values = {name: format_inline(node) for name, node in found.values.items()}
+    return ImportedPage(
+        page,
+        values,
+        found.remarks,
+        _changed_constants(found.solved, page),
+        tuple(problems.reported),
+    )
+
+
+def _changed_constants(
+    before: Mapping[str, float], page: CalibrationPage
+) -> tuple[SolvedChange, ...]:
+    """Return the solved numbers that are others than they were."""
+    return tuple(
+        SolvedChange(page_name(page.program, constant), before[constant.name], constant.value)
+        for constant in page.solved
+        if constant.name in before and constant.value != before[constant.name]
+    )
+
+
+def _build_page(
+    document: Document, project: Project, values: Mapping[str, YamlNode]
+) -> CalibrationPage:
+    """Return a page; a value with more digits than its type is taken as the page will hold it.
+
+    What is solved for a value then fits what a tool reads of it, to the last bit.
+    """
+    automaton = automaton_of(document, project, values)
+    program = program_of(automaton)
+    solved_for = {name for c in page_constants(program) for name in c.depends_on}
+    rounded = {
+        name: _stored_value(automaton, program, name)
+        for name in sorted(solved_for)
+        if automaton.parameters[name].type == "real"
+        and not is_exact_literal(automaton.parameters[name], program.number_type)
+    }
+    if rounded:
+        automaton = automaton_of(document, project, {**values, **rounded})
+        program = program_of(automaton)
+    return CalibrationPage(automaton, program)
+
+
+def _stored_value(automaton: Automaton, program: Program, name: str) -> ScalarNode:
+    """Return the value of a parameter as a page holds it."""
+    value = next(c.value for c in program.constants if c.name == f"calibration.{name}")
+    text = format_value_in_unit(automaton.parameters[name], value, program.number_type)
+    return ScalarNode(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))

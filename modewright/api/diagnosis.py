@@ -1,0 +1,332 @@
+"""Diagnoses: recordings against a spec, as functions of the public API."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shutil
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from diagnosis.criterion.threshold import (
+    DEFAULT_THRESHOLDS,
+    Thresholds,
+    format_thresholds,
+    read_thresholds,
+)
+from diagnosis.data.file_names import recording_names
+from diagnosis.data.holdout import require_disjoint
+from diagnosis.model.effect_folder import explain_unplaceable, load_effects
+from diagnosis.model.effect_library import library_effects
+from diagnosis.pipeline.case import BootstrapMode, Case, file_digests
+from diagnosis.pipeline.diagnose import diagnose as diagnosed
+from diagnosis.pipeline.parameter_fit import Fit, fit as fitted
+from diagnosis.pipeline.usable_recordings import LazyRecordings, select_usable
+from diagnosis.quality.finding import format_findings
+from diagnosis.quality.recording import used_columns
+from diagnosis.report.diagnosis_report import DiagnosisReport, undecided_verdict, unusable_reasons
+from diagnosis.report.sentences import summary_lines
+from diagnosis.report.stale_files import find_stale_files
+from diagnosis.report.unfollowed_signals import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.report.variant_file import format_variant, missing_effect_notes
+from engine.recordings.recording import read_recording
+from engine.recordings.recording_window import file_of
+from language.loading.load import automaton_of
+from language.model.automaton import Automaton
+from language.overlays.effect_reader import Effect
+from language.overlays.expand_document import Project, display_path, expand_document, read_document
+from modewright.api.recordings import CheckedRecordings, check_recordings, held_out_findings
+from modewright.runtime.blas_threads import SingleThreadedBlas
+from modewright.runtime.gc_pause import infrequent_gc
+from modewright.runtime.output_files import OutputError, make_folder, remove_files, write_files
+
+Report = Callable[[str], None]
+CACHED = "kept"
+CHECKPOINT_FOLDER = "stages"
+"""Where a folder of results keeps what a diagnosis that was ended goes on from."""
+THRESHOLD_WORDS: Mapping[str, BootstrapMode] = {
+    CACHED: "kept",
+    "bootstrap": "made",
+    "usual": "never",
+}
+"""Words for thresholds; anything else is a file."""
+
+
+class BudgetSpent(Exception):
+    """The time that a diagnosis may take has passed before it came to a verdict."""
+
+
+class UnusableRecordings(Exception):
+    """Recordings have errors that make whatever follows from them worthless."""
+
+
+class _Budget:
+    """The time [s] that a diagnosis may take, and what has been told in it."""
+
+    def __init__(self, seconds: float | None, report: Report) -> None:
+        self.begun = time.monotonic()
+        self.seconds = seconds
+        self.telling = report
+        self.told: list[str] = []
+
+    def report(self, text: str) -> None:
+        """Tell what a stage has found."""
+        self.told.append(text)
+        self.telling(text)
+
+    def check(self) -> None:
+        """Raise BudgetSpent when the time has passed."""
+        if self.seconds is not None and self.elapsed > self.seconds:
+            raise BudgetSpent(f"the {self.seconds:g} s of its budget are over")
+
+    @property
+    def elapsed(self) -> float:
+        """The time [s] since the beginning."""
+        return time.monotonic() - self.begun
+
+
+@SingleThreadedBlas()
+@infrequent_gc()
+def diagnose(
+    spec: str,
+    train: Sequence[str | Path],
+    held_out: Sequence[str | Path] = (),
+    map: str | None = None,
+    effects: str | Path | None = None,
+    root: Path | None = None,
+    *,
+    thresholds: str | Path = CACHED,
+    out: str | Path | None = None,
+    budget: float | None = None,
+    anyway: bool = False,
+    tell: Report = lambda text: None,
+) -> DiagnosisReport:
+    """Say which physics an automaton lacks to show what was recorded; write it into a folder.
+
+    Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
+    wanted `anyway`. `effects` is a folder of effects in place of those shipped, `budget` a time
+    [s] after which the verdict is `unknown` if none was found. `thresholds` are those that a
+    bootstrap has left (`kept`, else the usual one), those of a `bootstrap` made where it has left
+    none, the `usual` one, or a file. Raises SpecError, ValueError, ToolMissing, OutputError.
+    """
+    time_budget = _Budget(budget, tell)
+    tell = time_budget.report
+    require_disjoint(train, held_out)
+    bootstrap, limits = _read_thresholds(thresholds)
+    checked = check_recordings(train, map, spec, root=root)
+    case, automaton = _build_case(spec, train, held_out, checked, effects, root)
+    stages = _checkpoint_folder(out)
+    case = dataclasses.replace(
+        case,
+        thresholds=limits,
+        bootstrap=bootstrap,
+        checkpoint_folder=stages,
+        before_fit=time_budget.check,
+    )
+    tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
+    usable_files, errors = select_usable(case, checked.check, anyway)
+    left_out = tuple(case.name_of(file) for file in case.train if file not in usable_files)
+    if usable_files:
+        reasons = [f"left out: {text}" for text in errors]
+        if effects is not None:
+            reasons += explain_unplaceable(case.effects or (), case.document, case.project)
+        for text in reasons:
+            tell(text)
+        case = dataclasses.replace(case, train=usable_files)
+        dossier = _conclude(case, automaton, checked, left_out, reasons, time_budget)
+    else:
+        dossier = _build_unusable_dossier(case, automaton, checked, errors, time_budget)
+    if out is not None:
+        save_diagnosis(dossier, out, spec)
+    return dossier
+
+
+def _build_unusable_dossier(
+    case: Case,
+    automaton: Automaton,
+    checked: CheckedRecordings,
+    errors: Sequence[str],
+    budget: _Budget,
+) -> DiagnosisReport:
+    """Return what is told where no recording is left to conclude from."""
+    messages = tuple(dict.fromkeys((*unusable_reasons(checked.check), *errors)))
+    verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
+    return DiagnosisReport(case, automaton, checked.check, verdict)
+
+
+def _checkpoint_folder(out: str | Path | None) -> Path | None:
+    """Return where stages are kept. Raises OutputError where they cannot be."""
+    if out is None:
+        return None
+    folder = Path(out) / CHECKPOINT_FOLDER
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise OutputError(f"{folder}: this is a file; what is found on the way is kept there")
+    return folder
+
+
+def _conclude(
+    case: Case,
+    automaton: Automaton,
+    checked: CheckedRecordings,
+    left_out: tuple[str, ...],
+    reasons: Sequence[str],
+    budget: _Budget,
+) -> DiagnosisReport:
+    """Return what is concluded from recordings; where the time is over, what was found till then.
+
+    A verdict from a part of the candidates would look like one from all: it is `unknown`.
+    """
+    try:
+        diagnosis = diagnosed(case, budget.report)
+    except BudgetSpent as spent:
+        done = [text for text in budget.told if text.startswith(("accepted", "recalibrated"))]
+        advice = "with a larger --budget and the same --out it goes on from there"
+        messages = (*reasons, f"not finished: {spent}", *done, advice)
+        verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
+        ended = f"{spent}; {advice}"
+        return DiagnosisReport(
+            case, automaton, checked.check, verdict, unused_recordings=left_out, end_reason=ended
+        )
+    case = dataclasses.replace(case, thresholds=diagnosis.thresholds)
+    after = file_digests(case, case.held_out)
+    unfollowed = tuple(unfollowed_signals(diagnosis.verdict))
+    verdict = withdraw_nothing_missing(diagnosis.verdict, unfollowed)
+    dossier = DiagnosisReport(case, automaton, checked.check, verdict, diagnosis, after, left_out)
+    warnings = (*unfollowed, *held_out_findings(case, automaton))
+    for text in warnings:
+        budget.report(text)
+    messages = (
+        *reasons,
+        *summary_lines(dossier),
+        *diagnosis.unread,
+        *warnings,
+        *missing_effect_notes(dossier),
+    )
+    verdict = dataclasses.replace(verdict, messages=messages)
+    return dataclasses.replace(dossier, verdict=verdict)
+
+
+def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
+    """Write verdict, variant, report and figures into a folder; return the files.
+
+    Raises OutputError.
+    """
+    from diagnosis.report.page import report_files
+
+    folder = Path(out)
+    make_folder(folder)
+    variant = format_variant(dossier, base_of(dossier, spec, folder))
+    files = {}
+    if dossier.case.thresholds != DEFAULT_THRESHOLDS:
+        files[folder / "thresholds.json"] = format_thresholds(dossier.case.thresholds).encode()
+    for name, data in report_files(dossier, variant, Path(display_path(folder))).items():
+        files[folder / name] = data
+    stale = [
+        path
+        for path in find_stale_files(folder)
+        if path not in files and not _is_input_file(path, dossier)
+    ]
+    write_files(files)
+    remove_files(stale)
+    if not dossier.end_reason:
+        shutil.rmtree(folder / CHECKPOINT_FOLDER, ignore_errors=True)
+    return list(files)
+
+
+def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
+    """Tell whether a file is one that the diagnosis itself has read."""
+    recordings = (*dossier.case.train, *dossier.case.held_out)
+    is_recording = path.resolve() in {file_of(one).resolve() for one in recordings}
+    return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
+
+
+def base_of(dossier: DiagnosisReport, spec: str, folder: Path) -> str:
+    """Return how a variant in a folder names its base: by name, or by file if need be."""
+    project = dossier.case.project
+    path = project.path_of(spec)
+    if [file.resolve() for file in project.index.get(dossier.name, [])] == [path.resolve()]:
+        return dossier.name
+    return os.path.relpath(path.resolve(), folder.resolve())
+
+
+def _build_case(
+    spec: str,
+    train: Sequence[str | Path],
+    held_out: Sequence[str | Path],
+    checked: CheckedRecordings,
+    effects: str | Path | None,
+    root: Path | None,
+) -> tuple[Case, Automaton]:
+    project = Project(root or Path())
+    document = read_document(project.path_of(spec))
+    automaton = checked.automaton or automaton_of(document, project)
+    expanded_document = expand_document(document, project)
+    files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
+    candidates = _load_effects(effects, project)
+    names = recording_names(*files)
+    known = dict(zip(files[0], checked.recordings, strict=True))
+    used = used_columns(checked.mapping, automaton)
+    read = LazyRecordings(known, files[1], lambda path: read_recording(path, checked.mapping, used))
+    case = Case(
+        expanded_document,
+        project,
+        checked.mapping,
+        *files,
+        candidates,
+        names=names,
+        recordings=read,
+    )
+    return case, automaton
+
+
+def _read_thresholds(thresholds: str | Path) -> tuple[BootstrapMode, Thresholds]:
+    """Return whether a bootstrap is used, and the thresholds without one. Raises ValueError."""
+    if thresholds in THRESHOLD_WORDS:
+        return THRESHOLD_WORDS[str(thresholds)], DEFAULT_THRESHOLDS
+    if not Path(thresholds).is_file():
+        words = ", ".join(THRESHOLD_WORDS)
+        raise ValueError(f"thresholds `{thresholds}`: neither one of {words} nor a file")
+    return "never", read_thresholds(Path(thresholds))
+
+
+def _load_effects(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
+    """Return the effects of a folder; without one those of the project and those shipped.
+
+    Raises SpecError, ValueError.
+    """
+    return library_effects(project) if folder is None else load_effects(Path(folder))
+
+
+@SingleThreadedBlas()
+def fit(
+    spec: str,
+    train: Sequence[str | Path],
+    parameters: Sequence[str] | None = None,
+    map: str | None = None,
+    root: Path | None = None,
+    *,
+    anyway: bool = False,
+    tell: Report = lambda text: None,
+) -> Fit:
+    """Fit parameters of an automaton within their ranges to what was recorded.
+
+    `parameters` are those that may move: all that have a range, if none are named. What is odd
+    about the recordings is told. Those with errors are not used, but if it is wanted `anyway`.
+    Raises UnusableRecordings where most of them are, SpecError, ValueError, ToolMissing.
+    """
+    require_disjoint(train, ())
+    checked = check_recordings(train, map, spec, root=root)
+    case, _ = _build_case(spec, train, (), checked, None, root)
+    usable_files, errors = select_usable(case, checked.check, anyway)
+    findings = [f"{severity}: {text}" for severity, text in format_findings(checked.check.findings)]
+    for text in dict.fromkeys((*findings, *(f"error: {text}" for text in errors))):
+        if not text.startswith("note"):
+            tell(text)
+    if not usable_files:
+        raise UnusableRecordings("the recordings are not usable; nothing was fitted to them")
+    for file in case.train:
+        if file not in usable_files:
+            tell(f"left out: {case.name_of(file)}")
+    case = dataclasses.replace(case, train=usable_files)
+    return fitted(case, parameters, tell)

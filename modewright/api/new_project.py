@@ -1,0 +1,56 @@
+"""Skeleton: the files of a new project that works at once: plant, controller, scenario, test."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from importlib import resources
+from pathlib import Path
+
+from modewright.runtime.output_files import OutputError
+
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
+RESERVED_NAMES = frozenset({"room", "thermostat", "cold_day", "stays_warm", "ev_driveline"})
+TEMPLATE_TARGETS = {
+    "room.yaml": "spec/room.yaml",
+    "thermostat.yaml": "spec/thermostat.yaml",
+    "system.yaml": "spec/system.yaml",
+    "cold_day.yaml": "spec/cold_day.yaml",
+    "stays_warm.yaml": "spec/stays_warm.yaml",
+    "test_project.py.txt": "tests/test_project.py",
+    "README.md.txt": "README.md",
+}
+
+
+def skeleton_files(name: str) -> dict[str, str]:
+    """Return the files of a project by path; its system has the project's name."""
+    folder = resources.files("modewright") / "skeleton_files"
+    return {
+        place: (folder / source).read_text("utf-8").replace("PROJECT", name)
+        for source, place in TEMPLATE_TARGETS.items()
+    }
+
+
+def write_skeleton(name: str, folder: Path) -> list[Path]:
+    """Write a new project into a folder that is not there yet. Raises OutputError, ValueError."""
+    if not NAME_PATTERN.fullmatch(name) or name in RESERVED_NAMES:
+        raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")
+    if folder.exists():
+        raise OutputError(f"{folder}: it is there already")
+    temporary_folder = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary_folder = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        for place, text in skeleton_files(name).items():
+            path = temporary_folder / place
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text, "utf-8")
+        temporary_folder.chmod(0o755)
+        temporary_folder.rename(folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: {error.strerror}") from None
+    finally:
+        if temporary_folder is not None:
+            shutil.rmtree(temporary_folder, ignore_errors=True)
+    return [folder / place for place in TEMPLATE_TARGETS.values()]

@@ -1,0 +1,180 @@
+"""Recordings: files checked before anything is concluded from them."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from diagnosis.data.file_names import distinguish_file_names
+from diagnosis.pipeline.case import Case
+from diagnosis.quality.clock_search import find_clock_and_sign_errors
+from diagnosis.quality.column_guess import guess_map
+from diagnosis.quality.finding import format_findings
+from diagnosis.quality.recording import RecordingCheck, check_recordings as checked, used_columns
+from engine.recordings.recording import Recording, read_recording
+from language.loading.load import automaton_of
+from language.loading.map_pairing import check_pairing
+from language.loading.recording_map_reader import read_map
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.diagnostic import MissingToolError, Problems, SpecError
+from modewright.runtime.compiled_run import simulate_resolved
+
+if TYPE_CHECKING:
+    from engine.results.plot import Picture
+
+
+MissingReasons = dict[str, str]
+"""Why a file has none of some columns, by their names in the map."""
+MISSING_KINDS = ("column", "empty")
+"""Problems of a file that lacks a column, or has no value in it."""
+
+
+@dataclass(frozen=True)
+class CheckedRecordings:
+    """Recordings with what was found of them, and the automaton of a spec."""
+
+    check: RecordingCheck
+    mapping: RecordingMap
+    recordings: tuple[Recording, ...] = field(repr=False)
+    automaton: Automaton | None = field(default=None, repr=False)
+
+    def plot(self, title: str = "") -> Picture:
+        """Return a picture of the channels, what they excite and what was found."""
+        from diagnosis.quality.recording_picture import draw_recordings
+
+        names = ", ".join(recording.name for recording in self.recordings)
+        return draw_recordings(self.recordings, self.check, title or names)
+
+
+def check_recordings(
+    files: Sequence[str | Path],
+    map: str | None = None,
+    spec: str | None = None,
+    databases: Sequence[str] = (),
+    root: Path | None = None,
+) -> CheckedRecordings:
+    """Check recordings: rates, gaps, noise, what they excite; with a spec units, signs and clocks.
+
+    Without a map that of the spec is taken; without either, columns are guessed by their names.
+    Raises SpecError, ToolMissing.
+    """
+    project = Project(root or Path())
+    automaton = _load_automaton(spec, project) if spec else None
+    map_name = map or (
+        automaton.recording_map.text if automaton and automaton.recording_map else None
+    )
+    if automaton and not map_name:
+        problems = Problems()
+        label = f"`{automaton.name}` names no map of recordings"
+        hint = "`recording_map: <name>` in the spec, or `--map`"
+        problems.error("missing", automaton.span, label, hint)
+        raise SpecError(problems.reported)
+    if map_name:
+        mapping = read_map(read_document(project.path_of(map_name)), project)
+        _check_map(automaton, mapping)
+    else:
+        mapping = guess_map(Path(files[0]), databases)
+    used = used_columns(mapping, automaton)
+    if len({os.path.realpath(file) for file in files}) < len(files):
+        raise ValueError("a recording is named twice: each recording counts once")
+    names = distinguish_file_names([Path(file) for file in files])
+    read = [_read_available(path, name, mapping, used) for path, name in names.items()]
+    recordings = tuple(recording for recording, _ in read)
+    reasons = {recording.name: why for recording, why in read}
+    if spec is None or automaton is None:
+        check = _add_missing_reasons(checked(recordings, mapping, automaton), reasons)
+        return CheckedRecordings(check, mapping, recordings)
+    document = expand_document(read_document(project.path_of(spec)), project)
+    mistakes = partial(find_clock_and_sign_errors, document, project, automaton, mapping)
+    check = _add_missing_reasons(
+        checked(recordings, mapping, automaton, simulate_resolved, mistakes), reasons
+    )
+    return CheckedRecordings(check, mapping, recordings, automaton)
+
+
+def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
+    """Return what a check finds of recordings that are held out, for people.
+
+    It is told beside a verdict that is final. What cannot be used is told elsewhere.
+    """
+    used = used_columns(case.mapping, automaton)
+    recordings = []
+    for path in case.held_out:
+        name = case.name_of(path)
+        with suppress(SpecError, MissingToolError, ValueError):
+            recording = (
+                case.recordings.get(path) or _read_available(path, name, case.mapping, used)[0]
+            )
+            recordings.append(dataclasses.replace(recording, name=name))
+    if not recordings:
+        return ()
+    mistakes = partial(
+        find_clock_and_sign_errors, case.document, case.project, automaton, case.mapping
+    )
+    check = checked(recordings, case.mapping, automaton, simulate_resolved, mistakes)
+    serious = [finding for finding in check.findings if finding.severity != "note"]
+    return tuple(f"held out, {severity}: {text}" for severity, text in format_findings(serious))
+
+
+def _read_available(
+    path: Path, name: str, mapping: RecordingMap, columns: Sequence[str]
+) -> tuple[Recording, MissingReasons]:
+    """Read a recording, without the columns that it has not got; say why it has not.
+
+    What else is wrong with a file is a problem of the file. Raises SpecError, ToolMissing.
+    """
+    reasons: MissingReasons = {}
+    try:
+        recording = read_recording(path, mapping, columns)
+    except SpecError as error:
+        reasons = {
+            column: text for column in columns if (text := _missing_reason(path, mapping, column))
+        }
+        available = [column for column in columns if column not in reasons]
+        if not available or any(problem.kind not in MISSING_KINDS for problem in error.problems):
+            raise
+        recording = read_recording(path, mapping, available)
+    return dataclasses.replace(recording, name=name), reasons
+
+
+def _missing_reason(path: Path, mapping: RecordingMap, column: str) -> str:
+    """Return why a file does not have a column; empty where it has, or is wrong otherwise."""
+    try:
+        read_recording(path, mapping, [column])
+    except SpecError as error:
+        lacks = [problem for problem in error.problems if problem.kind in MISSING_KINDS]
+        if len(lacks) == len(error.problems):
+            return "; ".join(text for text in (lacks[0].label, lacks[0].help) if text)
+    return ""
+
+
+def _add_missing_reasons(
+    check: RecordingCheck, reasons: Mapping[str, MissingReasons]
+) -> RecordingCheck:
+    """Return a check in which missing signals are told with why they are."""
+    findings = []
+    for finding in check.findings:
+        why = reasons.get(finding.recording, {}).get(finding.channel, "")
+        is_absent = bool(why) and finding.kind == "no_signal"
+        findings.append(dataclasses.replace(finding, text=why) if is_absent else finding)
+    return dataclasses.replace(check, findings=tuple(findings))
+
+
+def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
+    """Raise SpecError where a map is not one for an automaton."""
+    problems = Problems()
+    if automaton is not None:
+        check_pairing(automaton, mapping, problems)
+    problems.raise_if_errors()
+
+
+def _load_automaton(spec: str, project: Project) -> Automaton:
+    return automaton_of(read_document(project.path_of(spec)), project)

@@ -1,0 +1,92 @@
+"""Runs: read, saved, plotted and compared; a run is a trajectory, a file, or `system:scenario`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engine.results.run_comparison import RunDifference, compare_runs
+from engine.results.run_file import FORMATS, encode_run, read_run
+from engine.results.trajectory import Trajectory
+from modewright.api import simulation as api
+from modewright.runtime.output_files import write_files
+
+if TYPE_CHECKING:
+    from engine.results.plot import Picture
+
+Run = Trajectory | str | Path
+"""A trajectory, the path of a run file, or `system:scenario` to simulate."""
+
+
+def save(trajectory: Trajectory, path: str | Path) -> None:
+    """Write a run to `.csv` (with `.csv.json` beside it) or `.parquet`, whole or not at all.
+
+    Raises OutputError, ToolMissing, ValueError (another ending).
+    """
+    write_files(encode_run(trajectory, Path(path)))
+
+
+def read(run: Run, root: Path | None = None) -> Trajectory:
+    """Return a run: from a file that `save` wrote, or simulated from `system:scenario`.
+
+    Raises SpecError, ToolMissing, ValueError (neither a file nor `system:scenario`).
+    """
+    if isinstance(run, Trajectory):
+        return run
+    if Path(run).suffix.lower() in FORMATS:
+        return read_run(Path(run))
+    system, colon, scenario = str(run).rpartition(":")
+    if not colon or not system or not scenario:
+        raise ValueError(f"`{run}` is neither a .csv or .parquet file nor system:scenario")
+    return api.simulate(system, scenario, root=root)
+
+
+def plot(
+    run: Run,
+    other: Run | None = None,
+    *,
+    signals: Sequence[str] = (),
+    span: tuple[float, float] | None = None,
+    title: str = "",
+) -> Picture:
+    """Return a picture of one run, or of two: the second dashed, in the same colours.
+
+    `signals` are patterns such as `plant.*`; `span` is in seconds.
+    """
+    from engine.results.plot import draw_overview
+
+    runs = [read(each) for each in (run, other) if each is not None]
+    names = [
+        run_label(each, letter) for each, letter in ((run, "A"), (other, "B")) if each is not None
+    ]
+    shown = title or (f"A: {names[0]}; B (dashed): {names[1]}" if len(runs) > 1 else names[0])
+    return draw_overview(runs, signals, span, shown)
+
+
+def compare(
+    a: Run,
+    b: Run,
+    *,
+    relative: float = 0.0,
+    tolerances: Mapping[str, float] | None = None,
+    slack: float = 0.0,
+    signals: Sequence[str] = (),
+    span: tuple[float, float] | None = None,
+) -> RunDifference:
+    """Compare two runs signal by signal; `is_within` tells whether all is within tolerance.
+
+    A signal may differ by `relative` times its peak, or by its entry in `tolerances` (patterns of
+    names, values in SI); modes may disagree for `slack` [s]. Raises ValueError, SpecError.
+    """
+    return compare_runs(
+        read(a), read(b),
+        relative=relative, tolerances=tolerances, slack=slack, patterns=signals, span=span,
+    )  # fmt: skip
+
+
+def run_label(run: Run, default: str) -> str:
+    """Return what a run is called in a picture."""
+    if isinstance(run, Trajectory):
+        return run.name or default
+    return Path(run).name if Path(run).suffix.lower() in FORMATS else str(run)

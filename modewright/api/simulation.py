@@ -1,0 +1,212 @@
+"""API: what the command line does, as functions. Specs are named or given by path."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from codegen.toolchain.compiler import flags_at_level
+from codegen.toolchain.machine import CORTEX_M4F, HOST, MACHINES
+from engine.recordings.recording import Recording, read_recording
+from engine.results.trajectory import Trajectory
+from engine.simulation.replay import Replay, replay as replay_recording, used_columns
+from language.ir.number_type import NumberType
+from language.ir.program import Program
+from language.loading.calibration_page_reader import parse_pages
+from language.loading.load import automaton_of, program_of
+from language.loading.recording_map_reader import read_map
+from language.loading.scenario_reader import read_scenario
+from language.loading.system_reader import read_system, with_number_type
+from language.lowering.range_saturation import require_ranges
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap, Scenario, System
+from language.overlays.expand_document import (
+    Project,
+    add_calibrations,
+    apply_variant,
+    read_document,
+)
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import require_kind
+from lockstep.comparison import Verdict, add_instruction_counts, compare
+from lockstep.comparison_notes import add_notes
+from lockstep.tick_log import TickLog, record_ticks
+from modewright.api.documents import Values, load_calibrated_document, parse_values
+from modewright.runtime.compiled_run import run_simulation as run_compiled
+
+METHODS = ("RK4", "DOP853", "Radau", "LSODA")
+"""How continuous automata can be integrated: our own method, or one of scipy's."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A system with a scenario, checked."""
+
+    system: System
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A replay with its lock-step verdict (None if C was not asked for)."""
+
+    result: Replay
+    verdict: Verdict | None
+    left_out: tuple[str, ...]
+    recording: Recording = field(repr=False)
+
+
+def load(
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> Loaded:
+    """Return a system with a scenario. Raises SpecError with all problems."""
+    project = Project(root or Path())
+    parsed_system = read_system(
+        load_calibrated_document(system, project, calibrations), project, parse_values(values)
+    )
+    document = read_document(project.path_of(scenario))
+    return Loaded(parsed_system, read_scenario(document, project, parsed_system))
+
+
+def simulate(
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    reference: bool = False,
+    method: str = "RK4",
+    calibrations: Sequence[str] = (),
+    compiled: bool | None = None,
+) -> Trajectory:
+    """Return the trajectory of a system, or of an automaton alone, through a scenario.
+
+    `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of
+    scipy; `reference` takes scipy (DOP853) and the numbers of filterpy. `compiled` takes C, which
+    has the same bits; None does so for long runs; the log tells what did the work. Raises
+    ValueError.
+    """
+    if method not in METHODS:
+        raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
+    loaded = load(system, scenario, values, root, calibrations)
+    if reference or method != "RK4":
+        from engine.reference import scipy_reference as independent  # scipy only where asked for
+
+        run = independent.simulate_reference if reference else independent.simulate_with_scipy
+        scipy_method: Any = "DOP853" if method == "RK4" else method
+        return run(loaded.system, loaded.scenario, scipy_method)
+    trajectory, backend = run_compiled(loaded.system, loaded.scenario, compiled)
+    level = logging.WARNING if compiled and backend.startswith("interpreter") else logging.INFO
+    logging.getLogger("modewright").log(level, "%s by the %s", scenario, backend)
+    return trajectory
+
+
+def program(reference: str, values: Values | None = None, root: Path | None = None) -> Program:
+    """Return the Program of an automaton. Raises SpecError."""
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    return program_of(automaton_of(document, project, parse_values(values)))
+
+
+def lockstep(
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    numbers: NumberType | None = None,
+    changes: Sequence[str] = (),
+    compiler: str | None = None,
+    optimise: str = "O2",
+    calibrations: Sequence[str] = (),
+    target: str = HOST.name,
+) -> tuple[Trajectory, list[Verdict]]:
+    """Simulate, then run the C of every instance on the same inputs and compare bits.
+
+    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator, where the instructions of
+    steps are counted, too.
+    `numbers` replaces the number type of every instance; `changes` are pages of the calibration
+    like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
+    Raises SpecError, ToolMissing.
+    """
+    loaded = load(system, scenario, values, root, calibrations)
+    if numbers:
+        loaded = Loaded(with_number_type(loaded.system, numbers), loaded.scenario)
+    if changes:
+        pages = parse_pages(changes, loaded.system)
+        loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, calibrations=pages))
+    for instance in loaded.system.instances.values():
+        if instance.automaton.is_sampled:
+            require_ranges(instance.automaton)
+    trajectory, tapes = record_ticks(loaded.system, loaded.scenario)
+    flags = flags_at_level(optimise)
+    machine = MACHINES[target]
+    verdicts = [compare(tape, flags, compiler, machine) for tape in tapes.values()]
+    if machine is CORTEX_M4F:
+        verdicts = [
+            add_instruction_counts(verdict, tapes[verdict.name], flags) for verdict in verdicts
+        ]
+    return trajectory, add_notes(verdicts, loaded.system, loaded.scenario, trajectory)
+
+
+def replay(
+    estimator: str,
+    recording: Path,
+    map: str,
+    variant: str | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    compiled: bool = True,
+    calibrations: Sequence[str] = (),
+) -> Replayed:
+    """Replay a recording through a sampled automaton, in lock-step with its C.
+
+    Raises SpecError, ToolMissing.
+    """
+    automaton, used = _load_estimator(estimator, variant, values, root, calibrations)
+    mapping = _load_map(map, root)
+    columns, left_out = used_columns(automaton, mapping)
+    measured = read_recording(recording, mapping, columns)
+    tape = TickLog(used, name=automaton.name)
+    result = replay_recording(automaton, used, measured, mapping, on_tick=tape.record_tick)
+    tape.start = float(result.trajectory.times[0])
+    verdict = compare(tape) if compiled else None
+    return Replayed(result, verdict, tuple(left_out), measured)
+
+
+def _load_estimator(
+    reference: str,
+    variant: str | None,
+    values: Values | None,
+    root: Path | None,
+    calibrations: Sequence[str],
+) -> tuple[Automaton, Program]:
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    if variant:
+        over = read_document(project.path_of(variant))
+        problems = Problems()
+        require_kind(over, "variant", problems)
+        document = apply_variant(document, over, project, problems)
+    document = add_calibrations(document, calibrations, "--calibration")
+    automaton = automaton_of(document, project, parse_values(values))
+    if not automaton.is_sampled:
+        problems = Problems()
+        label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
+        problems.error("form", automaton.span, label, "give it a `period`")
+        raise SpecError(problems.reported)
+    return automaton, program_of(automaton)
+
+
+def _load_map(reference: str, root: Path | None) -> RecordingMap:
+    project = Project(root or Path())
+    return read_map(read_document(project.path_of(reference)), project)

@@ -1,0 +1,133 @@
+"""Tests: the tests of a project, each run on the engine and on compiled C, with one verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from engine.results.trajectory import Trajectory
+from engine.simulation.simulate import simulate
+from expectation.evaluate_expectations import Outcome, evaluate_test
+from expectation.expectations import Test
+from expectation.test_reader import read_test
+from language.overlays.expand_document import Project
+from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.project_files import HEAD_PATTERN
+from modewright.api.checking import spec_files
+from modewright.runtime.compiled_run import run_in_c
+
+
+@dataclass(frozen=True)
+class TestRun:
+    """What became of a test: its outcomes on the engine, and where C gave others.
+
+    `means` is what ran beside the engine, empty if nothing did; `difference` is the first thing in
+    which that run was another, which fails the test.
+    """
+
+    __test__ = False  # for pytest
+
+    test: Test
+    outcomes: tuple[Outcome, ...]
+    means: str
+    difference: str
+    stopped: str | None
+    faults: tuple[str, ...]
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether everything that was expected was so, in both runs."""
+        all_passed = all(outcome.passed for outcome in self.outcomes)
+        return all_passed and not self.difference and self.stopped is None
+
+
+def find_tests(root: Path | None = None) -> list[str]:
+    """Return the files of all tests of a project, in the order of their paths."""
+    return [str(path) for path in spec_files(root or Path()) if _is_test(path)]
+
+
+def load_test(reference: str, root: Path | None = None) -> Test:
+    """Return a test by its name or path. Raises SpecError with all problems."""
+    project = Project(root or Path())
+    return read_test(project.read(project.path_of(reference)), project)
+
+
+def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:
+    """Return tests. Raises SpecError with the problems of all of them."""
+    problems, tests = Problems(), []
+    for reference in references:
+        with problems.collect_errors():
+            tests.append(load_test(reference, root))
+    problems.raise_if_errors()
+    return tests
+
+
+def run_tests(
+    references: Sequence[str] = (), root: Path | None = None, *, compiled: bool = True
+) -> Iterator[TestRun]:
+    """Yield what became of each test; of all tests of the project where none is named.
+
+    Raises SpecError before anything is run; ToolMissing where there is no compiler.
+    """
+    named = list(references) or find_tests(root)
+    if not named:
+        place = Span(Source("spec"), 1, 1)
+        problems = Problems()
+        problems.error("missing", place, "there is no test below spec/", "see docs/testing.md")
+        raise SpecError(problems.reported)
+    for test in load_tests(named, root):
+        yield run_test(test, compiled=compiled)
+
+
+def run_test(test: Test, *, compiled: bool = True) -> TestRun:
+    """Return what became of a test on the engine and, if `compiled`, in C. Raises ToolMissing."""
+    start = time.perf_counter()
+    trajectory = simulate(test.system, test.scenario)
+    outcomes = evaluate_test(test, trajectory)
+    means, difference = "", ""
+    if compiled:
+        other, means = run_in_c(test.system, test.scenario)
+        difference = _outcome_difference(
+            outcomes, evaluate_test(test, other)
+        ) or _trajectory_difference(trajectory, other)
+    seconds = time.perf_counter() - start
+    return TestRun(
+        test, outcomes, means, difference, trajectory.stopped, trajectory.faults, seconds
+    )
+
+
+def _outcome_difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> str:
+    """Return the first expectation that C did not decide as the engine did."""
+    for mine, other in zip(ours, theirs, strict=True):
+        if mine.passed != other.passed:
+            word = "passed" if other.passed else f"failed: {other.message}"
+            return f"`{mine.name}` {word} in C, and not on the engine"
+    return ""
+
+
+def _trajectory_difference(ours: Trajectory, theirs: Trajectory) -> str:
+    """Return in what the run in C was another: the first event, signal or end."""
+    if ours.stopped != theirs.stopped:
+        return f"C ended with {theirs.stopped or 'no stop'}, the engine with {ours.stopped}"
+    for mine, other in zip(ours.events, theirs.events, strict=False):
+        if mine != other:
+            place = f"at {other.time:.9g} s, on the engine at {mine.time:.9g} s"
+            return f"`{other.instance}.{other.transition}` in C {place} `{mine.transition}`"
+    if len(ours.events) != len(theirs.events):
+        return f"C had {len(theirs.events)} events, the engine {len(ours.events)}"
+    for name, values in ours.signals.items():
+        other_values = theirs.signals[name]
+        if not np.array_equal(values, other_values, equal_nan=True):
+            row = int(np.argmax(values != other_values))
+            return f"`{name}` at {ours.times[row]:.9g} s is {other_values[row]} in C, {values[row]}"
+    return ""
+
+
+def _is_test(path: Path) -> bool:
+    text = path.read_text("utf-8", errors="replace")[:65536]
+    return any(match.group(1) == "test" for match in HEAD_PATTERN.finditer(text))

@@ -1,0 +1,42 @@
+"""Generated: the committed C of a project, one folder per folder of specs, guarded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from codegen.emit.c_module import emit_c_files
+from language.loading.load import automaton_of, program_of
+from language.overlays.expand_document import Project, expand_document, read_document
+from modewright.api.checking import spec_files
+
+MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
+
+
+def generated_files(root: Path) -> dict[Path, bytes]:
+    """Return every file that belongs below `generated/`. Raises SpecError."""
+    project = Project(root)
+    files: dict[Path, bytes] = {}
+    for path in spec_files(root):
+        document = read_document(path)
+        if expand_document(document, project).kind != "automaton":
+            continue
+        automaton = automaton_of(document, project)
+        folder = root / "generated" / path.parent.relative_to(root / "spec")
+        for name, text in emit_c_files(program_of(automaton)).items():
+            files[folder / name] = text.encode()
+    return files
+
+
+def stale_files(root: Path) -> list[str]:
+    """Return what is missing, different or left over below `generated/`, one line each."""
+    expected = generated_files(root)
+    present = {path for path in (root / "generated").rglob("*.[ch]") if path.is_file()}
+    lines = []
+    for path, data in expected.items():
+        name = path.relative_to(root)
+        if path not in present:
+            lines.append(f"{name}: missing")
+        elif path.read_bytes() != data:
+            lines.append(f"{name}: differs from what the specs give")
+    lines += [f"{path.relative_to(root)}: left over" for path in sorted(present - set(expected))]
+    return lines

@@ -1,0 +1,151 @@
+"""Studies: many variants run into a folder, gone on with, summed up and drawn."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from language.loading.load import command_line_value
+from language.overlays.expand_document import Project, read_document
+from language.text.diagnostic import MissingToolError, Problems, render_problem, sort_problems
+from language.text.document import ScalarNode
+from modewright.runtime.compiled_run import run_block
+from modewright.runtime.output_files import OutputError
+from sweep.analysis.summary import Summary, summary_of
+from sweep.definition.override_check import require_overridable
+from sweep.definition.sampling_reader import find_imbalance
+from sweep.definition.study import Study
+from sweep.definition.study_reader import read_study
+from sweep.execution import fork_server
+from sweep.execution.dask_address import Address, Credentials, parse_address
+from sweep.execution.executor import Executor, SerialExecutor
+from sweep.execution.prepare_study import prepare_study, resample_study
+from sweep.execution.processes import ProcessExecutor
+from sweep.execution.study_run import Progress, StudyRun, Warn, run_study
+from sweep.store.store import read_store
+
+if TYPE_CHECKING:
+    from engine.results.plot import Picture
+    from sweep.analysis.sensitivity import Sensitivity
+
+WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.workers.study_worker")
+"""What starts a process that computes blocks."""
+
+TEMPLATE_MODULE = "modewright.workers.dask_template"
+"""What the workers of a cluster of this machine are copies of."""
+
+
+def sweep(
+    study: str,
+    out: str | Path,
+    values: Mapping[str, str] | None = None,
+    root: Path | None = None,
+    *,
+    workers: int | None = None,
+    block: int | None = None,
+    samples: int | None = None,
+    seed: int | None = None,
+    progress: Progress | None = None,
+    warn: Warn | None = None,
+    executor: Executor | None = None,
+    cluster: str | None = None,
+    credentials: Credentials | None = None,
+) -> StudyRun:
+    """Run a study into a folder, or go on with it there; what is finished is never lost.
+
+    `workers` processes (all cores), 1: in this process; `cluster`: on the workers of a Dask
+    cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
+    are kept at once; `samples` and `seed` replace those of the study. `warn` is told what the
+    study is warned of, and which blocks were damaged; without it Python warns.
+    Raises SpecError, ValueError, ClusterError, ToolMissing, OutputError (what is done is kept).
+    """
+    place = parse_address(cluster) if cluster else None
+    if place and place.count:
+        fork_server.start_fork_server(TEMPLATE_MODULE)
+    if block is not None and block < 1:
+        raise ValueError(f"blocks of {block} variants are none")
+    tell = warn or warnings.warn
+    found = _read_study(study, values or {}, Project(root or Path()), tell)
+    ready = prepare_study(_override_sampling(found, samples, seed, tell))
+    try:
+        if place is None:
+            return run_study(
+                ready, Path(out), executor or _local_executor(workers), block, progress, tell
+            )
+        with _cluster_executor(place, credentials or Credentials()) as remote:
+            return run_study(ready, Path(out), remote, block, progress, tell)
+    except OSError as error:
+        where = f" {error.filename}" if error.filename else ""
+        raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+
+
+def _local_executor(workers: int | None) -> Executor:
+    """Return processes of this machine, one for each core; of one this process is enough."""
+    count = workers or os.cpu_count() or 1
+    return ProcessExecutor(count, WORKER_COMMAND) if count > 1 else SerialExecutor(run_block)
+
+
+def _read_study(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
+    """Return a study with values of the command line; tell its warnings.
+
+    Raises SpecError, and ValueError for a value of what the study gives one itself.
+    """
+    document = read_document(project.path_of(study))
+    scalars: dict[str, ScalarNode] = {
+        name: command_line_value(text, name=name) for name, text in values.items()
+    }
+    problems = Problems()
+    result = read_study(document, project, scalars, problems)
+    require_overridable(result, scalars)
+    for problem in sort_problems(dict.fromkeys(problems.reported)):
+        warn(render_problem(problem))
+    return result
+
+
+def _override_sampling(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
+    """Return a study with points of the command line; warn of a number that suits it badly."""
+    result = resample_study(study, samples, seed)
+    fault = find_imbalance(result.sampling.method, samples) if samples is not None else None
+    if fault:
+        warn(f"{fault[0]}; {fault[1]}")
+    return result
+
+
+@contextmanager
+def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Executor]:
+    """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
+    try:
+        from sweep.execution.dask_client import WorkerSetup, open_client
+        from sweep.execution.dask_executor import DaskExecutor
+    except ImportError:
+        advice = "pip install 'modewright[cluster]'"
+        raise MissingToolError(f"a cluster needs the package `distributed`: {advice}") from None
+    from modewright.workers import dask_worker as cluster_worker
+
+    staff = WorkerSetup(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with open_client(place, credentials, staff) as client:
+        yield DaskExecutor(client, cluster_worker.compute_block)
+
+
+def study_summary(out: str | Path) -> Summary:
+    """Return the summary of what is in the folder of a study so far. Raises SpecError."""
+    return summary_of(read_store(Path(out)))
+
+
+def study_pictures(out: str | Path) -> dict[str, Picture]:
+    """Return the pictures that the study asks for, by name. Raises SpecError."""
+    from sweep.analysis.plots import draw_pictures
+
+    return draw_pictures(read_store(Path(out)))
+
+
+def sensitivity(out: str | Path) -> Sensitivity:
+    """Return which of the things that a study draws move its measures. Raises SpecError."""
+    from sweep.analysis.sensitivity import sensitivity_of
+
+    return sensitivity_of(read_store(Path(out)))

@@ -1,0 +1,152 @@
+"""Command line: a thin skin over the API; every command has an example in its help."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from language.text.project_files import ALLOW_OUTSIDE_ENV
+from modewright.cli.commands.a2l import a2l
+from modewright.cli.commands.calibration import calibration
+from modewright.cli.commands.check import check
+from modewright.cli.commands.compare import compare
+from modewright.cli.commands.dbc import dbc
+from modewright.cli.commands.demo import demo
+from modewright.cli.commands.diagnose import diagnose
+from modewright.cli.commands.diff import diff
+from modewright.cli.commands.doctor import doctor
+from modewright.cli.commands.effects import effects
+from modewright.cli.commands.explain import explain
+from modewright.cli.commands.fit import fit
+from modewright.cli.commands.fmu import fmu
+from modewright.cli.commands.format import format
+from modewright.cli.commands.fuzz import fuzz
+from modewright.cli.commands.generate import generate
+from modewright.cli.commands.graph import graph
+from modewright.cli.commands.lockstep import lockstep
+from modewright.cli.commands.lsp import lsp
+from modewright.cli.commands.mcdc import mcdc
+from modewright.cli.commands.metrics import metrics
+from modewright.cli.commands.new import new
+from modewright.cli.commands.plot import plot
+from modewright.cli.commands.prove import prove
+from modewright.cli.commands.recording import recording
+from modewright.cli.commands.replay import replay
+from modewright.cli.commands.schema import schema
+from modewright.cli.commands.sensitivity import sensitivity
+from modewright.cli.commands.simulate import simulate
+from modewright.cli.commands.sweep import sweep
+from modewright.cli.commands.test import test
+from modewright.cli.commands.trace import trace
+from modewright.cli.common.console import configure
+from modewright.cli.common.exit_codes import EXIT_CODES, INTERRUPTED, run_with_exit_code
+from modewright.runtime.gc_pause import raise_gc_threshold
+from modewright.runtime.output_files import require_writable
+
+MULTI_VALUE_OPTIONS = ("--train", "--held-out")
+"""Options that take values until the next option; each is repeatable as well."""
+
+
+def expand_arguments(arguments: Sequence[str]) -> list[str]:
+    """Return the words of a command line with such an option written before each of its values.
+
+    Only where the command has its argument in front: else it could be among the values.
+    """
+    if len(arguments) < 2 or arguments[1].startswith("-"):
+        return list(arguments)
+    result: list[str] = []
+    option = ""
+    for argument in arguments:
+        if argument.startswith("-"):
+            option = argument if argument in MULTI_VALUE_OPTIONS else ""
+        elif option and result[-1] != option:
+            result.append(option)
+        result.append(argument)
+    return result
+
+
+COMPLETION_VARIABLE = "_MODEWRIGHT_COMPLETE"
+"""Set by a shell that asks for completions; its words are elsewhere."""
+
+COMMANDS = (
+    new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
+    lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
+    explain, diff, format, schema, lsp, demo, doctor,
+)  # fmt: skip
+
+
+def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
+    """Return the application; with the words of a command line only what they need is made whole.
+
+    Parameters of a command take longer to look at than a page of help to print: a command that
+    no word names has its name and its help alone.
+    """
+    typer_app = typer.Typer(
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        help="Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step.",
+        epilog=EXIT_CODES,
+        callback=options,
+    )
+    for command in COMMANDS:
+        is_complete = arguments is None or command.__name__ in arguments
+        typer_app.command(epilog=EXIT_CODES)(command if is_complete else command_stub(command))
+    typer_app.add_typer(recording, name="recording")
+    typer_app.add_typer(calibration, name="calibration")
+    return typer_app
+
+
+def command_stub(command: Callable[..., None]) -> Callable[[], None]:
+    """Return a function with the name and the help of a command and without its parameters."""
+
+    def stand_in() -> None:
+        raise AssertionError(f"{command.__name__} is not made whole")
+
+    stand_in.__name__, stand_in.__doc__ = command.__name__, command.__doc__
+    return stand_in
+
+
+def options(
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="tell problems only")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="tell each step")] = False,
+    log_file: Annotated[Path | None, typer.Option(help="append what is done to this file")] = None,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="specs may name files outside of their project")
+    ] = False,
+) -> None:
+    """Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step."""
+    require_writable(log_file)
+    configure(quiet, verbose, log_file)
+    if allow_outside:
+        os.environ[ALLOW_OUTSIDE_ENV] = "1"
+
+
+app = build_application()
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    raise_gc_threshold()
+    logging.raiseExceptions = False  # a log that cannot be written is no reason to stop
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - for the whole process
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files need not be text
+    arguments = expand_arguments(sys.argv[1:])
+    is_completion = COMPLETION_VARIABLE in os.environ
+    run = build_application(None if is_completion else arguments)
+    code = run_with_exit_code(lambda: run(arguments, standalone_mode=False))
+    if code == INTERRUPTED:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # more of them disturb nothing but the exit
+    sys.exit(code)

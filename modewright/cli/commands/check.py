@@ -1,0 +1,113 @@
+"""Command check: all problems of specs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from modewright.cli.common.console import console, report_written_files
+from modewright.cli.common.exit_codes import MAX_SHOWN, PROBLEMS
+from modewright.cli.common.options import Json
+from modewright.render.text import pluralise
+from modewright.runtime.output_files import require_writable, write_files
+
+if TYPE_CHECKING:
+    from language.text.diagnostic import Problem
+    from modewright.api.checking import CheckResult
+
+
+def check(
+    specs: Annotated[list[str] | None, typer.Argument(help="specs: names or files")] = None,
+    every: Annotated[bool, typer.Option("--all", help="every spec below spec/")] = False,
+    as_json: Json = False,
+    as_annotations: Annotated[
+        bool, typer.Option("--github", help="print problems as annotations of GitHub Actions")
+    ] = False,
+    sarif: Annotated[Path | None, typer.Option(help="write the problems as SARIF 2.1.0")] = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="check again whenever a spec changes; Ctrl-C ends it")
+    ] = False,
+) -> None:
+    """Report all problems of specs, with places, codes (docs/problems.md) and help.
+
+    \b
+    modewright check estimator spec/ev_driveline/plant.yaml
+    modewright check --all --json
+    modewright check --all --github --sarif problems.sarif
+    modewright check --all --watch
+    """
+    from modewright.api import checking
+    from modewright.cli.common.watch import spec_folders, watch_changes
+
+    require_writable(sarif)
+    if not (specs or every):
+        raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
+
+    def names() -> list[str]:
+        return list(specs or []) + [str(path) for path in checking.spec_files(Path()) if every]
+
+    is_fine = _check_specs(names(), len(specs or []), as_json, as_annotations, sarif)
+    for changed in watch_changes(spec_folders(specs or [])) if watch else ():
+        console().print(f"\n{', '.join(map(str, changed))} changed", highlight=False)
+        _check_specs(names(), len(specs or []), as_json, as_annotations, sarif)
+    if not is_fine:
+        raise typer.Exit(PROBLEMS)
+
+
+def _check_specs(
+    names: list[str], named: int, as_json: bool, as_annotations: bool, sarif: Path | None
+) -> bool:
+    """Check specs and tell what was found, of those that are named their steps; is all fine?"""
+    from modewright.api import checking
+
+    found = [checking.check_spec(name) for name in names]
+    problems = checking.merge_problems(found)
+    if sarif:
+        _write_sarif(sarif, problems, as_json)
+    _report_problems(problems, len(names), as_json, as_annotations)
+    is_fine = all(problem.severity != "error" for problem in problems)
+    if is_fine and not (as_json or as_annotations):
+        _report_limits(found[:named])
+    return is_fine
+
+
+def _report_problems(
+    problems: Sequence[Problem], specs: int, as_json: bool, as_annotations: bool = False
+) -> None:
+    """Print the problems of some specs: as JSON, as annotations, or for a person."""
+    from language.text.diagnostic import render_all
+    from modewright.api.checking import problem_json
+    from modewright.render.github_annotations import annotation_lines
+
+    if as_json:
+        told = [problem_json(problem) for problem in problems]
+        print(json.dumps({"problems": told}, indent=2, allow_nan=False))
+        return
+    if as_annotations:
+        print(annotation_lines(problems), end="")
+    elif problems:
+        print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)
+        if len(problems) > MAX_SHOWN:
+            print(f"\n... and {len(problems) - MAX_SHOWN} more: --json", file=sys.stderr)
+    errors = sum(problem.severity == "error" for problem in problems)
+    console().print(f"{pluralise(specs, 'spec')} checked, {pluralise(errors, 'problem')}")
+
+
+def _report_limits(found: Sequence[CheckResult]) -> None:
+    for each in found:
+        for line in each.limits:
+            console().print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def _write_sarif(path: Path, problems: Sequence[Problem], silent: bool) -> None:
+    from modewright.render.sarif import to_sarif
+
+    text = json.dumps(to_sarif(problems), indent=2, allow_nan=False)
+    write_files({path: f"{text}\n".encode()})
+    if not silent:
+        report_written_files([path])

@@ -1,0 +1,84 @@
+"""Command compare: two runs, signal by signal."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from modewright.cli.commands.plot import RunArgument
+from modewright.cli.common.console import console, progress_spinner, report_written_files
+from modewright.cli.common.exit_codes import PROBLEMS
+from modewright.cli.common.options import (
+    From,
+    Json,
+    Plot,
+    Signals,
+    To,
+    picture_format,
+    span_of,
+    usage_errors,
+)
+from modewright.runtime.output_files import require_writable, write_files
+
+
+def compare(
+    a: Annotated[str, RunArgument],
+    b: Annotated[str, RunArgument],
+    relative: Annotated[
+        float, typer.Option(min=0.0, help="a signal may differ by this share of its peak in A")
+    ] = 0.0,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(help="a signal may differ by this, in its unit: '*.T_hs=0.5' (repeatable)"),
+    ] = None,
+    slack: Annotated[float, typer.Option(min=0.0, help="modes may disagree for so long [s]")] = 0.0,
+    signals: Signals = None,
+    start: From = None,
+    end: To = None,
+    plot: Plot = None,
+    as_json: Json = False,
+) -> None:
+    """Compare two runs: signals, modes, transitions.
+
+    Exit code 0: within tolerance; 1: not, or a signal or a part of the time is in one run only.
+
+    \b
+    modewright compare run.csv ev_driveline:tip_out
+    modewright compare a.csv b.parquet --relative 1e-6 --tolerance '*.T_hs=0.5' --plot apart.png
+    """
+    from modewright.api import runs
+    from modewright.render import run as show
+
+    form = picture_format(plot) if plot else "png"
+    require_writable(plot)
+    with usage_errors(), progress_spinner(f"comparing {a} and {b}"):
+        first, second = runs.read(a), runs.read(b)
+        found = runs.compare(
+            first, second, relative=relative, tolerances=_parse_tolerances(tolerance),
+            slack=slack, signals=signals or (), span=span_of(start, end),
+        )  # fmt: skip
+    if plot:
+        from engine.results.comparison_plot import draw_difference
+
+        names = (runs.run_label(a, "A"), runs.run_label(b, "B"))
+        write_files({plot: draw_difference(first, second, found, names).data(form)})
+    if as_json:
+        show.print_json(show.difference_json(found))
+    else:
+        show.print_difference(console(), found)
+        report_written_files([plot] if plot else [])
+    if not found.is_within:
+        raise typer.Exit(PROBLEMS)
+
+
+def _parse_tolerances(texts: list[str] | None) -> dict[str, float]:
+    found = {}
+    for text in texts or []:
+        name, _, value = text.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            label = f"`{text}` is not `signal=number`, the number in the signal's unit"
+            raise typer.BadParameter(label, param_hint="--tolerance") from None
+    return found

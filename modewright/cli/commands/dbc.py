@@ -1,0 +1,39 @@
+"""Command dbc: inputs and outputs of an automaton as messages of a CAN bus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.cli.common.console import report_written_files
+from modewright.cli.common.options import Calibrations, Sets, values_of
+from modewright.runtime.output_files import require_writable, write_files
+
+
+def dbc(
+    automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write .dbc")],
+    first: Annotated[str, typer.Option(help="identifier of the first message")] = "0x100",
+    is_fd: Annotated[bool, typer.Option("--fd", help="frames of CAN FD, up to 64 bytes")] = False,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+) -> None:
+    """Write what an automaton receives and sends as a CAN database: each value with its C bits.
+
+    \b
+    modewright dbc supervisor --out supervisor.dbc
+    modewright dbc estimator --fd --first 0x320 --out estimator.dbc
+    """
+    from modewright.api import code_generation as code
+
+    require_writable(out)
+    try:
+        text = code.dbc(
+            automaton, int(first, 0), values_of(sets), None, calibrations or (), is_fd=is_fd
+        )
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--first") from None
+    write_files({out: text.encode("ascii")})
+    report_written_files([out])

@@ -1,0 +1,34 @@
+"""Command doctor: whether everything needed is there and works."""
+
+from __future__ import annotations
+
+import typer
+
+from modewright.cli.common.console import console
+from modewright.cli.common.exit_codes import PROBLEMS, TOOL
+from modewright.cli.common.options import Json
+
+
+def doctor(as_json: Json = False) -> None:
+    """Look at Python, packages, compiler and cache, and run a self-test.
+
+    Exit code 3: the compiler or a package is missing; 1: something else is wrong.
+
+    \b
+    modewright doctor
+    modewright doctor --json
+    """
+    from modewright.render import run as show
+    from modewright.runtime.doctor import run_health_checks
+
+    found = []
+    for finding in run_health_checks():
+        found.append(finding)
+        if not as_json:
+            show.print_health_check(console(), finding)
+    if as_json:
+        show.print_json({"findings": [vars(finding) for finding in found]})
+    faults = [finding for finding in found if finding.verdict == "fault"]
+    if faults:
+        others = ("modewright", "cache", "self-test", "python")
+        raise typer.Exit(PROBLEMS if all(f.name in others for f in faults) else TOOL)

@@ -1,0 +1,48 @@
+"""Command fuzz: sequences that libFuzzer finds, on generated C and on the engine."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from modewright.cli.common.console import console, progress_spinner
+from modewright.cli.common.exit_codes import PROBLEMS
+from modewright.cli.common.options import Calibrations, Json, Numbers, Sets, values_of
+
+
+def fuzz(
+    automaton: Annotated[str, typer.Argument(help="a sampled automaton: its name or file")],
+    runs: Annotated[int, typer.Option(min=1, help="how many sequences are tried")] = 20_000,
+    ticks: Annotated[int, typer.Option(min=1, max=64, help="the most of a sequence")] = 24,
+    seed: Annotated[int, typer.Option(min=1, help="of the fuzzer")] = 1,
+    numbers: Numbers = None,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    as_json: Json = False,
+) -> None:
+    """Let libFuzzer look for every way through the C of an automaton, and compare with the engine.
+
+    The C runs under sanitizers; each sequence of inputs is done again by the engine, and every bit
+    that both carry has to be the same.
+
+    \b
+    modewright fuzz estimator
+    modewright fuzz supervisor --runs 200000 --json
+    """
+    from modewright.api import code_generation as code
+    from modewright.render import code as show_code, run as show
+
+    with progress_spinner(f"trying {runs} sequences on {automaton}"):
+        try:
+            found = code.fuzz(
+                automaton, runs, ticks, seed, values_of(sets), None, calibrations or (), numbers
+            )
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
+    if as_json:
+        show.print_json(show_code.fuzzed_json(found))
+    else:
+        show_code.print_fuzzed(console(), found)
+    if not found.is_clean:
+        raise typer.Exit(PROBLEMS)

@@ -1,0 +1,76 @@
+"""Command lockstep: engine and compiled C compared bit by bit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from modewright.cli.common.console import console, progress_spinner
+from modewright.cli.common.options import (
+    Calibrations,
+    Json,
+    Numbers,
+    Scenario,
+    Sets,
+    System,
+    exit_if_failed,
+    values_of,
+)
+
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--change", help="a tunable from a time on: '1.5 s: k_hs = 6000 N*m/rad'"),
+]
+Compiler = Annotated[str | None, typer.Option(help="a C compiler, like gcc or clang; default CC")]
+Optimise = Annotated[
+    Literal["O0", "O1", "O2", "O3", "Os"], typer.Option(help="level of the C compiler")
+]
+
+Target = Annotated[
+    Literal["host", "cortex-m4f"],
+    typer.Option(help="where the C runs: here, or on an emulated Cortex-M4F (QEMU)"),
+]
+
+
+def lockstep(
+    system: System,
+    scenario: Scenario,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    numbers: Numbers = None,
+    changes: Changes = None,
+    compiler: Compiler = None,
+    optimise: Optimise = "O2",
+    target: Target = "host",
+    as_json: Json = False,
+) -> None:
+    """Compare engine and compiled C, tick by tick and bit by bit.
+
+    \b
+    modewright lockstep ev_driveline -s tip_out --numbers float32 --optimise O3
+    modewright lockstep ev_driveline -s tip_out --target cortex-m4f
+    """
+    from modewright.api import simulation as api
+    from modewright.render import run as show
+
+    with progress_spinner(f"simulating {system}, {scenario}, and running its C"):
+        trajectory, verdicts = api.lockstep(
+            system,
+            scenario,
+            values_of(sets),
+            numbers=numbers,
+            changes=changes or (),
+            compiler=compiler,
+            optimise=optimise,
+            calibrations=calibrations or (),
+            target=target,
+        )
+    if as_json:
+        found = {"lockstep": [show.verdict_json(verdict) for verdict in verdicts]}
+        show.print_json({**show.trajectory_json(trajectory), **found})
+    else:
+        show.print_verdicts(console(), verdicts)
+    is_compared = any(verdict.ticks for verdict in verdicts)
+    is_equal = is_compared and all(verdict.is_equal for verdict in verdicts)
+    exit_if_failed(trajectory.stopped is not None or not is_equal, trajectory)

@@ -1,0 +1,65 @@
+"""Command recording: what recorded data are worth, before anything is concluded from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.cli.common.console import console, progress_spinner, report_written_files
+from modewright.cli.common.exit_codes import EXIT_CODES, PROBLEMS
+from modewright.cli.common.options import Json, Plot, picture_format, usage_errors
+from modewright.render.text import pluralise
+from modewright.runtime.output_files import require_writable, write_files
+
+recording = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Look at recordings.", epilog=EXIT_CODES
+)
+
+
+@recording.callback()
+def _recording() -> None:
+    """Look at recordings."""
+
+
+@recording.command(epilog=EXIT_CODES)
+def check(
+    files: Annotated[
+        list[Path], typer.Argument(help="CSV(.gz), Parquet, MF4, or CAN logs: BLF, ASC, candump")
+    ],
+    mapping: Annotated[
+        str | None, typer.Option("--map", "-m", help="a map of columns: name or file")
+    ] = None,
+    spec: Annotated[
+        str | None, typer.Option("--spec", "-s", help="an automaton, to check units and clocks")
+    ] = None,
+    databases: Annotated[
+        list[str] | None, typer.Option("--dbc", help="what CAN frames mean, without a map")
+    ] = None,
+    plot: Plot = None,
+    as_json: Json = False,
+) -> None:
+    """Tell rates, gaps, noise and odd values, and which effects these recordings can test.
+
+    \b
+    modewright recording check drive.csv --spec leaf_motor_side --plot drive.png
+
+    Exit code 1 if something makes a verdict about physics worthless.
+    """
+    from modewright.api.recordings import check_recordings
+    from modewright.render import recording as show_recording, run as show
+
+    require_writable(plot)
+    with progress_spinner(f"looking at {pluralise(len(files), 'recording')}"), usage_errors():
+        checked = check_recordings(files, mapping, spec, databases or ())
+    if plot:
+        title = ", ".join(file.name for file in files) + (f" against {spec}" if spec else "")
+        write_files({plot: checked.plot(title).data(picture_format(plot))})
+    if as_json:
+        show.print_json(show_recording.check_json(checked.check))
+    else:
+        show_recording.print_check(console(), checked.check)
+        report_written_files([plot] if plot else [])
+    if not checked.check.is_usable:
+        raise typer.Exit(PROBLEMS)

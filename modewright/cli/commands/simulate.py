@@ -1,0 +1,93 @@
+"""Command simulate: a system through a scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from modewright.cli.common.console import console, progress_spinner, report_written_files
+from modewright.cli.common.options import (
+    Calibrations,
+    Json,
+    Out,
+    Plot,
+    Scenario,
+    Sets,
+    System,
+    exit_if_failed,
+    picture_format,
+    require_run_format,
+    usage_errors,
+    values_of,
+)
+from modewright.runtime.output_files import require_writable, write_files
+
+if TYPE_CHECKING:
+    from engine.results.trajectory import Trajectory
+
+
+def simulate(
+    system: System,
+    scenario: Scenario,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    out: Out = None,
+    plot: Plot = None,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="integrate with scipy, observe with filterpy")
+    ] = False,
+    method: Annotated[
+        str, typer.Option("--method", help="RK4, or scipy's DOP853, Radau or LSODA")
+    ] = "RK4",
+    compiled: Annotated[
+        bool | None,
+        typer.Option("--compiled/--interpreted", help="by C or by the interpreter: the same bits"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Simulate a system, or an automaton alone, through a scenario.
+
+    \b
+    modewright simulate ev_driveline -s tip_out --plot tip_out.png
+    modewright simulate ev_driveline -s tip_out --set 'k_hs=6000 N*m/rad' --out run.csv
+    """
+    from engine.results.run_file import encode_run
+    from modewright.api import simulation as api
+
+    require_run_format(out)
+    require_writable(out, plot)
+    with progress_spinner(f"simulating {system}, {scenario}"), usage_errors():
+        trajectory = api.simulate(
+            system,
+            scenario,
+            values_of(sets),
+            reference=reference,
+            method=method,
+            calibrations=calibrations or (),
+            compiled=compiled,
+        )
+    files = encode_run(trajectory, out) if out else {}
+    if plot:
+        files[plot] = _draw_plot(trajectory, f"{system}, scenario {scenario}", plot)
+    write_files(files)
+    _report_run(trajectory, list(files), as_json)
+
+
+def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:
+    from modewright.render import run as show
+
+    if as_json:
+        show.print_json(show.trajectory_json(trajectory))
+    else:
+        console().print(show.events_table(trajectory.events))
+    exit_if_failed(trajectory.stopped is not None, trajectory)
+    if not as_json:
+        report_written_files(files)
+
+
+def _draw_plot(trajectory: Trajectory, title: str, plot: Path) -> bytes:
+    from engine.results.plot import draw_overview
+
+    return draw_overview([trajectory], title=title).data(picture_format(plot))

@@ -1,0 +1,1 @@
+"""What commands share: options, console, exit codes, interruption."""

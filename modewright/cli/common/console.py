@@ -1,0 +1,122 @@
+"""Console: where results go; a bar is shown, and colours are used, on terminals only."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PIPE_WIDTH = 160
+"""Columns of a table in a pipe or a file, where there is no window to fit."""
+
+REPORT_INTERVAL = 20.0
+"""Seconds between two lines that tell how far a work is, where there is no terminal."""
+
+log = logging.getLogger("modewright")
+
+
+@cache
+def console() -> Console:
+    """Return the console for results: stdout, without colours in pipes and under NO_COLOR."""
+    from rich.console import Console  # a quarter of the time of --help, which needs none
+
+    has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(width=None if has_width else PIPE_WIDTH)
+
+
+def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
+    """Set how much is told: --quiet only problems, --verbose each step, --log-file all of it."""
+    if quiet or console.cache_info().currsize:
+        console().quiet = quiet
+    for handler in list(log.handlers):
+        log.removeHandler(handler)
+        handler.close()
+    log.setLevel(logging.DEBUG if verbose or log_file else logging.WARNING)
+    log.propagate = False
+    if verbose:
+        log.addHandler(_set_formatter(logging.StreamHandler(sys.stderr), "%(message)s"))
+    if log_file:
+        file = logging.FileHandler(log_file, encoding="utf-8")
+        log.addHandler(_set_formatter(file, "%(asctime)s %(levelname)s %(message)s"))
+        log.debug("command: %s", " ".join(sys.argv))
+    if not log.handlers:
+        log.addHandler(logging.NullHandler())
+
+
+@contextmanager
+def progress_spinner(description: str) -> Iterator[None]:
+    """Show on a terminal that work goes on, and for how long; log when it is done."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    start = time.monotonic()
+    screen = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    is_hidden = not screen.is_terminal or console().quiet
+    with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
+        progress.add_task(description, total=None)
+        yield
+    log.info("%s: %.2f s", description, time.monotonic() - start)
+
+
+@contextmanager
+def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
+    """Show on a terminal how much of a work is done, its rate and the time left.
+
+    Elsewhere, in the log of a build, a line tells it now and then. What is yielded is told: how
+    much is done, how much of it was before, how much it is in all.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = Console(stderr=True)
+    is_hidden = not screen.is_terminal or console().quiet
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[count]}"),
+        TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
+    )  # fmt: skip
+    start = told = time.monotonic()
+    with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
+
+        def tell(done: int, before: int, total: int) -> None:
+            if not progress.tasks:
+                progress.add_task(description, total=total, completed=before, count="", rate="")
+            rate = (done - before) / max(time.monotonic() - start, 1e-9)
+            shown = f"{rate:.3g} {noun}/s" if done > before else ""
+            count, bar = f"{done}/{total}", progress.tasks[0].id
+            progress.update(bar, total=total, completed=done, count=count, rate=shown)
+            nonlocal told
+            if (
+                not (screen.is_terminal or console().quiet)
+                and time.monotonic() - told > REPORT_INTERVAL
+            ):
+                told = time.monotonic()
+                print(
+                    f"{description}: {done} of {total} {noun}, {shown}", file=sys.stderr, flush=True
+                )
+
+        yield tell
+    log.info("%s: %.2f s", description, time.monotonic() - start)
+
+
+def report_written_files(files: Sequence[Path]) -> None:
+    """Tell which files were written."""
+    for path in files:
+        log.info("wrote %s", path)
+        console().print(f"wrote {path}", highlight=False, soft_wrap=True)
+
+
+def _set_formatter(handler: logging.Handler, form: str) -> logging.Handler:
+    formatter = logging.Formatter(form, "%Y-%m-%dT%H:%M:%SZ")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    return handler

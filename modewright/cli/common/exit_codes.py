@@ -1,0 +1,119 @@
+"""Exits: what each exit code means, and how an exception becomes one."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from language.text.diagnostic import MissingToolError, SpecError, render_all, sort_problems
+from language.text.sanitise import escape_invisible, truncate
+from modewright.runtime.output_files import OutputError
+from sweep.execution.dask_error import ClusterError
+
+DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
+MAX_SHOWN = 100
+"""Problems that are shown to a person; `check --json` has all of them."""
+USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
+"""The class of all usage errors; typer brings its own copy of click's."""
+EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
+differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
+modewright (one line and a report file); 130 interrupted."""
+
+
+def run_with_exit_code(run: Callable[[], object]) -> int:
+    """Run a command line and return its exit code; every message goes to stderr."""
+    try:
+        code = run()
+        _flush_stdout()
+        return code if isinstance(code, int) else DONE
+    except USAGE_ERROR as error:
+        error.show()
+        return USAGE
+    except (KeyboardInterrupt, typer.Abort):
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except typer.Exit as error:
+        if error.exit_code == INTERRUPTED:
+            print("interrupted", file=sys.stderr)
+        return _flush_with_code(error.exit_code)
+    except SpecError as error:
+        report_problems(error)
+        return PROBLEMS
+    except (OutputError, ClusterError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return PROBLEMS
+    except MissingToolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return TOOL
+    except BrokenPipeError:
+        return _discard_output()
+    except OSError as error:
+        if error.errno not in USER_ERRNOS:
+            return _report_defect(error)
+        _discard_output()
+        where = f": {error.filename}" if error.filename else ""
+        print(f"error: {escape_invisible(truncate(str(error.strerror) + where))}", file=sys.stderr)
+        return PROBLEMS
+    except Exception as error:
+        return _report_defect(error)
+
+
+def _report_defect(error: Exception) -> int:
+    print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
+    print(f"a report is in {_write_defect_report()}", file=sys.stderr)
+    return DEFECT
+
+
+def _flush_stdout() -> None:
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _flush_with_code(code: int) -> int:
+    try:
+        _flush_stdout()
+    except BrokenPipeError:
+        return _discard_output() or code
+    return code
+
+
+def _discard_output() -> int:
+    """Who reads our output has gone (`| head`): the rest goes nowhere, which is no failure."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE
+
+
+def report_problems(error: SpecError) -> None:
+    """Print the problems and their number."""
+    problems = sort_problems(error.problems)
+    count = sum(problem.severity == "error" for problem in problems)
+    print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)
+    if len(problems) > MAX_SHOWN:
+        print(f"\n... and {len(problems) - MAX_SHOWN} more", file=sys.stderr)
+    print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
+
+
+USER_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.ENAMETOOLONG, errno.EIO}
+"""Errors of the system that the user can do something about: a full disk, a wrong path."""
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip().split("\n")[0]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _write_defect_report() -> Path:
+    text = f"command: {' '.join(sys.argv)}\npython: {sys.version}\n\n{traceback.format_exc()}"
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="modewright-report-", suffix=".txt", delete=False
+    ) as file:
+        file.write(text)
+    return Path(file.name)

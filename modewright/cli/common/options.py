@@ -1,0 +1,118 @@
+"""Options: arguments that several commands share, and what is done with them."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from modewright.cli.common.exit_codes import PROBLEMS
+from modewright.runtime.output_files import OutputError, require_calibration_output
+
+if TYPE_CHECKING:
+    from engine.results.trajectory import Trajectory
+
+GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
+
+System = Annotated[str, typer.Argument(help="a system: its name or its file")]
+Scenario = Annotated[str, typer.Option("--scenario", "-s", help="a scenario: name or file")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="a parameter value: 'k_hs=6000 N*m/rad', 'est.t_wait=2 ms'"),
+]
+Calibrations = Annotated[
+    list[str] | None,
+    typer.Option("--calibration", "-c", help="a calibration: name or file (repeatable)"),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="write the run: .csv (with a side file) or .parquet"),
+]
+Plot = Annotated[
+    Path | None, typer.Option("--plot", "-p", help="write a picture: .png, .svg or .pdf")
+]
+Signals = Annotated[
+    list[str] | None, typer.Option(help="only signals that match: 'plant.*' (repeatable)")
+]
+From = Annotated[float | None, typer.Option("--from", help="start of the window [s]")]
+To = Annotated[float | None, typer.Option("--to", help="end of the window [s]")]
+Numbers = Annotated[
+    Literal["float64", "float32"] | None,
+    typer.Option(help="compute in this type, whatever the automata say"),
+]
+Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+
+
+def values_of(sets: Sequence[str] | None) -> dict[str, str]:
+    """Return the values of --set by parameter."""
+    found = {}
+    for text in sets or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip() or not value.strip():
+            raise typer.BadParameter(f"`{text}` is not `parameter=value`", param_hint="--set")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def span_of(start: float | None, end: float | None) -> tuple[float, float] | None:
+    """Return the window of --from and --to [s]; None if neither is given."""
+    if start is None and end is None:
+        return None
+    span = (-math.inf if start is None else start, math.inf if end is None else end)
+    if not span[0] < span[1]:
+        raise typer.BadParameter("the window is empty", param_hint="--from, --to")
+    return span
+
+
+@contextmanager
+def usage_errors() -> Iterator[None]:
+    """Tell a ValueError of the API as wrong usage (exit code 2)."""
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def calibration_title(out: Path | None, name: str | None, date: str) -> str:
+    """Return the name of the calibration, which can be written as it is asked for."""
+    from language.expressions.name_rules import NAME_PATTERN
+    from language.overlays.calibration import DATE
+
+    if out:
+        if out.suffix != ".yaml":
+            raise OutputError(f"{out}: a calibration ends with .yaml")
+        require_calibration_output(out)
+    title = name or (out.stem if out else "fitted")
+    if not NAME_PATTERN.fullmatch(title):
+        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
+    if date and not DATE.fullmatch(date):
+        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
+    return title
+
+
+def require_run_format(path: Path | None) -> None:
+    """Raise OutputError, before any work is done, for a run in a format that is not known."""
+    if path and path.suffix.lower() not in (".csv", ".parquet"):
+        raise OutputError(f"{path}: a run ends with .csv or .parquet")
+
+
+def picture_format(path: Path) -> str:
+    """Return the format of a picture by the ending of its name. Raises OutputError."""
+    if path.suffix.lower() not in GRAPHIC_FORMATS:
+        raise OutputError(f"{path}: a picture ends with {', '.join(GRAPHIC_FORMATS)}")
+    return path.suffix.lower()[1:]
+
+
+def exit_if_failed(failed: bool, trajectory: Trajectory) -> None:
+    """Warn of latched faults, tell why a run stopped; leave with exit code 1 if it failed."""
+    for fault in trajectory.faults:
+        print(f"warning: a fault bit is set: {fault}", file=sys.stderr)
+    if trajectory.stopped:
+        print(f"error: the run stopped: {trajectory.stopped}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(PROBLEMS)

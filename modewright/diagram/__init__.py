@@ -1,0 +1,1 @@
+"""Diagrams of modes: boxes, layout, SVG and Mermaid."""

@@ -1,0 +1,66 @@
+"""TODO docstring."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+from modewright.diagram.label_text import ModeKind
+
+ModePath = tuple[str, ...]
+
+Shade = Literal["", "covered", "part", "missed"]
+"""What tests have reached of a mode or a transition; empty where nothing is said of it."""
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A transition between two modes (paths from the root) with the lines of its label."""
+
+    source: ModePath
+    target: ModePath
+    lines: tuple[str, ...]
+    name: str = ""
+    shade: Shade = ""
+
+
+@dataclass(frozen=True)
+class ModeBox:
+    """A mode: its path, what holds in it, and its inner regions (none in a plain mode)."""
+
+    path: ModePath
+    lines: tuple[str, ...]
+    regions: tuple[RegionBox, ...] = ()
+    shade: Shade = ""
+    kind: ModeKind = ""
+
+    @property
+    def name(self) -> str:
+        """The name without the path."""
+        return self.path[-1]
+
+
+@dataclass(frozen=True)
+class RegionBox:
+    """Modes of which one is active, and the initial one; a name only if there are several."""
+
+    name: str
+    initial: str
+    modes: tuple[ModeBox, ...]
+
+
+def lift_arrow(arrow: Arrow) -> Arrow:
+    """Return an arrow between modes of one region: those that hold its ends, which it names."""
+    depth = 0
+    for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):
+        if a != b:
+            break
+        depth += 1
+    source, target = arrow.source[: depth + 1], arrow.target[: depth + 1]
+    lines = list(arrow.lines)
+    if target != arrow.target:
+        lines.insert(0, f"to {'.'.join(arrow.target[depth + 1 :])}")
+    if source != arrow.source:
+        lines.insert(0, f"from {'.'.join(arrow.source[depth + 1 :])}")
+    return dataclasses.replace(arrow, source=source, target=target, lines=tuple(lines))

@@ -1,0 +1,188 @@
+"""Diagram: the modes of an automaton as boxes and arrows, as the spec writes them.
+
+It is read from the laid-out text, so that guards stand in it as their author wrote them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from language.reading.transition_table_reader import expand_transition_tables
+from language.text.diagnostic import Problems
+from language.text.document import Document, Entry, MappingNode, SequenceNode, YamlNode
+from language.text.overlay import apply_overlay, without_keys
+from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox
+from modewright.diagram.label_text import label_lines, mode_kind_of, mode_lines, node_text
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """All regions of an automaton and its transitions; a notebook shows it as a picture."""
+
+    name: str
+    about: str
+    regions: tuple[RegionBox, ...]
+    arrows: tuple[Arrow, ...]
+
+    def mermaid(self) -> str:
+        """Return the diagram as Mermaid text, for Markdown that Git hosts show."""
+        from modewright.diagram.mermaid import render_mermaid
+
+        return render_mermaid(self)
+
+    def svg(self) -> str:
+        """Return the diagram as an SVG document."""
+        from modewright.diagram.svg import render_svg
+
+        return render_svg(self)
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
+
+def diagram_of(document: Document) -> Diagram:
+    """Return the diagram of an automaton's document, with variants laid over it already.
+
+    The automaton must have been checked: targets are there.
+    """
+    templates = document.root.get("templates")
+    root = (
+        _apply_templates(document.root, templates)
+        if isinstance(templates, MappingNode)
+        else document.root
+    )
+    root = expand_transition_tables(root, Problems())
+    regions = [
+        _mark_fault_mode(r, node_text(root.get("fault_mode"))) for r in _region_boxes(root, ())
+    ]
+    known = set(_iter_mode_paths(regions))
+    arrows = [
+        arrow
+        for path, table in _iter_modes(root, ())
+        for arrow in _transition_arrows(path, table, known)
+    ]
+    about = document.root.get("about")
+    return Diagram(document.name, node_text(about), tuple(regions), tuple(arrows))
+
+
+def _mark_fault_mode(region: RegionBox, fault_mode: str) -> RegionBox:
+    """Return a region in which the mode that faults lead to says so."""
+    boxes = tuple(
+        dataclasses.replace(box, lines=("entered on a fault", *box.lines))
+        if box.name == fault_mode
+        else box
+        for box in region.modes
+    )
+    return dataclasses.replace(region, modes=boxes)
+
+
+def _apply_templates(owner: MappingNode, templates: MappingNode) -> MappingNode:
+    """Return a table whose modes, inner ones too, are laid over the templates that they name."""
+    template = templates.get(node_text(owner.get("like")))
+    if isinstance(template, MappingNode):
+        owner = apply_overlay(template, without_keys(owner, "like"), Problems(), template=True)
+    entries = dict(owner.entries)
+    for key in ("modes", "regions"):
+        node = owner.get(key)
+        if isinstance(node, MappingNode):
+            inner = {
+                e.key: Entry(e.key, e.span, _apply_templates(e.node, templates))
+                for e in node
+                if isinstance(e.node, MappingNode)
+            }
+            entries[key] = Entry(key, owner.entries[key].span, MappingNode(inner, node.span))
+    return MappingNode(entries, owner.span)
+
+
+def _region_boxes(owner: MappingNode, path: ModePath) -> list[RegionBox]:
+    """Return the regions of the automaton or of a mode: its `modes`, then its `regions`."""
+    boxes = []
+    modes, regions = owner.get("modes"), owner.get("regions")
+    if isinstance(modes, MappingNode):
+        boxes.append(_region_box("chart" if regions else "", owner, modes, path))
+    if isinstance(regions, MappingNode):
+        for entry in regions:
+            inner = entry.node.get("modes") if isinstance(entry.node, MappingNode) else None
+            if isinstance(entry.node, MappingNode) and isinstance(inner, MappingNode):
+                boxes.append(_region_box(entry.key, entry.node, inner, (*path, entry.key)))
+    return boxes
+
+
+def _region_box(name: str, owner: MappingNode, modes: MappingNode, path: ModePath) -> RegionBox:
+    boxes = [
+        ModeBox(
+            (*path, entry.key),
+            tuple(mode_lines(entry.node)),
+            tuple(_region_boxes(entry.node, (*path, entry.key))),
+            kind=mode_kind_of(entry.node),
+        )
+        for entry in modes
+        if isinstance(entry.node, MappingNode)
+    ]
+    return RegionBox(
+        name, node_text(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
+    )
+
+
+def _iter_modes(owner: MappingNode, path: ModePath) -> Iterator[tuple[ModePath, MappingNode]]:
+    """Yield every mode with its path, outer ones first."""
+    regions = owner.get("regions")
+    owners = [(path, owner)]
+    if isinstance(regions, MappingNode):
+        owners += [((*path, e.key), e.node) for e in regions if isinstance(e.node, MappingNode)]
+    for place, each in owners:
+        modes = each.get("modes")
+        for entry in modes if isinstance(modes, MappingNode) else ():
+            if isinstance(entry.node, MappingNode):
+                yield (*place, entry.key), entry.node
+                yield from _iter_modes(entry.node, (*place, entry.key))
+
+
+def _iter_mode_paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterator[ModePath]:
+    for region in regions:
+        for mode in region.modes:
+            yield mode.path
+            yield from _iter_mode_paths(mode.regions)
+
+
+def _transition_arrows(path: ModePath, mode: MappingNode, known: set[ModePath]) -> Iterator[Arrow]:
+    transitions = mode.get("transitions")
+    for entry in transitions if isinstance(transitions, MappingNode) else ():
+        if isinstance(entry.node, MappingNode):
+            label = tuple(label_lines(entry.node))
+            names = _target_names(entry.node.get("to"), entry.key)
+            if not names:
+                yield Arrow(path, path, (*label, "/ stays"), entry.key)
+            for name in names:
+                target = _resolve_target(tuple(name.split(".")), path, known)
+                if target:
+                    yield Arrow(path, target, label, entry.key)
+
+
+def _target_names(to: YamlNode | None, key: str) -> list[str]:
+    """Return the targets of a transition: those of a list, the only one, or its key."""
+    if isinstance(to, SequenceNode):
+        return [node_text(item) for item in to.nodes]
+    return [node_text(to) or key]
+
+
+def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> ModePath | None:
+    """Return the mode that a name means: among the siblings first, then those of the parents."""
+    for depth in range(len(path) - 1, -1, -1):
+        if (*path[:depth], *name) in known:
+            return (*path[:depth], *name)
+    return None
+
+
+def graph(reference: str, root: Path | None = None) -> Diagram:
+    """Return the diagram of an automaton. Raises SpecError with all its problems."""
+    from language.loading.load import automaton_of
+    from language.overlays.expand_document import Project, expand_document, read_document
+
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    automaton_of(document, project)
+    return diagram_of(expand_document(document, project))

@@ -1,0 +1,80 @@
+"""Mermaid: a diagram as `stateDiagram-v2` text, read in review and drawn by Git hosts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from language.text.sanitise import escape_invisible
+from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox, lift_arrow
+from modewright.diagram.diagram import Diagram
+
+RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
+
+KIND_MARKS = {"history": "(H) "}
+"""What stands before the name of a mode that is no plain one."""
+
+
+def render_mermaid(diagram: Diagram) -> str:
+    """Return the diagram as Mermaid text; a transition stands where both its modes are inside."""
+    lines = ["stateDiagram-v2", "    direction LR"]
+    if len(diagram.regions) == 1:
+        lines += _region_lines(diagram.regions[0], diagram.arrows, 1)
+    else:
+        lines.append(
+            f'    state "{_escape_label(diagram.name)}" as {identifier_of((diagram.name,))}_ {{'
+        )
+        lines += _parallel_lines(diagram.regions, diagram.arrows, 2)
+        lines.append("    }")
+    return "\n".join(lines) + "\n"
+
+
+def identifier_of(path: ModePath) -> str:
+    """Return the identifier of a mode: its path, not a word of Mermaid."""
+    name = re.sub(r"\W", "_", "__".join(path), flags=re.ASCII)
+    return name + "_" if name in RESERVED else name
+
+
+def _parallel_lines(
+    regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...], depth: int
+) -> Iterator[str]:
+    for k, region in enumerate(regions):
+        if k:
+            yield "    " * depth + "--"
+        yield from _region_lines(region, arrows, depth)
+
+
+def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    indent = "    " * depth
+    for mode in region.modes:
+        if mode.name == region.initial:
+            yield f"{indent}[*] --> {identifier_of(mode.path)}"
+    for mode in region.modes:
+        yield from _mode_lines(mode, arrows, depth)
+        if mode.kind == "final":
+            yield f"{indent}{identifier_of(mode.path)} --> [*]"
+    place = region.modes[0].path[:-1] if region.modes else ()
+    for arrow in map(lift_arrow, arrows):
+        if arrow.source[:-1] == place:
+            label = f" : {'<br/>'.join(map(_escape_label, arrow.lines))}" if arrow.lines else ""
+            yield f"{indent}{identifier_of(arrow.source)} --> {identifier_of(arrow.target)}{label}"
+
+
+def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    indent = "    " * depth
+    text = "<br/>".join(
+        map(_escape_label, (KIND_MARKS.get(mode.kind, "") + mode.name, *mode.lines))
+    )
+    head = f'{indent}state "{text}" as {identifier_of(mode.path)}'
+    if not mode.regions:
+        yield head
+        return
+    yield head + " {"
+    yield from _parallel_lines(mode.regions, arrows, depth + 1)
+    yield indent + "}"
+
+
+def _escape_label(text: str) -> str:
+    """Return a text without what ends a label in some version of Mermaid, or is HTML."""
+    plain = escape_invisible(text).replace('"', "'")
+    return re.sub(r"[#;:]|<(?=[A-Za-z/!?])", lambda match: f"#{ord(match[0])};", plain)

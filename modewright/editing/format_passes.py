@@ -1,0 +1,181 @@
+"""Layout: what formatting does, pass by pass; each takes a text and returns one laid out more."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import yaml
+
+from modewright.editing.tokenised_text import (
+    CLOSING,
+    OPENING,
+    Token,
+    TokenisedText,
+    join_lines,
+    tokenise,
+)
+
+INDENTATION = 2
+COMMENT_GAP = 2
+"""Least blanks between a value and the comment behind it."""
+
+
+def strip_blanks(text: str) -> str:
+    """Return a text without blanks at the ends of its lines, with single blank lines."""
+    tokenised = tokenise(text)
+    result: list[str] = []
+    for number, line in enumerate(tokenised.lines):
+        kept = line if number in tokenised.continuation_lines else line.rstrip(" \t")
+        if kept or number in tokenised.continuation_lines or (result and result[-1]):
+            result.append(kept)
+    while result and not result[-1]:
+        result.pop()
+    return join_lines(result)
+
+
+def indent_blocks(text: str) -> str:
+    """Return a text with two blanks for each level of its blocks.
+
+    What goes on over several lines moves with the line on which it starts.
+    """
+    tokenised = tokenise(text)
+    shifts = _line_shifts(tokenised)
+    result = []
+    for number, line in enumerate(tokenised.lines):
+        bare = line.lstrip(" ")
+        old = len(line) - len(bare)
+        result.append(" " * max(0, old + shifts.get(number, 0)) + bare if bare else line)
+    return join_lines(_restore_comments(tokenised, result))
+
+
+def _line_shifts(tokenised: TokenisedText) -> dict[int, int]:
+    """Return by how many columns each line moves."""
+    first = tokenised.first_tokens
+    shifts: dict[int, int] = {}
+    shift = 0
+    for number, line in enumerate(tokenised.lines):
+        token = first.get(number)
+        is_start = token is not None and token.depth == 0 and token.kind not in CLOSING
+        if token and is_start and number not in tokenised.continuation_lines - {token.line}:
+            shift = INDENTATION * max(0, token.level - 1) - (len(line) - len(line.lstrip(" ")))
+        shifts[number] = shift
+    for number in sorted(tokenised.comment_columns, reverse=True):
+        if number not in first:
+            shifts[number] = _comment_shift(tokenised, number, shifts)
+    return shifts
+
+
+def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]) -> int:
+    """A line that is all comment moves with the line below, or above where it is indented more."""
+    below = next(
+        (k for k in range(number + 1, len(tokenised.lines)) if tokenised.lines[k].strip()), None
+    )
+    column = tokenised.comment_columns[number]
+    if below is not None:
+        line = tokenised.lines[below]
+        if column <= len(line) - len(line.lstrip(" ")):
+            return shifts[below]
+    return shifts[number]
+
+
+def space_tokens(text: str) -> str:
+    """Return a text with its blanks inside brackets and behind the dashes of lists."""
+    tokenised = tokenise(text)
+    lines = list(tokenised.lines)
+    starts = {(token.line, token.start_column) for token in tokenised.tokens}
+    pairs = [
+        pair for pair in itertools.pairwise(tokenised.tokens) if pair[0].end_line == pair[1].line
+    ]
+    for left, right in reversed(pairs):
+        separator = _separator_of(left, right)
+        line = lines[right.line]
+        if separator is None or line[left.end_column : right.start_column].strip(" "):
+            continue
+        if left.kind is yaml.FlowEntryToken and _is_in_column(left, right, starts):
+            continue
+        lines[right.line] = line[: left.end_column] + separator + line[right.start_column :]
+    return join_lines(_restore_comments(tokenised, lines))
+
+
+def _separator_of(left: Token, right: Token) -> str | None:
+    """Return what stands between two tokens of a line; None where that is left as it is."""
+    if left.kind in OPENING or right.kind in CLOSING:
+        return ""
+    if right.kind in (yaml.FlowEntryToken, yaml.ValueToken):
+        return ""
+    if left.kind in (yaml.FlowEntryToken, yaml.BlockEntryToken):
+        return " "
+    return " " if left.kind is yaml.ValueToken and left.depth else None
+
+
+def _is_in_column(left: Token, right: Token, starts: set[tuple[int, int]]) -> bool:
+    """Tell whether blanks behind a comma put a part below or above another one: a table."""
+    beside = {(right.line - 1, right.start_column), (right.line + 1, right.start_column)}
+    return right.start_column > left.end_column + 1 and not beside.isdisjoint(starts)
+
+
+def align_values(text: str) -> str:
+    """Return a text whose values are aligned where an author did so, comments behind them."""
+    tokenised = tokenise(text)
+    lines = list(tokenised.lines)
+    for group in _iter_entry_groups(tokenised):
+        column = _value_column(group)
+        for colon, value in group:
+            line = lines[colon.line]
+            blanks = max(1, column - colon.end_column)
+            lines[colon.line] = line[: colon.end_column] + " " * blanks + line[value.start_column :]
+    return join_lines(_restore_comments(tokenised, lines))
+
+
+def _value_column(group: list[tuple[Token, Token]]) -> int:
+    """Return where aligned values start: where they do, else behind the longest key of them.
+
+    Values are aligned where two of them start in one column and not for want of blanks; a key that
+    reaches beyond that column is left alone.
+    """
+    columns = [value.start_column for _, value in group]
+    spread = [
+        value.start_column for colon, value in group if value.start_column > colon.end_column + 1
+    ]
+    limit = max((column for column in spread if columns.count(column) > 1), default=0)
+    within = [(colon, value) for colon, value in group if colon.end_column < limit]
+    if all(value.start_column == limit for _, value in within):
+        return limit
+    return max((colon.end_column + 1 for colon, _ in within), default=0)
+
+
+def _iter_entry_groups(tokenised: TokenisedText) -> Iterator[list[tuple[Token, Token]]]:
+    """Yield the entries, as colon and value, of lines that follow each other at one level."""
+    group: list[tuple[Token, Token]] = []
+    first = tokenised.first_tokens
+    for before, colon, value in zip(
+        tokenised.tokens, tokenised.tokens[1:], tokenised.tokens[2:], strict=False
+    ):
+        if colon.kind is not yaml.ValueToken or colon.depth or value.line != colon.line:
+            continue
+        if first[colon.line] is not before:
+            continue
+        last = group[-1][0] if group else None
+        if last and (colon.line != last.line + 1 or colon.level != last.level):
+            yield group
+            group = []
+        group.append((colon, value))
+    if group:
+        yield group
+
+
+def _restore_comments(tokenised: TokenisedText, lines: list[str]) -> list[str]:
+    """Return lines whose comments stand where they stood, or behind what has become longer."""
+    result = []
+    for number, (old, new) in enumerate(zip(tokenised.lines, lines, strict=True)):
+        column = tokenised.comment_columns.get(number)
+        content = "" if column is None else old[:column].rstrip(" ")
+        if column is None or not content:
+            result.append(new)
+            continue
+        comment = old[column:]
+        kept = new[: len(new) - len(comment)].rstrip(" ")
+        blanks = max(COMMENT_GAP, column - len(kept))
+        result.append(kept + " " * blanks + comment)
+    return result

@@ -1,0 +1,58 @@
+"""Proving: what takes seconds to find of a text, in a process that ends when the text changes.
+
+Read from stdin is which file, with the texts of the editor; written are its diagnostics.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from lsprotocol import converters, types
+
+from modewright.api.checking import check_spec
+from modewright.lsp.diagnostics import to_diagnostics
+from modewright.lsp.workspace import Workspace
+
+
+async def run_background_check(workspace: Workspace, path: Path) -> list[types.Diagnostic] | None:
+    """Return all problems of a file, None where they were not found; cancelled, nothing runs on."""
+    request = {
+        "path": str(path),
+        "root": str(workspace.root),
+        "encoding": workspace.encoding,
+        "texts": {str(file): text for file, text in workspace.texts.items()},
+    }
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", "modewright.lsp.background_check"),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        answer, _ = await process.communicate(json.dumps(request).encode())
+    finally:
+        if process.returncode is None:
+            process.kill()
+    if process.returncode:
+        return None
+    converter = converters.get_converter()
+    return [converter.structure(each, types.Diagnostic) for each in json.loads(answer)]
+
+
+def main() -> None:
+    """Answer one question."""
+    request = json.loads(sys.stdin.read())
+    texts = {Path(file): text for file, text in request["texts"].items()}
+    path = Path(request["path"])
+    diagnostics = to_diagnostics(
+        check_spec(str(path), Path(request["root"]), texts), path, request["encoding"]
+    )
+    converter = converters.get_converter()
+    print(json.dumps([converter.unstructure(each) for each in diagnostics]))
+
+
+if __name__ == "__main__":
+    main()

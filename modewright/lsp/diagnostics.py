@@ -1,0 +1,59 @@
+"""Problems: what `check` says of a text in an editor, as its diagnostics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lsprotocol import types
+
+from language.text.diagnostic import Problem
+from modewright.api.checking import CheckResult, check_without_proofs
+from modewright.lsp.positions import range_of, uri_of
+from modewright.lsp.workspace import Workspace
+
+SOURCE = "modewright"
+SEVERITIES = {
+    "error": types.DiagnosticSeverity.Error,
+    "warning": types.DiagnosticSeverity.Warning,
+}
+FILE_START = types.Range(types.Position(0, 0), types.Position(0, 0))
+
+
+def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
+    """Return the problems of a file without what takes long to prove.
+
+    One that lies in another file is told at the start of this; so is a defect of ours, with which
+    the other files are checked nevertheless.
+    """
+    try:
+        found = check_without_proofs(str(path), workspace.root, dict(workspace.texts))
+    except Exception as defect:
+        message = f"a defect of modewright: {type(defect).__name__}: {defect}\n"
+        message += f"help: `modewright check {path.stem}` writes a report"
+        return [types.Diagnostic(FILE_START, message, SEVERITIES["error"], source=SOURCE)]
+    return to_diagnostics(found, path, workspace.encoding)
+
+
+def to_diagnostics(result: CheckResult, path: Path, encoding: str) -> list[types.Diagnostic]:
+    """Return what was found in a file as diagnostics."""
+    return [_to_diagnostic(problem, path.resolve(), encoding) for problem in result.problems]
+
+
+def _to_diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:
+    message = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
+    place = Path(problem.span.source.name).resolve()
+    related = None
+    where = range_of(problem.span, encoding)
+    if place != path:
+        location = types.Location(uri_of(place), where)
+        related = [types.DiagnosticRelatedInformation(location, problem.label)]
+        message = f"in {problem.span}: {message}"
+        where = FILE_START
+    return types.Diagnostic(
+        range=where,
+        message=message,
+        severity=SEVERITIES[problem.severity],
+        code=problem.code,
+        source=SOURCE,
+        related_information=related,
+    )

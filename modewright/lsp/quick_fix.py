@@ -1,0 +1,33 @@
+"""Repair: the changes that the help of a problem names, offered where the problem is shown."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from lsprotocol import types
+
+from modewright.lsp.diagnostics import SOURCE
+
+REPLACEMENT_PATTERNS = (
+    re.compile(r"^help: did you mean `(.+?)`\?", re.MULTILINE),
+    re.compile(r"^help: write `(\S+?)`:", re.MULTILINE),
+)
+"""Helps that give the very text to write at the place of the problem."""
+
+
+def quick_fixes(uri: str, diagnostics: Sequence[types.Diagnostic]) -> Iterator[types.CodeAction]:
+    """Yield the change that each problem's help names, if it names one."""
+    for problem in diagnostics:
+        found = [match for each in REPLACEMENT_PATTERNS if (match := each.search(problem.message))]
+        if not found or problem.source != SOURCE or problem.related_information:
+            continue
+        text = found[0].group(1)
+        edit = types.TextEdit(problem.range, text)
+        yield types.CodeAction(
+            title=f"Write `{text}`",
+            kind=types.CodeActionKind.QuickFix,
+            diagnostics=[problem],
+            is_preferred=True,
+            edit=types.WorkspaceEdit(changes={uri: [edit]}),
+        )

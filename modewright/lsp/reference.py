@@ -1,0 +1,186 @@
+"""Mention: every place of a spec that names something, and what it names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from language.ir.regions import CHART
+from language.text.diagnostic import Span
+from modewright.lsp.mode_resolution import NamePart, Resolution, resolve_mode_parts, split_name
+from modewright.lsp.name_occurrence import QUERIED_KINDS, NameOccurrence
+from modewright.lsp.symbol_table import (
+    Symbol,
+    SymbolTable,
+    column_name,
+    load_symbol_table,
+    mode_path,
+)
+from modewright.lsp.workspace import Workspace
+
+STUDY_PREFIXES = ("initial", "inputs")
+"""What stands before names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
+SPEC_LOCAL_KINDS = ("template", "fault")
+"""What is named inside one spec only; an event of a study is a mode that is entered."""
+INSTANCE_SECTIONS = (("values",), ("inputs",))
+"""Sections of an instance whose keys are its names, not ours."""
+SPEC_TARGETS = ("automaton", "system", "scenario", "map", "calibration", "spec", "effect")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A part of a name that stands for something; `path` are the keys that lead to it."""
+
+    symbol: Symbol
+    span: Span
+    path: tuple[str, ...]
+    is_key: bool
+
+    @property
+    def is_declaration(self) -> bool:
+        """Whether this is where the thing gets its name; an equation does so in several modes."""
+        is_equation = self.is_key and self.path[-2:-1] == ("equations",)
+        return self.span == self.symbol.span or (is_equation and self.is_in_declaring_file)
+
+    @property
+    def is_in_declaring_file(self) -> bool:
+        """Whether this stands in the file that declares the thing."""
+        return Path(self.span.source.name).resolve() == self.symbol.file
+
+
+def find_references(workspace: Workspace, path: Path) -> list[Reference]:
+    """Return what a spec names, in the order of the file."""
+    symbols = load_symbol_table(workspace, path)
+    result = []
+    for name in workspace.names(path) if symbols else ():
+        assert symbols is not None
+        for (offset, part), symbol in resolve_name(workspace, symbols, name):
+            if symbol:
+                span = name.span.subspan(offset, len(part))
+                result.append(Reference(symbol, span, name.path, name.is_key))
+    return result
+
+
+def references_to(workspace: Workspace, symbol: Symbol) -> list[Reference]:
+    """Return where something is named, in the whole project and in the file that declares it."""
+    files = dict.fromkeys((symbol.file, *(path for path, _ in workspace.documents())))
+    return [
+        reference
+        for path in files
+        for reference in find_references(workspace, path)
+        if reference.symbol.identity == symbol.identity
+    ]
+
+
+def resolve_name(workspace: Workspace, symbols: SymbolTable, name: NameOccurrence) -> Resolution:
+    """Yield the parts of a dotted name with what each stands for."""
+    whole = (0, name.text)
+    if name.kind in SPEC_TARGETS:
+        yield whole, _resolve_spec(workspace, symbols, name)
+    elif name.kind in ("mode", "region") and name.path[-2:-1] in (("modes",), ("regions",)):
+        yield whole, _symbol_of_key(symbols, name)
+    elif name.kind == "mode" and name.owner is not None:
+        yield from _resolve_mode(*_split_instance(symbols, name.owner), split_name(name.text))
+    elif name.kind == "mode":
+        yield from resolve_mode_parts(symbols, split_name(name.text), name.path)
+    elif name.kind == "column":
+        yield whole, symbols.names.get(("column", column_name(name.path, name.text)))
+    elif name.kind in SPEC_LOCAL_KINDS or (
+        name.kind == "event" and (name.kind, name.text) in symbols.names
+    ):
+        yield whole, symbols.names.get((name.kind, name.text))
+    else:
+        parts = split_name(name.text)
+        if name.kind == "model_mode":
+            yield from _resolve_model_mode(symbols, parts)
+            return
+        region = region_of(symbols, name.owner or "") if name.kind == "compared" else None
+        if region:
+            yield from _resolve_mode(*region, parts)
+            return
+        if name.kind == "signal" and "measures" in name.path and symbols.model:
+            symbols = symbols.model
+        if name.path[:1] == ("instances",) and name.is_key and name.path[2:3] in INSTANCE_SECTIONS:
+            symbols = symbols.instances.get(name.path[1], symbols)
+        if symbols.document.kind == "study" and parts[0][1] in STUDY_PREFIXES:
+            parts = parts[1:]
+        yield from _resolve_value(symbols, parts, name)
+
+
+def _resolve_spec(
+    workspace: Workspace, symbols: SymbolTable, name: NameOccurrence
+) -> Symbol | None:
+    if name.text == symbols.document.name:
+        return symbols.names.get(("spec", name.text))
+    path = workspace.find_file(name.text, symbols.file, is_effect=name.kind == "effect")
+    document = workspace.document(path) if path else None
+    if path is None or document is None or document.name != name.text:
+        return None
+    return Symbol(path, "spec", name.text, document.kind, document.name_span, document)
+
+
+def _symbol_of_key(symbols: SymbolTable, name: NameOccurrence) -> Symbol | None:
+    """Return the mode or region that a key declares."""
+    inner = mode_path(name.path) if name.path[-2:] != ("regions", CHART) else CHART
+    return symbols.names.get((name.kind, inner))
+
+
+def _resolve_value(
+    symbols: SymbolTable, parts: Sequence[NamePart], name: NameOccurrence
+) -> Resolution:
+    """Yield what a name in an expression stands for; inside `in(...)` it is a mode."""
+    if not parts:
+        return
+    head, *rest = parts
+    symbol = (
+        symbols.names.get(("value", head[1]))
+        if name.kind not in QUERIED_KINDS.values() or rest
+        else None
+    )
+    if symbol is None and head[1] in symbols.instances:
+        symbol = symbols.names.get(("spec", head[1]))  # an automaton alone is its own instance
+    if head[1] in symbols.instances and rest:
+        yield head, symbol
+        yield from _resolve_value(symbols.instances[head[1]], rest, replace(name, path=()))
+    elif symbols.model and rest and head[1] == symbols.model.document.name:
+        yield from _resolve_model_mode(symbols, parts)
+    elif name.kind == "asked_fault":
+        yield head, symbols.names.get(("fault", head[1]))
+    elif symbol and not rest:
+        yield head, symbol
+    else:
+        found = list(resolve_mode_parts(symbols, parts, name.path))
+        event = None if rest or found else symbols.names.get(("event", head[1]))
+        yield from found or [(head, event or symbol)]
+
+
+def region_of(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str] | None:
+    """Return whose modes a name in an expression has, and of which region; None for other names.
+
+    It is `mode`, `est.mode`, `est.gap`, or alone `gap`.
+    """
+    inner, region = _split_instance(symbols, path)
+    if region.rpartition(".")[2] == "mode":
+        return inner, region.rpartition(".")[0]
+    return (inner, region) if ("region", region) in inner.names else None
+
+
+def _split_instance(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str]:
+    """Return the automaton that a path begins with, and the region that is left of it."""
+    head, _, region = path.partition(".")
+    return (symbols.instances[head], region) if head in symbols.instances else (symbols, path)
+
+
+def _resolve_mode(symbols: SymbolTable, region: str, parts: Sequence[NamePart]) -> Resolution:
+    """Yield what a mode of a region stands for, or of the chart where none is named."""
+    before = split_name(region) if region else []
+    found = list(resolve_mode_parts(symbols, [*before, *parts]))
+    yield from found[len(before) :]
+
+
+def _resolve_model_mode(symbols: SymbolTable, parts: Sequence[NamePart]) -> Resolution:
+    model = symbols.model
+    if model and len(parts) > 1 and parts[0][1] == model.document.name:
+        yield parts[0], model.names.get(("spec", parts[0][1]))
+        yield from resolve_mode_parts(model, parts[1:])

@@ -1,0 +1,210 @@
+"""Namespace: what names mean in a spec, with those of its base, its model, its instances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from language.ir.regions import CHART
+from language.text.diagnostic import Span
+from language.text.document import Document, Entry, MappingNode, ScalarNode
+from language.text.node_edit import entries
+from modewright.editing.key_shape import MappingOf
+from modewright.editing.node_kinds import places
+from modewright.lsp.workspace import Workspace, root_text
+
+VALUE_SECTIONS = {
+    "parameters": "parameter",
+    "inputs": "input",
+    "states": "state",
+    "discrete": "discrete variable",
+    "equations": "equation",
+    "sensors": "sensor",
+    "instances": "instance",
+    "outputs": "output",
+    "measures": "measure",
+    "vary": "what varies",
+}
+"""Sections that declare what expressions read, and what each declares."""
+OTHER_SECTIONS = {
+    "modes": "mode",
+    "regions": "region",
+    "templates": "template",
+    "faults": "fault",
+    "events": "event",
+}
+MAX_DEPTH = 20
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """Something that has a name: where it is declared and what as.
+
+    `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`;
+    a mode and a region have their path as their name.
+    """
+
+    file: Path
+    group: str
+    name: str
+    kind: str
+    span: Span
+    node: object = field(compare=False, repr=False, default=None)
+
+    @property
+    def identity(self) -> tuple[Path, str, str]:
+        """What two mentions of one thing have in common."""
+        return self.file, self.group, self.name
+
+
+@dataclass
+class SymbolTable:
+    """The names of one spec, by group and name; those of its base and model are the same things."""
+
+    file: Path
+    document: Document
+    names: dict[tuple[str, str], Symbol] = field(default_factory=dict)
+    instances: dict[str, SymbolTable] = field(default_factory=dict)
+    model: SymbolTable | None = None
+    target: SymbolTable | None = None
+
+    @property
+    def is_automaton(self) -> bool:
+        """Whether this is an automaton, or a variant of one."""
+        return ("spec", "automaton") in {(each.group, each.kind) for each in self.names.values()}
+
+    def in_groups(self, *groups: str) -> list[Symbol]:
+        """Return what is declared in some groups."""
+        return [each for (group, _), each in self.names.items() if group in groups]
+
+
+def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> SymbolTable | None:
+    """Return the names of a spec; None where it cannot be read."""
+    document = workspace.document(path)
+    if document is None or depth > MAX_DEPTH:
+        return None
+    return build_symbol_table(workspace, path, document, depth)
+
+
+def build_symbol_table(
+    workspace: Workspace, path: Path, document: Document, depth: int = 0
+) -> SymbolTable:
+    """Return the names of a document; `depth` counts what it was reached through."""
+    symbols = SymbolTable(path.resolve(), document)
+    base = _referenced_symbols(workspace, symbols, "extends", depth)
+    if base:
+        symbols.names.update(base.names)
+        symbols.instances.update(base.instances)
+        symbols.model, symbols.target = base.model, base.target
+    model = _referenced_symbols(workspace, symbols, "model", depth)
+    if model:
+        symbols.model = model
+        shared = ("parameter", "state", "input")
+        for each in model.in_groups("value"):
+            if each.kind in shared:
+                symbols.names[each.group, each.name] = each
+    target = _referenced_symbols(workspace, symbols, "of", depth) or _tested_symbols(
+        workspace, symbols, depth
+    )
+    if target:
+        symbols.target = target
+        symbols.names.update(target.names)
+        symbols.instances.update(target.instances)
+        if target.is_automaton:  # it runs alone, and is an instance of its own name
+            symbols.instances[target.document.name] = target
+    if document.kind == "study":  # a bare name is that of all instances that have it
+        for inner in symbols.instances.values():
+            for each in inner.in_groups("value"):
+                if each.kind == "parameter":
+                    symbols.names.setdefault((each.group, each.name), each)
+    for symbol in _iter_symbols(symbols.file, document):
+        symbols.names.setdefault((symbol.group, symbol.name), symbol)
+    _add_instances(workspace, symbols, depth)
+    return symbols
+
+
+def _tested_symbols(workspace: Workspace, symbols: SymbolTable, depth: int) -> SymbolTable | None:
+    """Return what the scenario of a test is of: one that is named, or written in the test."""
+    if symbols.document.kind != "test":
+        return None
+    written = symbols.document.root.get("scenario")
+    if isinstance(written, MappingNode):
+        of = written.get("of")
+        path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
+        return load_symbol_table(workspace, path, depth + 1) if path else None
+    scenario = _referenced_symbols(workspace, symbols, "scenario", depth)
+    return scenario.target if scenario else None
+
+
+def _referenced_symbols(
+    workspace: Workspace, symbols: SymbolTable, key: str, depth: int
+) -> SymbolTable | None:
+    name = root_text(symbols.document, key)
+    path = workspace.find_file(name, symbols.file) if name else None
+    return load_symbol_table(workspace, path, depth + 1) if path else None
+
+
+def _add_instances(workspace: Workspace, symbols: SymbolTable, depth: int) -> None:
+    for entry in entries(symbols.document.root.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
+        path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
+        inner = load_symbol_table(workspace, path, depth + 1) if path else None
+        if inner:
+            symbols.instances[entry.key] = inner
+
+
+def _iter_symbols(file: Path, document: Document) -> Iterator[Symbol]:
+    yield Symbol(file, "spec", document.name, document.kind, document.name_span, document)
+    is_calibration = document.kind in ("calibration", "scenario")
+    for place in places(document.root):
+        if not isinstance(place.node, MappingNode) or not isinstance(place.kind, MappingOf):
+            continue
+        for entry in place.node:
+            symbol = None if is_calibration else _make_symbol(file, place.path, entry)
+            if symbol:
+                yield symbol
+
+
+def _make_symbol(file: Path, path: tuple[str, ...], entry: Entry) -> Symbol | None:
+    section = path[-1] if path else ""
+    if entry.key.startswith("$"):
+        return None
+    is_inner = "observer" in path or "redirect" in path
+    is_value = len(path) == 1 or section == "equations"
+    if section in VALUE_SECTIONS and not is_inner and is_value:
+        word = VALUE_SECTIONS[section]
+        return Symbol(file, "value", entry.key, word, entry.text_span, entry.node)
+    if section == "columns" and "transition_table" in path:
+        name = column_name(path, entry.key)
+        return Symbol(file, "column", name, "column of a table", entry.text_span, entry.node)
+    if section in OTHER_SECTIONS:
+        word = OTHER_SECTIONS[section]
+        name = _symbol_name(word, path, entry.key)
+        return Symbol(file, word, name, word, entry.text_span, entry.node)
+    return None
+
+
+def _symbol_name(word: str, path: tuple[str, ...], key: str) -> str:
+    if word == "mode" or (word == "region" and key != CHART):
+        return mode_path((*path, key))
+    return key
+
+
+def mode_path(path: tuple[str, ...]) -> str:
+    """Return the path of a mode: `gap`, in a region `tyre.upper`, nested `drive.creep`.
+
+    `path` are the keys that lead to it; what is below the mode is left out.
+    """
+    found: list[str] = []
+    k = 0
+    while k + 1 < len(path) and path[k] in ("modes", "regions"):
+        if not (path[k] == "regions" and path[k + 1] == CHART):
+            found.append(path[k + 1])
+        k += 2
+    return ".".join(found)
+
+
+def column_name(path: tuple[str, ...], key: str) -> str:
+    """Return the name of a column with the place of its table: others may have one like it."""
+    return f"{mode_path(path)}.{key}"

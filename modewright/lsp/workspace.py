@@ -1,0 +1,114 @@
+"""World: the specs of a project as an editor sees them, open texts before files on the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from language.text.diagnostic import SpecError
+from language.text.document import Document, ScalarNode
+from language.text.project_files import Project
+from modewright.lsp.name_occurrence import NameOccurrence, find_names
+
+
+@dataclass
+class Workspace:
+    """A project's folder, the open texts by resolved path, and documents as last read.
+
+    `encoding` is that in which the editor counts columns.
+    While a text that is being written is no YAML, its document is the last one that was.
+    """
+
+    root: Path
+    encoding: str = "utf-16"
+    texts: dict[Path, str] = field(default_factory=dict)
+    _project: Project | None = None
+    _document_cache: dict[Path, tuple[object, Document | None]] = field(default_factory=dict)
+    _name_cache: dict[Path, tuple[Document, tuple[NameOccurrence, ...]]] = field(
+        default_factory=dict
+    )
+
+    def project(self) -> Project:
+        """Return the project as it was when this was last refreshed: its index takes time."""
+        if self._project is None:
+            self._project = Project(self.root, dict(self.texts))
+        return self._project
+
+    def refresh(self) -> None:
+        """Look anew at what files there are."""
+        self._project = None
+
+    def set_text(self, path: Path, text: str | None) -> None:
+        """Take the text of an editor for a file; None: what is on the disk counts again."""
+        path = path.resolve()
+        if text is None:
+            self.texts.pop(path, None)
+        else:
+            self.texts[path] = text
+        self.refresh()
+
+    def document(self, path: Path) -> Document | None:
+        """Return the document of a file, None for what never was one."""
+        path = path.resolve()
+        stamp: object = self.texts.get(path)
+        if stamp is None:
+            try:
+                stamp = path.stat().st_mtime_ns
+            except OSError:
+                return None
+        cached = self._document_cache.get(path, (None, None))
+        if cached[0] != stamp:
+            try:
+                cached = (stamp, self.project().read(path))
+            except SpecError:
+                cached = (stamp, cached[1])
+            self._document_cache[path] = cached
+        return cached[1]
+
+    def names(self, path: Path) -> tuple[NameOccurrence, ...]:
+        """Return the names that are written in a file; its expressions are parsed once."""
+        document = self.document(path)
+        if document is None:
+            return ()
+        known = self._name_cache.get(path)
+        if known is None or known[0] is not document:
+            known = self._name_cache[path] = document, find_names(document)
+        return known[1]
+
+    def documents(self) -> Iterator[tuple[Path, Document]]:
+        """Yield the documents of the project, not those that are shipped."""
+        found = {path.resolve() for path in (self.root / "spec").rglob("*.yaml")}
+        for path in sorted(found | set(self.texts)):
+            document = self.document(path)
+            if document is not None:
+                yield path, document
+
+    def find_file(self, name: str, referring_file: Path, is_effect: bool = False) -> Path | None:
+        """Return the file of a name or a path that a spec names."""
+        if name.endswith((".yaml", ".yml")):
+            beside = referring_file.parent / name
+            return beside.resolve() if beside.is_file() else None
+        for path in self.texts:
+            document = self.document(path)
+            if document and document.name == name and (document.kind == "effect") == is_effect:
+                return path
+        project = self.project()
+        found = (project.effect_index if is_effect else project.index).get(name, [])
+        return found[0].resolve() if len(found) == 1 else None
+
+    def is_in_project(self, path: Path) -> bool:
+        """Tell whether a file belongs to the project: what is shipped is not edited."""
+        return path.resolve().is_relative_to(self.root.resolve())
+
+
+def project_root_of(path: Path) -> Path:
+    """Return the folder of the project of a file: that whose `spec/` holds it, else its own."""
+    above = [folder.parent for folder in path.resolve().parents if folder.name == "spec"]
+    return above[-1] if above else path.resolve().parent
+
+
+def root_text(document: Document, key: str) -> str:
+    """Return the text of a key at the root of a document, empty where there is none."""
+    node = document.root.get(key)
+    return node.text if isinstance(node, ScalarNode) else ""

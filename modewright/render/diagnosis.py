@@ -1,0 +1,70 @@
+"""Show diagnosis: verdicts and fits for people at a console, fits as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
+from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
+from diagnosis.report.sentences import format_rounded, summary_lines
+
+
+def print_dossier(screen: Console, dossier: DiagnosisReport) -> None:
+    """Print a diagnosis in at most four lines."""
+    for line in summary_lines(dossier):
+        screen.print(line.replace("`", ""), highlight=False, markup=False, soft_wrap=True)
+
+
+def print_fit(screen: Console, fit: Fit) -> None:
+    """Print the parameters of a fit, what they improve, and what data cannot tell."""
+    table = Table(
+        "parameter", "declared", "fitted", "std", "unit", "of prior", "goes with", "",
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for one in fit.parameters:
+        goes = (
+            f"{one.strongest_correlation[0]} {one.strongest_correlation[1]:+.2f}"
+            if one.strongest_correlation
+            else ""
+        )
+        table.add_row(
+            one.name, f"{one.declared:.5g}", f"{one.quantity.value:.5g}",
+            format_rounded(one.quantity.std), one.quantity.unit, f"{one.prior_ratio:.0%}", goes, one.note,
+        )  # fmt: skip
+    screen.print(table)
+    for name, misfit in fit.misfits.items():
+        text = f"misfit of free simulation, {name}: {misfit.nrmse_before:.2%} as declared, "
+        screen.print(text + f"{misfit.nrmse_after:.2%} as fitted", highlight=False)
+    for (first, second), value in fit.correlations.items():
+        if abs(value) >= STRONG_CORRELATION:
+            text = f"hardly told apart: {first} and {second}, correlation {value:+.2f}"
+            screen.print(text, highlight=False)
+    if fit.undetermined:
+        names = ", ".join(fit.undetermined)
+        screen.print(f"these data do not determine {names}: the prior does", highlight=False)
+
+
+def fit_json(fit: Fit) -> dict[str, Any]:
+    """Return a fit as plain data, in SI."""
+    found = {
+        "of": fit.automaton.name,
+        "parameters": {
+            one.name: {
+                "declared": one.declared,
+                "value": one.quantity.value,
+                "std": one.quantity.std,
+                "unit": one.quantity.unit,
+                "of_prior": one.prior_ratio,
+                "note": one.note,
+            }
+            for one in fit.parameters
+        },
+        "correlations": [[*pair, value] for pair, value in fit.correlations.items()],
+        "undetermined": list(fit.undetermined),
+        "misfits": {name: vars(misfit) for name, misfit in fit.misfits.items()},
+        "inputs": dict(fit.inputs),
+    }
+    return dict(replace_non_finite(found))

@@ -1,0 +1,91 @@
+"""Show recording: what a check of recordings found, for people and for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from diagnosis.quality.channel import ChannelCheck
+from diagnosis.quality.excitation import Excitation
+from diagnosis.quality.finding import format_findings
+from diagnosis.quality.recording import RecordingCheck
+from modewright.render.run import null_nonfinite
+
+STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
+MAX_CHANNELS = 24
+"""Longest table of channels shown to a person; all of them are in --json."""
+
+
+def print_check(screen: Console, check: RecordingCheck) -> None:
+    """Print the channels, what they excite and what was found."""
+    screen.print(channel_table(check.channels))
+    _print_excitation(screen, check.excitation)
+    if not check.findings:
+        screen.print("\n[green]nothing odd was found in these data[/]")
+    else:
+        screen.print()
+    for severity, line in format_findings(check.findings):
+        screen.print(f"[{STYLES[severity]}]{severity}[/]: {escape(line)}", highlight=False)
+
+
+def channel_table(channels: Sequence[ChannelCheck]) -> Table:
+    """Return a table of channels, their values in the units of the map."""
+    heads = ("recording", "channel", "signal", "unit", "rate", "jitter", "missing", "step", "noise")
+    table = Table(*heads, "from", "to", box=None, pad_edge=False, header_style="bold")
+    for channel in channels[:MAX_CHANNELS]:
+        table.add_row(
+            escape(channel.recording),
+            escape(channel.name),
+            escape(channel.signal if channel.signal != channel.name else ""),
+            channel.unit,
+            f"{channel.rate:.4g} Hz",
+            f"{1e3 * channel.jitter:.2g} ms",
+            f"{channel.dropped:.1%}",
+            f"{channel.quantum / channel.factor:.3g}" if channel.quantum else "-",
+            f"{channel.noise / channel.factor:.2g}",
+            f"{channel.low / channel.factor:.4g}",
+            f"{channel.high / channel.factor:.4g}",
+        )
+    if len(channels) > MAX_CHANNELS:
+        table.add_row("...", f"{len(channels) - MAX_CHANNELS} more")
+    return table
+
+
+def _print_excitation(screen: Console, excitation: Excitation) -> None:
+    screen.print(f"\n{excitation.duration:.4g} s in all", highlight=False)
+    for kind, signals in (("input", excitation.inputs), ("speed", excitation.speeds)):
+        for one in signals:
+            steps = f"{len(one.steps)} steps, " if kind == "input" else ""
+            text = f"{kind} `{one.name}`: {steps}{one.sign_changes} changes of sign, "
+            text += f"above its noise up to {one.band:.3g} Hz" if one.band else "nothing but noise"
+            screen.print(escape(text), highlight=False)
+    testable = [effect.effect for effect in excitation.effects if effect.is_testable]
+    screen.print(f"\nthese data can test {', '.join(testable) or 'no effect'}", highlight=False)
+    untestable: dict[str, list[str]] = {}
+    for effect in excitation.effects:
+        if effect.lacking:
+            untestable.setdefault(" and ".join(effect.lacking), []).append(effect.effect)
+    for lacking, effects in untestable.items():
+        screen.print(f"not {', '.join(effects)}: needs {lacking}", highlight=False)
+
+
+def check_json(check: RecordingCheck) -> dict[str, Any]:
+    """Return a check as JSON, values in SI."""
+    excitation = check.excitation
+    return {
+        "usable": check.is_usable,
+        "channels": [null_nonfinite(asdict(one)) for one in check.channels],
+        "findings": [asdict(one) for one in check.findings],
+        "duration": excitation.duration,
+        "inputs": [null_nonfinite(asdict(one)) for one in excitation.inputs],
+        "speeds": [null_nonfinite(asdict(one)) for one in excitation.speeds],
+        "effects": {
+            e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excitation.effects
+        },
+        "relations": [null_nonfinite(asdict(one)) for one in check.agreements],
+    }

@@ -1,0 +1,32 @@
+"""Replay picture: measured speeds, estimated half-shaft torque and mode of a replay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.results.mode_band import ModeBand
+from engine.results.plot import Panel, PlotLine, axis_title, draw_picture
+from engine.results.trajectory import Trajectory
+from modewright.api.simulation import Replayed
+
+
+def replay_picture(replayed: Replayed, title: str, form: str = "png") -> bytes:
+    """Return the picture: one panel per unit of what was measured, one per unit of the outputs."""
+    trajectory = replayed.result.trajectory
+    panels = [*_panels(trajectory, measured=True), *_panels(trajectory, measured=False)]
+    return draw_picture([trajectory], panels, [ModeBand("mode", "mode")], title).data(form)
+
+
+def _panels(trajectory: Trajectory, *, measured: bool) -> list[Panel]:
+    by_unit: dict[str, list[str]] = {}
+    for name, values in trajectory.signals.items():
+        if values.dtype == np.float64 and name.startswith("in.") == measured:
+            by_unit.setdefault(trajectory.units[name], []).append(name)
+    word = "measured" if measured else "estimated"
+    return [
+        Panel(
+            f"{word} {axis_title(unit)}",
+            [PlotLine(name, name.removeprefix("in.")) for name in names],
+        )
+        for unit, names in by_unit.items()
+    ]

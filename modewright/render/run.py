@@ -1,0 +1,240 @@
+"""Show: results as tables for people and as JSON for machines."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from engine.results.run_comparison import ModeSequence, RunDifference
+from engine.results.trajectory import Event, Trajectory
+from lockstep.comparison import Verdict
+from modewright.api.simulation import Replayed
+from modewright.runtime.doctor import HealthCheck
+
+MAX_EVENTS = 40
+"""Most transitions shown to a person; all of them are in --json."""
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON document."""
+    print(json.dumps(value, indent=2, allow_nan=False))
+
+
+def events_table(events: Sequence[Event]) -> Table:
+    """Return a table of transitions; of many the middle is left out."""
+    table = Table(
+        escape("time [s]"), "automaton", "transition", "from", "to",
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    shown = sorted(_select_events(events))
+    for number, before in zip(shown, [-1, *shown], strict=False):
+        if number > before + 1:
+            table.add_row("...", f"{number - before - 1} more", "", "", "")
+        event = events[number]
+        change = (event.source, event.target)
+        if event.kind != "transition":
+            change = (event.source, escape(event.message))
+        table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)
+    return table
+
+
+def _select_events(events: Sequence[Event]) -> set[int]:
+    """Return which events are shown: of many the first, the last, and what is no transition."""
+    numbers = range(len(events))
+    if len(events) <= MAX_EVENTS:
+        return set(numbers)
+    others = [number for number in numbers if events[number].kind != "transition"]
+    half = MAX_EVENTS // 2
+    return {*numbers[:half], *numbers[-half:], *others[:MAX_EVENTS]}
+
+
+def verdict_table(verdicts: Iterable[Verdict]) -> Table:
+    """Return a table of lock-step verdicts."""
+    table = Table(
+        "lock-step", "ticks", "transitions", "values", "differing", "verdict",
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for verdict in verdicts:
+        word = "[green]equal, bit for bit[/]" if verdict.is_equal else "[red]DIFFERENT[/]"
+        word = word if verdict.ticks else "[yellow]not compared[/]"
+        table.add_row(
+            verdict.name,
+            str(verdict.ticks),
+            str(verdict.transitions),
+            str(verdict.values),
+            str(verdict.differing),
+            word,
+        )
+    return table
+
+
+def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
+    """Print the verdicts, and the first difference of each that has one."""
+    console.print(verdict_table(verdicts))
+    for verdict in verdicts:
+        if verdict.note:
+            console.print(f"{verdict.name}: {verdict.note}", soft_wrap=True, highlight=False)
+        if verdict.instructions:
+            count = len(verdict.instructions.steps)
+            text = f"{verdict.name}: {verdict.instructions} instructions a step, of {count} steps"
+            console.print(text, soft_wrap=True, highlight=False)
+        if verdict.first:
+            console.print(f"first difference: {verdict.first}", soft_wrap=True, highlight=False)
+
+
+def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
+    """Return what a machine wants of a run: events, last values, why it stopped."""
+    last = {
+        name: (values[-1].item() if len(values) else None)
+        for name, values in trajectory.signals.items()
+    }
+    return {
+        "name": trajectory.name,
+        "samples": len(trajectory.times),
+        "events": [vars(event) for event in trajectory.events],
+        "last": last,
+        "units": dict(trajectory.units),
+        "stopped": trajectory.stopped,
+        "faults": list(trajectory.faults),
+    }
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict as plain data."""
+    return {
+        "name": verdict.name,
+        "program": verdict.program,
+        "ticks": verdict.ticks,
+        "values": verdict.values,
+        "differing": verdict.differing,
+        "transitions": verdict.transitions,
+        "first": vars(verdict.first) if verdict.first else None,
+        "note": verdict.note,
+        "instructions": _instructions_json(verdict),
+    }
+
+
+def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
+    counts = verdict.instructions
+    if counts is None:
+        return None
+    least, most = min(counts.steps, default=0), max(counts.steps, default=0)
+    return {"steps": len(counts.steps), "mean": counts.mean, "min": least, "max": most}
+
+
+def replay_json(replayed: Replayed) -> dict[str, Any]:
+    """Return a replay as plain data."""
+    return {
+        **trajectory_json(replayed.result.trajectory),
+        "innovation_rms": dict(replayed.result.innovation_rms),
+        "comparisons": [vars(comparison) for comparison in replayed.result.comparisons],
+        "columns_left_out": list(replayed.left_out),
+        "lockstep": verdict_json(replayed.verdict) if replayed.verdict else None,
+    }
+
+
+def print_replay(console: Console, replayed: Replayed) -> None:
+    """Print transitions, innovations, comparisons and the lock-step verdict of a replay."""
+    result = replayed.result
+    times = result.trajectory.times
+    console.print(f"{len(times)} ticks from {times[0]:.6g} s to {times[-1]:.6g} s", highlight=False)
+    if result.trajectory.events:
+        console.print(events_table(result.trajectory.events))
+    else:
+        console.print("no transitions")
+    for name, rms in result.innovation_rms.items():
+        unit = result.trajectory.units[f"in.{name}"]
+        console.print(
+            f"RMS of the one-step innovation of {name}: {rms:.4g} {unit}", highlight=False
+        )
+    for found in result.comparisons:
+        text = f"{found.output} against the recording: RMS {found.rms:.4g} {found.unit}"
+        console.print(f"{text}, largest {found.largest:.4g} {found.unit}", highlight=False)
+    for name in replayed.left_out:
+        console.print(f"`{name}` of the map is not read: there is no such input", highlight=False)
+    if replayed.verdict:
+        print_verdicts(console, [replayed.verdict])
+
+
+def print_difference(console: Console, difference: RunDifference) -> None:
+    """Print the differences of two runs: signals, modes, transitions, and when they part."""
+    table = Table(
+        "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for item in difference.signals:
+        first = "" if item.first is None else f"[red]{item.first:.9g}[/]"
+        at = f"{item.at:.6g}" if item.largest else ""
+        table.add_row(item.name, item.unit, f"{item.rms:.4g}", f"{item.largest:.4g}", at, first)
+    console.print(table)
+    for sequence in difference.sequences:
+        console.print(_sequence_line(sequence), highlight=False)
+    for window in difference.windows[:MAX_EVENTS]:
+        span = f"{window.start:.9g} s to {window.end:.9g} s"
+        text = f"{window.signal}: {span}: {window.a} in A, {window.b} in B"
+        console.print(text, highlight=False, soft_wrap=True)
+    if len(difference.windows) > MAX_EVENTS:
+        console.print(f"{len(difference.windows) - MAX_EVENTS} more windows of disagreement")
+    for names, letter in ((difference.only_a, "A"), (difference.only_b, "B")):
+        if names:
+            console.print(f"only in {letter}: {', '.join(names)}", highlight=False, soft_wrap=True)
+    if difference.uncovered:
+        console.print(f"{difference.uncovered:.6g} s are in one of the runs only", highlight=False)
+    if difference.first:
+        console.print(
+            f"they part at {difference.first[0]:.9g} s: {difference.first[1]}", highlight=False
+        )
+    console.print(
+        f"{difference.samples} samples: {'within' if difference.is_within else 'NOT within'} tolerance"
+    )
+
+
+def difference_json(difference: RunDifference) -> dict[str, Any]:
+    """Return the differences of two runs as plain data; what is infinite is null."""
+    return {
+        "within": difference.is_within,
+        "span": list(difference.span),
+        "samples": difference.samples,
+        "signals": [null_nonfinite(vars(item)) for item in difference.signals],
+        "mode_windows": [vars(window) for window in difference.windows],
+        "transitions": [vars(sequence) for sequence in difference.sequences],
+        "only_a": list(difference.only_a),
+        "only_b": list(difference.only_b),
+        "uncovered": difference.uncovered,
+        "first": list(difference.first) if difference.first else None,
+    }
+
+
+def _sequence_line(sequence: ModeSequence) -> str:
+    counts = f"{sequence.count_a} transitions in A, {sequence.count_b} in B"
+    same = f"the same, at most {sequence.apart:.3g} s apart"
+    order_text = (
+        same if sequence.parted is None else f"not the same from number {sequence.parted + 1} on"
+    )
+    return f"{sequence.instance or 'automaton'}: {counts}, {order_text}"
+
+
+def null_nonfinite(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values for JSON, which has neither infinities nor NaN: they are null."""
+    return {name: _null_nonfinite_value(value) for name, value in values.items()}
+
+
+def _null_nonfinite_value(value: Any) -> Any:
+    if isinstance(value, tuple | list):
+        return [_null_nonfinite_value(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_health_check(console: Console, check: HealthCheck) -> None:
+    """Print one finding of the doctor, and what would help."""
+    colour = {"ok": "green", "absent": "yellow", "fault": "red"}[check.verdict]
+    text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.told)}"
+    console.print(text, highlight=False, soft_wrap=True)
+    if check.help:
+        console.print(f"       help: {escape(check.help)}", highlight=False, soft_wrap=True)

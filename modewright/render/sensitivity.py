@@ -1,0 +1,96 @@
+"""Show sensitivity: indices as a table and as plain data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from language.text.sanitise import escape_invisible
+from modewright.render.run import null_nonfinite
+from modewright.render.study import format_number, interval_text, progress_text
+from sweep.analysis.sensitivity import MIN_COMPLETE, Index, Sensitivity
+
+DESIGN_UNITS = {"saltelli": "blocks", "morris": "paths"}
+
+
+def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
+    """Print the indices by group and measure, the largest first."""
+    text = f"{sensitivity.study}: {sensitivity.method}; {progress_text(sensitivity.counts, sensitivity.expected)}"
+    console.print(escape_invisible(text), highlight=False, markup=False)
+    if sum(sensitivity.counts.values()) < sensitivity.expected:
+        text = "unfinished: the same `modewright sweep STUDY --out DIR` goes on"
+        console.print(text, highlight=False, markup=False)
+    if not sensitivity.indices:
+        return
+    first = sensitivity.indices[0]
+    sure = f"{sensitivity.confidence * 100:g} %"
+    values = [head for name in first.values for head in (name, sure)]
+    table = Table(
+        *first.group, "measure", "of", *values, DESIGN_UNITS[sensitivity.method], box=None, pad_edge=False,
+        header_style="bold",
+    )  # fmt: skip
+    for one in sort_indices(sensitivity):
+        groups = (escape(escape_invisible(name)) for name in one.group.values())
+        table.add_row(*groups, one.measure, escape(one.name), *_cells(one))
+    console.print(table)
+    for text in incomplete_index_notes(sensitivity):
+        console.print(text, highlight=False, markup=False)
+
+
+def incomplete_index_notes(sensitivity: Sensitivity) -> list[str]:
+    """Return a note where some indices are not told, for want of complete blocks or paths."""
+    few = sum(one.used < MIN_COMPLETE for one in sensitivity.indices)
+    whole = DESIGN_UNITS[sensitivity.method]
+    hint = f"fewer than {MIN_COMPLETE} {whole} are complete (every point done and with the measure)"
+    return [f"{few} of {len(sensitivity.indices)} indices are not told (-): {hint}"] if few else []
+
+
+def sort_indices(sensitivity: Sensitivity) -> list[Index]:
+    """Return the indices with the largest of each measure first."""
+    key = "total" if sensitivity.method == "saltelli" else "mu_star"
+    places: dict[object, int] = {}
+    for one in sensitivity.indices:
+        places.setdefault((*one.group.values(), one.measure), len(places))
+    return sorted(
+        sensitivity.indices,
+        key=lambda one: (
+            places[(*one.group.values(), one.measure)],
+            math.inf if math.isnan(one.values[key]) else -one.values[key],
+        ),
+    )
+
+
+def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
+    """Return the indices as plain data; what is not there is null."""
+    return {
+        "study": sensitivity.study,
+        "digest": sensitivity.digest,
+        "expected": sensitivity.expected,
+        "counts": dict(sensitivity.counts),
+        "method": sensitivity.method,
+        "fewest": MIN_COMPLETE,
+        "confidence": sensitivity.confidence,
+        "indices": [
+            {**asdict(one), "values": null_nonfinite(one.values), "intervals": _intervals_json(one)}
+            for one in sensitivity.indices
+        ],
+    }
+
+
+def _intervals_json(index: Index) -> dict[str, Any]:
+    return {
+        name: list(null_nonfinite({"from": pair[0], "to": pair[1]}).values()) if pair else None
+        for name, pair in index.intervals.items()
+    }
+
+
+def _cells(index: Index) -> list[str]:
+    found = []
+    for name, value in index.values.items():
+        found += [format_number(value), interval_text(index.intervals[name])]
+    return [*found, f"{index.used} of {index.count}"]

@@ -1,0 +1,1 @@
+"""The running process: threads, garbage collection, output files, diagnosis of the installation."""
