@@ -54,32 +54,32 @@ test long-test target-test: export PYTHONHASHSEED := 0
 test long-test target-test: export PYTHONUTF8 := 1
 test long-test target-test: export TZ := UTC
 test: setup ## run the tests but the long ones and those of the target, the same way everywhere
-	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target -m "not long" $(ARGS)
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m "not long" $(ARGS)
 
 long-test: setup ## run the long ones: proofs, fuzzing, methods of integration
-	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target -m long $(ARGS)
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m long $(ARGS)
 
 target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, and prove contracts
-	$(BIN)/pytest -n 2 --dist worksteal -q tests/target $(ARGS)
+	$(BIN)/pytest -n 2 --dist worksteal -q tests/codegen/target $(ARGS)
 
 prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
-	$(BIN)/python tests/verify/proofs.py
+	$(BIN)/python tests/validation/figures/proofs.py
 
 verify: setup ## measure every figure of docs/evidence; with recordings: ARGS="--recordings DIR"
-	$(BIN)/python tests/verify/every.py $(ARGS)
+	$(BIN)/python tests/validation/figures/every.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
-	$(BIN)/python tests/verify/every.py --part
-	$(BIN)/python -m tests.proof.part
+	$(BIN)/python tests/validation/figures/every.py --part
+	$(BIN)/python -m tests.validation.blind_study.part
 
 prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
-	$(BIN)/python -m tests.proof $(ARGS)
+	$(BIN)/python -m tests.validation.blind_study $(ARGS)
 
 paper: setup ## reproduce the reference paper from specs: docs/paper, build/paper.json (minutes; resumable)
-	$(BIN)/python -m tests.paper $(ARGS)
+	$(BIN)/python -m tests.validation.paper $(ARGS)
 
 bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
-	$(BIN)/python tests/bench/run.py $(ARGS)
+	$(BIN)/python tests/benchmark/run.py $(ARGS)
 
 check: check-lock check-format check-lint check-types ## run all checks
 check: check-floors check-specs check-tests check-generated

@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from language.loading import load
 from modewright.runtime.gc_pause import raise_gc_threshold
-from tests.once import memoise_lowering, memoise_shipped
+from tests.support.memoised_specs import memoise_lowering, memoise_shipped
 
 load.program_of = memoise_lowering(load.program_of)  # before it is imported by name
 from modewright.api import simulation as api  # noqa: E402

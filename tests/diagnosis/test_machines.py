@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
-from tests.diagnosis.machines import Figure, diagnose_damper, diagnose_emps, diagnose_leaf
+from tests.diagnosis.real_machines import Figure, diagnose_damper, diagnose_emps, diagnose_leaf
 
 
 @pytest.mark.recordings

@@ -11,7 +11,7 @@ import pytest
 from modewright.api.traces import KeyTraceReport, trace_keys
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
-from tests.language.making import ROOT
+from tests.language.build import ROOT
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from engine.simulation.simulate import simulate
 from modewright.api import spec_tests as tests
 from modewright.cli.app import app
 from modewright.render import spec_tests as show_tests
-from tests.expectation.latching import write_project
+from tests.expectation.latch_project import write_project
 
 SHIPPED = Path(__file__).parent.parent.parent
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.lockstep.chance.healthy import ReferenceRun, run_reference_specs
+from tests.lockstep.random_specs.reference_runs import ReferenceRun, run_reference_specs
 
 COUNT = 12
 TICKS = 200

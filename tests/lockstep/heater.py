@@ -1,4 +1,4 @@
-"""The small automaton of tests/codegen/golden: its Program, and a tape of four heatings."""
+"""The small automaton of tests/codegen/emit/golden: its Program, and a tape of four heatings."""
 
 from __future__ import annotations
 

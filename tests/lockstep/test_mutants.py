@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.lockstep.chance.generator_mutants import GENERATOR
-from tests.lockstep.chance.healthy import ReferenceRun, find_killing_spec
-from tests.lockstep.chance.mutant import Mutant
-from tests.lockstep.chance.mutants import INTERPRETER
 from tests.lockstep.conftest import TICKS
+from tests.lockstep.random_specs.generator_mutants import GENERATOR
+from tests.lockstep.random_specs.mutant import Mutant
+from tests.lockstep.random_specs.mutants import INTERPRETER
+from tests.lockstep.random_specs.reference_runs import ReferenceRun, find_killing_spec
 
 MUTANTS = (*INTERPRETER, *GENERATOR)
 

@@ -10,13 +10,13 @@ from hypothesis import HealthCheck, given, note, settings, strategies as st
 
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.comparison import compare
-from tests.lockstep.chance.batch import FLAGS
-from tests.lockstep.chance.healthy import ReferenceRun
-from tests.lockstep.chance.kinds import random_spec
-from tests.lockstep.chance.quality import Quality, measure_quality
-from tests.lockstep.chance.running import record_ticks
-from tests.lockstep.chance.spec import program
 from tests.lockstep.conftest import TICKS
+from tests.lockstep.random_specs.batch import FLAGS
+from tests.lockstep.random_specs.quality import Quality, measure_quality
+from tests.lockstep.random_specs.reference_runs import ReferenceRun
+from tests.lockstep.random_specs.running import record_ticks
+from tests.lockstep.random_specs.spec import program
+from tests.lockstep.random_specs.spec_kinds import random_spec
 
 SHARE = 25
 """An example costs two compilations."""

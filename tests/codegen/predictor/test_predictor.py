@@ -1,0 +1,73 @@
+"""Predictor: without a gain it moves as the interpreter does, bit for bit, and says less."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from codegen.emit.c_module import restrict_to_step
+from codegen.predictor.predictor import Predictor, build_predictor, columns_of, slice_to_outputs
+from engine.interpreter.interpreter import Interpreter
+from language.ir.program import Program
+from tests.language.build import program
+
+TEXT = """language: 1
+automaton: slider
+method: rk4
+step: 10 ms
+numbers: {number}
+parameters: {{c: {{value: 3, tunable: true, range: [0, 9]}}, only_shown: {{{only}}}}}
+inputs: {{u: {{unit: 1/s, range: [-99, 99]}}}}
+states: {{x: {{initial: 1, range: [-99, 99]}}}}
+equations:
+  drag: c * tanh(x * 9)
+  shown: only_shown * tanh(drag)
+flow: {{x: 1 * der(x) = u - drag * (1 / 1 s)}}
+initial: low
+modes:
+  low: {{transitions: {{high: {{when: x > 2}}}}}}
+  high: {{transitions: {{low: {{when: x < -2, reset: {{x: x + 0.5}}}}}}}}
+outputs: [x]
+"""
+FIXED = "value: 2"
+
+
+def slider(number: str = "float64", only: str = FIXED) -> Program:
+    return program(TEXT.format(number=number, only=only))
+
+
+@pytest.mark.parametrize("number", ["float64", "float32"])
+def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
+    """Through both modes, and where tanh is 1: x * 9 > 20."""
+    made = slider(number)
+    inputs = np.repeat([0.0, 9.0, -20.0, 2.0, 30.0], 40)[:, np.newaxis]
+    columns = columns_of(made, ("x",))
+    no_gain = np.zeros((2, 1, 1))
+    page = np.array(list(columns.page.values()))
+    with build_predictor(made, columns) as library:
+        run = Predictor(columns, library).predict(
+            page, inputs, np.zeros((200, 1)), no_gain[:0], no_gain, 1, is_first_order_hold=False
+        )
+    theirs = Interpreter(made)
+    found = []
+    for (value,) in inputs:
+        theirs.set("input.u", value)
+        theirs.run("step")
+        found.append(theirs.get("state.x"))
+    assert run.completed == 200
+    assert set(run.modes) == {0, 1}
+    assert max(found) * 9 > 20 and min(found) < 0
+    assert run.states[:, 0].tolist() == found
+
+
+def test_what_no_output_reads_is_not_computed() -> None:
+    made = slider()
+    assert "shown" in str(restrict_to_step(made).blocks)
+    assert "shown" not in str(slice_to_outputs(made).blocks)
+    assert "tanh" in str(slice_to_outputs(made).blocks)
+
+
+def test_parameters_stay_though_nothing_that_is_left_reads_them() -> None:
+    """The page of a fit has a column for each."""
+    made = slider(only="value: 2, tunable: true, range: [0, 9]")
+    assert "only_shown" in columns_of(slice_to_outputs(made), ("x",)).page

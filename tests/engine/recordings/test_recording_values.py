@@ -1,0 +1,171 @@
+"""Values and time stamps of a recording: what is refused, and files that are not what they seem."""
+
+from __future__ import annotations
+
+import gzip
+import math
+
+import pytest
+from hypothesis import given, strategies as st
+
+from engine.recordings.recording import read_recording
+from language.text.diagnostic import SpecError
+from tests.engine.written_recordings import GOOD, HEAD, RenderProblems, render_problems, write_map
+
+
+class TestAValue:
+    @pytest.mark.parametrize("cell", ["NaN", "nan", "inf", "-Infinity", "1e999", "12x"])
+    def test_that_is_not_a_finite_number(self, told: RenderProblems, cell: str) -> None:
+        assert told(HEAD + f"0.01,92.5,2639\n0.02,{cell},2640\n") == (
+            f"drive.csv:3:6: error: `{cell}` in column `torque_Nm` is not a finite number\n"
+            f"  0.02,{cell},2640\n"
+            f"       {'^' * len(cell)}"
+        )
+
+    def test_that_is_text_is_refused_even_where_blanks_are_skipped(
+        self, told: RenderProblems
+    ) -> None:
+        assert told(HEAD + "0.01,92.5,fast\n") == (
+            "drive.csv:2:11: error: `fast` in column `speed_rpm` is not a finite number\n"
+            "  0.01,92.5,fast\n"
+            "            ^^^^"
+        )
+
+    def test_that_is_blank_is_refused_by_default(self, told: RenderProblems) -> None:
+        assert told(HEAD + "0.01,92.5,2639\n0.02,,2640\n") == (
+            "drive.csv:3:6: error: column `torque_Nm` has no value here\n"
+            "  0.02,,2640\n"
+            "       ^\n"
+            "help: `blank: skip` in the map leaves empty cells out"
+        )
+
+    def test_that_a_short_row_lacks_is_refused(self, told: RenderProblems) -> None:
+        text = told(HEAD + "0.01,92.5,2639\n0.02\n")
+        assert text.splitlines()[0] == (
+            "drive.csv:3:1: error: this row has 1 cells, the head line has 3"
+        )
+
+    def test_that_is_never_there_is_refused_even_where_blanks_are_skipped(
+        self, told: RenderProblems
+    ) -> None:
+        text = told(HEAD + "0.01,92.5,\n0.02,91,\n")
+        assert text.splitlines()[0] == "drive.csv:1:1: error: column `speed_rpm` has no values"
+
+    def test_of_a_column_read_twice_is_told_once(self, told: RenderProblems) -> None:
+        columns = "  a: {to: T_em, unit: N*m}\n  b: {column: a, to: T_req, unit: N*m}\n"
+        assert told("t_s,a\n1,x\n", columns).count("error") == 1
+
+    def test_after_many_bad_ones_is_not_looked_at(self, told: RenderProblems) -> None:
+        text = told(HEAD + "".join(f"{row},x,1\n" for row in range(1, 1000)))
+        assert text.count("error") == 20
+
+    def test_that_is_bad_is_told_together_with_all_others_in_order(
+        self, told: RenderProblems
+    ) -> None:
+        text = told(HEAD + "1,x,1\n2,5,y\n2,6,7\n4,z,8\n")
+        places = [line.split(": ")[0] for line in text.splitlines() if "error" in line]
+        assert places == ["drive.csv:2:3", "drive.csv:3:5", "drive.csv:4:1", "drive.csv:5:3"]
+
+
+class TestATimeStamp:
+    def test_below_the_one_before(self, told: RenderProblems) -> None:
+        assert told(HEAD + "0.02,1,1\n0.01,1,1\n") == (
+            "drive.csv:3:1: error: the time stamp 0.01 is not above the one before, 0.02\n"
+            "  0.01,1,1\n"
+            "  ^^^^\n"
+            "help: sort the recording, and remove repeated rows"
+        )
+
+    def test_that_is_repeated(self, told: RenderProblems) -> None:
+        assert told(HEAD + "0.01,1,1\n0.010,1,1\n") == (
+            "drive.csv:3:1: error: the time stamp 0.010 is not above the one before, 0.01\n"
+            "  0.010,1,1\n"
+            "  ^^^^^\n"
+            "help: sort the recording, and remove repeated rows"
+        )
+
+    def test_that_is_missing(self, told: RenderProblems) -> None:
+        assert told(HEAD + "0.01,1,1\n,1,1\n0.03,1,1\n") == (
+            "drive.csv:3:1: error: no time stamp\n  ,1,1\n  ^"
+        )
+
+    @pytest.mark.parametrize("cell", ["NaN", "inf", "12:30:01", "x", "1_0", "0x1F", "1e15"])
+    def test_that_is_not_a_number(self, told: RenderProblems, cell: str) -> None:
+        assert told(HEAD + f"0.01,1,1\n{cell},1,1\n") == (
+            f"drive.csv:3:1: error: the time stamp `{cell}` is not a number\n"
+            f"  {cell},1,1\n"
+            f"  {'^' * len(cell)}"
+        )
+
+    def test_of_a_channel_of_its_own_is_checked_too(self, told: RenderProblems) -> None:
+        columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"
+        text = told("t_s,w,t_w\n0.1,5,0.095\n0.2,,\n0.3,6,0.095\n", columns)
+        assert text.splitlines()[0] == (
+            "drive.csv:4:7: error: the time stamp 0.095 is not above the one before, 0.095"
+        )
+
+
+@given(
+    st.one_of(
+        st.binary(max_size=80), st.text("t_s,a\n\r 0123456789.+-\"'xn\0é\u2028").map(str.encode)
+    )
+)
+def test_any_bytes_are_a_recording_or_a_problem(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    path = folder / "any.csv"
+    path.write_bytes(b"t_s,a\n0,1\n" + data)
+    mapping = write_map(folder, "  a: {to: a, unit: A, blank: skip}\n")
+    try:
+        channel = read_recording(path, mapping, ["a"]).channels["a"]
+    except SpecError as error:
+        assert render_problems(error.problems)
+    else:
+        assert len(channel.times) == len(channel.values) > 0
+        assert list(channel.times) == sorted(set(channel.times))
+        assert all(math.isfinite(value) for value in channel.values)
+
+
+class TestAFileThatIsNotWhatItSeems:
+    """Bad files that a plain reader takes without a word."""
+
+    def test_digits_with_an_underscore(self, told: RenderProblems) -> None:
+        assert "`1_0` in column `torque_Nm`" in told(HEAD + "0.01,1_0,1\n")
+
+    @pytest.mark.parametrize(
+        ("columns", "text"),
+        [
+            ("  a: {to: a, unit: kN}\n", "t_s,a\n1,1e308\n"),
+            ("  c: {mean: [a, b], to: a, unit: A}\n", "t_s,a,b\n1,1.7e308,1.7e308\n"),
+            ("  a: {to: a, unit: A, scale: 1000}\n", "t_s,a\n1,1e308\n"),
+        ],
+        ids=["unit", "mean", "scale"],
+    )
+    def test_a_value_that_is_infinite_in_SI(
+        self, told: RenderProblems, columns: str, text: str
+    ) -> None:
+        assert "drive.csv:2:" in told(text, columns)
+
+    def test_a_quote_that_is_not_closed(self, told: RenderProblems) -> None:
+        assert "drive.csv:2:" in told(HEAD + '0.01,"1,1\n' + "0.02,1.5,1\n" * 20_000)
+
+    def test_a_row_longer_than_the_head_line_as_decimal_commas_make_it(
+        self, told: RenderProblems
+    ) -> None:
+        assert "drive.csv:2:" in told("t_s,torque_Nm,speed_rpm\n0,01,92,5,2639\n1,02,91,0,2640\n")
+
+    def test_a_value_without_its_own_time_stamp(self, told: RenderProblems) -> None:
+        columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"
+        assert "drive.csv:2:" in told("t_s,w,t_w\n0.1,5,\n0.2,6,0.195\n", columns)
+
+    def test_a_packed_file_that_is_huge_unpacked(
+        self, told: RenderProblems, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("engine.recordings.csv_reader.MAX_BYTES", 1000)
+        packed = gzip.compress(GOOD.encode() + b"\n" * 50_000, mtime=0)
+        assert len(packed) < 1000
+        assert "larger than 1000 bytes" in told(packed, name="drive.csv.gz")
+
+    def test_a_map_with_sign_0(self, told: RenderProblems) -> None:
+        assert "sign" in told("t_s,a\n1,5\n", "  a: {to: a, unit: A, sign: 0}\n")

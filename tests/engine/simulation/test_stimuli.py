@@ -1,0 +1,116 @@
+"""Stimulus: inputs of a scenario that come from a recording."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import modewright as mw
+from tests.language.build import problem_lines, project_of
+
+CART = """language: 1
+automaton: cart
+step: 7 ms
+inputs: {u: {unit: m/s}, hill: {default: 0}}
+states: {x: {unit: m, initial: 0 m}, top: {unit: m/s, initial: u}}
+flow: {x: der(x) = u, top: der(top) = 0}
+initial: only
+modes: {only: {number: 0}}
+outputs: [x, top]
+"""
+RUN = """language: 1
+scenario: run
+of: cart
+horizon: {horizon}
+recording:
+  file: drive.csv
+  time: {{column: t, unit: ms}}
+  columns:
+    speed: {{to: u, unit: km/h, hold: {hold}}}
+    way: {{compare: x, unit: m}}
+initial: {{x: column(way)}}
+record: {{every: 0.25 s, signals: [x, u, top]}}
+"""
+DRIVE = "t,speed,way\n1000,3.6,5\n2000,10.8,6\n2500,10.8,7\n"
+"""1 m/s at 1 s, 3 m/s at 2 s and at 2.5 s."""
+
+
+def run(folder: Path, hold: str, horizon: str = "recording", drive: str = DRIVE) -> mw.Trajectory:
+    project_of(folder, cart=CART, run=RUN.format(hold=hold, horizon=horizon))
+    (folder / "spec" / "drive.csv").write_text(drive)
+    return mw.simulate("cart", "run", root=folder)
+
+
+def test_a_recording_is_an_input_that_is_linear_between_its_stamps(tmp_path: Path) -> None:
+    found = run(tmp_path, "linear")
+    assert found.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
+    assert found.signals["u"] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0])
+    assert found.signals["cart.x"][[0, 4, 6]] == pytest.approx([5.0, 7.0, 8.5], abs=1e-13)
+    assert found.signals["cart.top"][0] == 1.0
+
+
+def test_a_recording_is_an_input_that_is_held(tmp_path: Path) -> None:
+    found = run(tmp_path, "previous")
+    assert found.signals["u"] == pytest.approx([1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
+    assert found.signals["cart.x"][[4, 6]] == pytest.approx([6.0, 7.5], abs=1e-13)
+
+
+def test_after_the_end_of_a_recording_its_last_value_is_held(tmp_path: Path) -> None:
+    found = run(tmp_path, "linear", "2 s")
+    assert found.signals["u"][-1] == pytest.approx(3.0)
+    assert found.signals["cart.x"][-1] == pytest.approx(10.0, abs=1e-13)
+
+
+def test_what_is_wrong_with_a_recording_is_told_with_its_place(tmp_path: Path) -> None:
+    broken = DRIVE.replace("10.8,6", "fast,6")
+    (line,) = problem_lines(lambda: run(tmp_path, "linear", drive=broken))
+    assert line == "3:6 `fast` in column `speed` is not a finite number"
+    (tmp_path / "spec" / "drive.csv").unlink()
+    (line,) = problem_lines(lambda: mw.simulate("cart", "run", root=tmp_path))
+    assert "the recording cannot be read" in line
+
+
+def test_a_recording_is_found_in_the_folder_of_recordings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = run(tmp_path, "linear")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / "spec" / "drive.csv").rename(elsewhere / "drive.csv")
+    monkeypatch.setenv("MODEWRIGHT_RECORDINGS", str(elsewhere))
+    assert mw.simulate("cart", "run", root=tmp_path).csv() == found.csv()
+
+
+@pytest.mark.recordings
+def test_the_motor_of_a_leaf_follows_its_recorded_wheels(
+    recordings: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between wheel and motor are the ratio, a tyre that wears, and stamps of two CAN frames."""
+    monkeypatch.setenv("MODEWRIGHT_RECORDINGS", str(recordings))
+    found = mw.simulate("leaf_motor_side", "leaf_drive_eco")
+    assert found.stopped is None and found.times[-1] > 30.0
+    speed = found.signals["leaf_motor_side.w_em"]
+    with (recordings / "nissan_leaf" / "drive_eco.csv").open() as file:
+        table = list(csv.DictReader(file))
+    rows = [(float(row["t_s"]), float(row["em_speed_rpm"])) for row in table]
+    wheel = next(float(row["t_wheel_s"]) for row in table if row["wheel_a_kmh"])
+    start = max(rows[0][0], wheel)
+    measured = np.interp(found.times + start, *np.array(rows).T) * 2 * np.pi / 60
+    moving = measured > 100.0
+    assert moving.sum() > 10_000
+    off = np.abs(speed[moving] / measured[moving] - 1.0)
+    assert np.median(off) < 0.01 and off.max() < 0.05, (np.median(off), off.max())
+
+
+def test_columns_of_a_recording_fit_the_inputs(tmp_path: Path) -> None:
+    text = RUN.format(hold="linear", horizon="recording")
+    wrong = text.replace("unit: km/h", "unit: km").replace("column(way)", "column(wey)")
+    project_of(tmp_path, cart=CART, run=wrong)
+    found = [f"{p.label} {p.help}" for p in mw.check("run", tmp_path)]
+    assert found == [
+        "`wey` is not a column of the scenario's recording did you mean `way`?",
+        "column `speed` is in `m`, input `u` is in `m/s` ",
+    ]

@@ -1,0 +1,139 @@
+"""Recording: the command that looks at recordings, its table, JSON, picture and exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modewright.cli.app import app
+from modewright.cli.common.console import console
+from modewright.cli.common.exit_codes import run_with_exit_code
+from tests.diagnosis.small_driveline import MAP, SPEC, Values, tip_in
+
+
+def write(path: Path, spoil: float = 1.0) -> Path:
+    times, values = tip_in()
+    columns = {"t_s": times, **values, "motor": values["motor"] * spoil}
+    return table(path, columns)
+
+
+def table(path: Path, columns: dict[str, Values]) -> Path:
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
+    console.cache_clear()
+    (tmp_path / "spec").mkdir()
+    named = SPEC.replace("step: 5 ms", "step: 5 ms\nrecording_map: bench")
+    (tmp_path / "spec" / "small.yaml").write_text(named, "utf-8")
+    (tmp_path / "spec" / "bench.yaml").write_text(MAP, "utf-8")
+    write(tmp_path / "drive.csv")
+    write(tmp_path / "spoiled.csv", 60 / (2 * np.pi))
+    return tmp_path
+
+
+def run(*arguments: str) -> int:
+    return run_with_exit_code(
+        partial(app, ["recording", "check", *arguments], standalone_mode=False)
+    )
+
+
+def test_a_good_recording_with_the_map_of_the_spec(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("drive.csv", "--spec", "small_driveline", "--plot", "drive.png") == 0
+    text = capsys.readouterr().out
+    assert "drive.csv  torque   T_em" in text and "100 Hz" in text
+    assert "nothing odd was found in these data" in text
+    assert (project / "drive.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_wrong_unit_is_an_exit_code_and_a_line(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("spoiled.csv", "--spec", "small_driveline") == 1
+    assert "rpm taken for rad/s?" in capsys.readouterr().out
+    assert run("spoiled.csv", "--map", "bench") == 0  # without a model nobody can know
+
+
+def test_json_has_the_channels_the_findings_and_the_effects(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("spoiled.csv", "--spec", "small_driveline", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["usable"] is False
+    assert [one["kind"] for one in found["findings"]] == ["unit"]
+    assert found["channels"][0]["rate"] == pytest.approx(100.0)
+    assert found["effects"]["backlash"] == {"testable": True, "needs": []}
+
+
+def test_without_a_map_columns_are_guessed_by_their_names(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    columns = {"t_ms": 1e3 * times, "torque_Nm": values["torque"], "motor_rpm": values["motor"]}
+    table(project / "plain.csv", columns)
+    text = (project / "plain.csv").read_text().splitlines()
+    text = [text[0] + ",note", *(line + ",fast" for line in text[1:])]
+    (project / "plain.csv").write_text("\n".join(text) + "\n", "utf-8")
+    assert run("plain.csv", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [(c["name"], c["unit"]) for c in found["channels"]] == [
+        ("torque_Nm", "N*m"),
+        ("motor_rpm", "rpm"),
+    ]
+    assert found["channels"][0]["rate"] == pytest.approx(100.0)
+    assert [one["name"] for one in found["inputs"]] == ["torque_Nm"]
+
+
+def test_what_cannot_be_read_is_told_with_its_place(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (project / "text.csv").write_text("who,what\nhe,that\n", "utf-8")
+    assert run("text.csv") == 1
+    assert "text.csv:1:1: error: no column of the recording looks like time" in (
+        capsys.readouterr().err
+    )
+    spec = project / "spec" / "small.yaml"
+    spec.write_text(spec.read_text().replace("recording_map: bench\n", ""))
+    assert run("drive.csv", "--spec", "small_driveline") == 1
+    assert "`small_driveline` names no map of recordings" in capsys.readouterr().err
+
+
+def test_a_column_that_is_not_there_is_told_with_the_nearest_name(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head, rest = (project / "drive.csv").read_text("utf-8").split("\n", 1)
+    misspelt = head.replace("torque", "Torque").replace("wheel", "motor")
+    (project / "odd.csv").write_text(f"{misspelt}\n{rest}", "utf-8")
+    assert run("odd.csv", "--spec", "small_driveline") == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "there is no column `torque`, which map `bench` reads; did you mean `Torque`?" in text
+    assert "error: there are two columns `motor` (odd.csv)" in text
+    assert "error: there is no column `wheel`" in text
+
+
+def test_a_pipe_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("pipe.csv", "pipe.dat"):  # of .dat the first bytes are looked at
+        os.mkfifo(project / name)
+        assert run(name, "--map", "bench") == 1
+        told = capsys.readouterr().err
+        assert f"{name}:1:1: error: the recording cannot be read: it is a pipe or a device" in told
+
+
+def test_a_loop_of_links_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "loop.csv").symlink_to("loop.csv")
+    for more in (("--map", "bench"), ("--spec", "small_driveline")):
+        assert run("loop.csv", *more) == 1
+        assert "loop.csv:1:1: error: the recording cannot be read" in capsys.readouterr().err

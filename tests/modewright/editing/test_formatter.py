@@ -1,0 +1,138 @@
+"""Format: layout follows rules, and nothing else of a spec changes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from language.overlays.expand_document import parse_document
+from language.text.diagnostic import SpecError
+from language.text.project_files import source_of
+from modewright.cli.app import app
+from modewright.editing.formatter import format_text
+from modewright.editing.tokenised_text import tokenise
+from modewright.runtime.output_files import OutputError
+from tests.modewright.editing.corpus import ROOT, to_plain_data, valid_documents
+
+HERE = Path(__file__).parent
+UNTIDY, TIDY = (HERE / "untidy.yaml").read_text(), (HERE / "tidy.yaml").read_text()
+
+
+def test_an_untidy_spec_is_laid_out_by_the_rules() -> None:
+    assert format_text(UNTIDY) == TIDY
+
+
+def test_a_column_stays_where_its_author_put_it() -> None:
+    head = "language: 1\nautomaton: a\nparameters:\n"
+    kept = head + "  a:      {value: 1}\n  b_long: {value: 2}\n  c_longer: {value: 3}\n"
+    wide = head + "  a:        {value: 1}\n  b_long:   {value: 2}\n"
+    half = head + "  a:        {value: 1}\n  b:        {value: 2}\n  b_long: {value: 3}\n"
+    assert [format_text(kept), format_text(wide)] == [kept, wide]
+    assert format_text(half) == half.replace(":        {", ":      {")
+
+
+def test_every_spec_here_says_the_same_and_a_second_pass_changes_nothing() -> None:
+    for path, document in valid_documents(("spec", "tests/data")):
+        text = path.read_text("utf-8-sig")
+        made = format_text(text, str(path))
+        again = parse_document(source_of(path, made), made)
+        assert to_plain_data(again.root) == to_plain_data(document.root), path
+        assert _comments(made) == _comments(text), path
+        assert format_text(made) == made, path
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_spec_that_was_shaken_says_the_same_and_is_laid_out_once_and_for_all(seed: int) -> None:
+    chance = random.Random(seed)
+    path = ROOT / "spec" / "ev_driveline" / f"{('estimator', 'plant', 'hko')[seed % 3]}.yaml"
+    text = shaken(path.read_text("utf-8"), chance)
+    made = format_text(text)
+    before, after = (parse_document(source_of(path, each), each) for each in (text, made))
+    assert to_plain_data(after.root) == to_plain_data(before.root)
+    assert _comments(made) == _comments(text)
+    assert format_text(made) == made
+
+
+def shaken(text: str, chance: random.Random) -> str:
+    """Return a text with other indentation, blanks and blank lines, and the same meaning."""
+    width = chance.choice((1, 2, 3, 5))
+    lines = []
+    for line in text.splitlines():
+        bare = line.lstrip(" ")
+        content, sign, comment = bare.partition(" #")
+        if '"' not in content:
+            content = content.replace(", ", chance.choice((", ", ",   ")))
+            content = content.replace("{", chance.choice(("{", "{ ")))
+        depth = (len(line) - len(bare)) // 2
+        lines.append(" " * (depth * width) + content + " " * chance.randint(0, 3) + sign + comment)
+        lines += [""] * chance.choice((0, 0, 0, 2))
+    return "\n".join(lines)
+
+
+def _comments(text: str) -> list[str]:
+    page = tokenise(text)
+    return [page.lines[line][column:].rstrip() for line, column in page.comment_columns.items()]
+
+
+def test_a_text_of_several_lines_is_left_as_it_is() -> None:
+    text = "about: |\n     a  # no comment\n\n\n       b   \nreq: 'x\n\n\n  y'\n"
+    assert format_text(text) == text
+
+
+def test_what_is_no_yaml_is_refused() -> None:
+    with pytest.raises(SpecError):
+        format_text("a: {b: 1")
+
+
+def test_check_writes_nothing_and_says_what_would_change(tmp_path: Path) -> None:
+    untidy, tidy = tmp_path / "a.yaml", tmp_path / "b.yaml"
+    untidy.write_text(UNTIDY)
+    tidy.write_text(TIDY)
+    told = CliRunner().invoke(app, ["format", "--check", str(tmp_path)])
+    assert told.exit_code == 1 and untidy.read_text() == UNTIDY
+    assert "would change" in told.output and "b.yaml" not in told.output
+    assert CliRunner().invoke(app, ["format", str(tmp_path)]).exit_code == 0
+    assert untidy.read_text() == TIDY
+    assert CliRunner().invoke(app, ["format", "--check", str(tmp_path)]).exit_code == 0
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_line_ends_and_a_mark_of_utf_8_stay(tmp_path: Path, mark: str, end: str) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_bytes((mark + UNTIDY.replace("\n", end)).encode())
+    assert CliRunner().invoke(app, ["format", str(path)]).exit_code == 0
+    assert path.read_bytes() == (mark + TIDY.replace("\n", end)).encode()
+    assert format_text(mark + TIDY.replace("\n", end)) == mark + TIDY.replace("\n", end)
+
+
+def test_a_file_with_two_names_is_told_to_part(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.yaml", tmp_path / "other"
+    path.write_text(UNTIDY)
+    other.hardlink_to(path)
+    told = CliRunner().invoke(app, ["format", str(path)]).output
+    assert f"changed {path} (no longer one file with its 1 other hard link)" in told
+    assert (path.read_text(), other.read_text()) == (TIDY, UNTIDY)
+    path.write_text(UNTIDY)
+    assert f"changed {path}\n" in CliRunner().invoke(app, ["format", str(path)]).output
+
+
+def test_what_cannot_be_written_is_not_told_as_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(UNTIDY)
+
+    def full(descriptor: int, *_: object) -> None:
+        os.close(descriptor)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("modewright.runtime.output_files.os.fdopen", full)
+    told = CliRunner().invoke(app, ["format", str(path)])
+    assert isinstance(told.exception, OutputError) and told.stdout == ""
+    assert path.read_text() == UNTIDY and list(tmp_path.iterdir()) == [path]

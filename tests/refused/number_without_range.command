@@ -1,1 +1,0 @@
-generate tests/refused/kinds_of_values.repaired.yaml

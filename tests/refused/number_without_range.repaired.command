@@ -1,1 +1,0 @@
-generate tests/codegen/golden/heater.yaml

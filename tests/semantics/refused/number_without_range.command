@@ -1,0 +1,1 @@
+generate tests/semantics/refused/kinds_of_values.repaired.yaml

@@ -1,0 +1,1 @@
+generate tests/codegen/emit/golden/heater.yaml
