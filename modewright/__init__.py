@@ -24,11 +24,12 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
+    from modewright.api.checking import check
     from modewright.api.code_generation import a2l, dbc, fmu, fuzz, generate, mcdc, metrics, prove
     from modewright.api.diagnosis import diagnose, fit, save_diagnosis
     from modewright.api.recordings import CheckedRecordings, check_recordings
     from modewright.api.runs import compare, plot, read, save
-    from modewright.api.simulation import Loaded, Replayed, check, load, lockstep, replay, simulate
+    from modewright.api.simulation import Loaded, Replayed, load, lockstep, replay, simulate
     from modewright.api.spec_tests import run_tests
     from modewright.api.studies import sensitivity, study_pictures, study_summary, sweep
     from modewright.api.traces import trace
@@ -127,7 +128,7 @@ PLACES = {
     "run_tests": "modewright.api.spec_tests",
     "sensitivity": "modewright.api.studies",
     "study_pictures": "modewright.api.studies",
-    "study_report": "modewright.api.studies",
+    "study_report": "modewright.render.study_page",
     "study_summary": "modewright.api.studies",
     "sweep": "modewright.api.studies",
     "trace": "modewright.api.traces",

@@ -30,7 +30,7 @@ from engine.results.plot import Picture
 from language.overlays.tree_types import format_si_unit
 from language.text.sanitise import escape_invisible
 
-BLUE, _, _, _, _, _, GREY = PALETTE
+BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 
 
 def draw_locations(locations: Sequence[Location]) -> Picture:
@@ -58,8 +58,6 @@ def draw_locations(locations: Sequence[Location]) -> Picture:
         axis.spines[side].set_visible(False)
     return Picture(figure)
 
-
-_, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 
 MAX_INPUTS = 3
 
@@ -156,9 +154,7 @@ def draw_experiment(
     return Picture(figure)
 
 
-BLUE, RED, *_ = PALETTE
-
-LABELS = ("simulated, recalibrated", "simulated, with what was found")
+OSCILLATION_LABELS = ("simulated, recalibrated", "simulated, with what was found")
 
 
 def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
@@ -169,7 +165,7 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
     axis.semilogx(first.recorded.amplitudes, first.recorded.frequencies, "o", color="black", ms=4)
     axis.lines[0].set_label("recorded")
     for one, colour, label, style in zip(
-        oscillations, (RED, BLUE), LABELS, ("--", "-"), strict=False
+        oscillations, (RED, BLUE), OSCILLATION_LABELS, ("--", "-"), strict=False
     ):
         axis.semilogx(
             one.simulated.amplitudes,

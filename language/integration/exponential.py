@@ -277,8 +277,10 @@ def exact_method(
             label += f"coefficients: {', '.join(f'`{term}`' for term in others)}"
             help = "`linearise: {at: ...}` takes the tangent, `method: exponential` the middle"
             problems.error("method", span, label, help)
-    return build_exponential_method(field, context, _step_blocks, span, problems)
+    return build_exponential_method(field, context, _affine_step_blocks, span, problems)
 
 
-def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> Mapping[str, Block]:
+def _affine_step_blocks(
+    field: VectorField, mode: str, context: ExponentialContext
+) -> Mapping[str, Block]:
     return {f"step_{mode}": (*lower_step_start(field, mode), *lower_step_end(field, mode, context))}

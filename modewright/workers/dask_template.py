@@ -11,9 +11,9 @@ import distributed.worker  # noqa: F401
 import pyarrow
 import pyarrow.parquet
 
-import modewright.runtime.compiled_run
-import modewright.workers.dask_worker
-from sweep.execution import dask_worker as cluster_worker  # noqa: F401
+from modewright.runtime import compiled_run  # noqa: F401
+from modewright.workers import dask_worker
+from sweep.execution import dask_worker as block_worker  # noqa: F401
 
-modewright.cluster_worker.own_fingerprint()
+dask_worker.own_fingerprint()
 pyarrow.array([0])  # which loads pandas where that is installed

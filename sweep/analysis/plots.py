@@ -20,8 +20,6 @@ from sweep.definition.measure import StoreColumn
 from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable, to_display_unit
 
-Reals = NDArray[np.float64]
-
 RELATIVE_ROUNDING = 1.0e-9
 """Part of their magnitude by which values differ that are drawn as one: rounding is less."""
 

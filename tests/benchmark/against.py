@@ -8,7 +8,7 @@ import sys
 import time
 
 from tests.benchmark.manoeuvre import TIP_OUT
-from tests.benchmark.rivals import with_scipy
+from tests.benchmark.rival_scripts import with_scipy
 from tests.benchmark.table import errors_of, format_ratio
 from tests.benchmark.timing import time_interleaved
 
@@ -16,7 +16,7 @@ from tests.benchmark.timing import time_interleaved
 def main(module: str, pairs: int) -> None:
     """Measure the rival whose model stands in a module of this folder."""
     start = time.process_time()
-    rival = importlib.import_module(f"tests.benchmark.{module}")
+    rival = importlib.import_module(f"tests.benchmark.rival_scripts.{module}")
     run = rival.prepared(TIP_OUT)
     found = run()
     first = time.process_time() - start

@@ -7,7 +7,7 @@ from typing import Any
 
 from tests.benchmark import c_rival as in_c, modewright_run as ours
 from tests.benchmark.manoeuvre import TIP_OUT, Manoeuvre
-from tests.benchmark.rivals import with_scipy
+from tests.benchmark.rival_scripts import with_scipy
 from tests.benchmark.table import errors_of, format_ratio
 from tests.benchmark.timing import time_interleaved
 from tests.benchmark.variants import FINE, Sweep

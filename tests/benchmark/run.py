@@ -17,6 +17,7 @@ from codegen.toolchain.compiler import FLAGS, compiler_version
 from tests.benchmark import figures, growth
 from tests.benchmark.charts import measure_charts
 from tests.benchmark.first_step import measure_first_step
+from tests.benchmark.manoeuvre import CHATTER, TIP_OUT
 from tests.benchmark.rivals import RIVALS, RivalMissing, measure_rival
 from tests.benchmark.table import table
 
@@ -45,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name in peers:
         if name not in RIVALS:
             parser.error(f"`{name}` is none of {', '.join(RIVALS)}")
-    cases = (figures.TIP_OUT, figures.CHATTER)
+    cases = (TIP_OUT, CHATTER)
     found: dict[str, Any] = {
         "machine": machine_info(),
         "single_run": single_run(given.pairs),

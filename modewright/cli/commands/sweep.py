@@ -217,6 +217,7 @@ def _report_results(
     from modewright.api import studies
     from modewright.render import study as show_study
     from modewright.render.run import print_json
+    from modewright.render.study_page import study_report
 
     found = studies.study_summary(folder)
     if as_json:
@@ -226,7 +227,7 @@ def _report_results(
     written = _write_pictures(folder, form)
     files = {table: found.csv().encode()} if table else {}
     if report:
-        files[report] = studies.study_report(folder)
+        files[report] = study_report(folder)
     write_files(files)
     if not as_json:
         report_written_files([*written, *files])

@@ -26,7 +26,7 @@ MEASURES = tuple(
 )
 
 
-def drive(values: dict[str, str] | None = None) -> mw.api.Loaded:
+def drive(values: dict[str, str] | None = None) -> mw.Loaded:
     loaded = load("ev_driveline_ideal", "tip_out", values)
     scenario = dataclasses.replace(loaded.scenario, horizon=HORIZON)
     return dataclasses.replace(loaded, scenario=scenario)

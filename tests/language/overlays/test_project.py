@@ -19,7 +19,7 @@ from language.overlays.expand_document import (
 )
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document
-from modewright.api.simulation import check
+from modewright.api.checking import check
 from tests.language.build import SHIPPED, document, problem_lines, project_of, raised_problems
 
 PLAIN = """language: 1

@@ -13,7 +13,7 @@ ASKED = """
 import os
 import modewright
 from modewright.api.studies import TEMPLATE_MODULE
-from sweep import fork_server
+from sweep.execution import fork_server
 
 def main():
     environment = dict(os.environ)

@@ -13,6 +13,7 @@ from functools import partial
 
 from tests.benchmark import figures
 from tests.benchmark.first_step import measure_first_step
+from tests.benchmark.manoeuvre import CHATTER, TIP_OUT
 from tests.benchmark.run import PAIRS, machine_info
 from tests.validation.figures.store import ROOT, Figure, measure_figures
 
@@ -79,7 +80,7 @@ def batch_over_c(pairs: int) -> Figure:
 
 def accuracy(step: str) -> Figure:
     """Events and speed of a tip-out at a step, against 40 digits."""
-    errors = figures.errors_at(step, figures.TIP_OUT)
+    errors = figures.errors_at(step, TIP_OUT)
     own = errors["modewright"]
     met = own["is_complete"] and own["late"] <= LATE[step] and own["rms"] <= OFF[step]
     return {"met": met, **errors}
@@ -87,7 +88,7 @@ def accuracy(step: str) -> Figure:
 
 def crossings(step: str) -> Figure:
     """Many crossings in a row at a step: all found, in order, none doubled."""
-    errors = figures.errors_at(step, figures.CHATTER)
+    errors = figures.errors_at(step, CHATTER)
     own = errors["modewright"]
     met = own["is_complete"] and own["events"] >= CROSSINGS
     return {"met": met and own["late"] <= LATE_CROSSINGS.get(step, 1.0), **errors}
