@@ -32,7 +32,7 @@ from codegen.toolchain.external_tools import output_of
 from language.ir.program import Constant, Program
 from language.ir.traversal import walk_ops
 
-MAIN = HarnessMain("explore_main.c.jinja")
+MAIN = HarnessMain("coverage/explore_main.c.jinja")
 MAX_PAGE_CHANGES, MAX_TICK_GROUPS = 4, 96
 """Most numbers of a page that are others, and most groups of ticks."""
 FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)

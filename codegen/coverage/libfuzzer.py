@@ -25,7 +25,7 @@ WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
 """Words of an input; those that are values, and how many of these are spread over its range. The
 others are changes: half of them small and smaller steps, as many none."""
 DEFAULT_INPUT_RANGE = (-1000.0, 1000.0)
-MAIN = HarnessMain("fuzz_main.c.jinja")
+MAIN = HarnessMain("coverage/fuzz_main.c.jinja")
 MAX_SEQUENCE_TICKS = 64
 """Most ticks of a sequence that the C reads."""
 FUZZER_TIMEOUT = 60

@@ -55,8 +55,8 @@ def emit_math_files(number: NumberType) -> dict[str, str]:
         "highest": format_literal(float(FLOAT_FORMATS[number].highest), number),
     }
     return {
-        f"ha_math{suffix}.h": render("ha_math.h.jinja", context),
-        f"ha_math{suffix}.c": render("ha_math.c.jinja", context),
+        f"ha_math{suffix}.h": render("emit/ha_math.h.jinja", context),
+        f"ha_math{suffix}.c": render("emit/ha_math.c.jinja", context),
     }
 
 

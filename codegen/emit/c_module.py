@@ -102,9 +102,9 @@ def emit_c_files(
         "digest": digest(program),
     }
     files = {
-        f"{program.name}.h": render("module.h.jinja", context),
-        f"{program.name}_MemMap.h": render("memory_map.h.jinja", context),
-        f"{program.name}.c": render("module.c.jinja", context),
+        f"{program.name}.h": render("emit/module.h.jinja", context),
+        f"{program.name}_MemMap.h": render("emit/memory_map.h.jinja", context),
+        f"{program.name}.c": render("emit/module.c.jinja", context),
     }
     if context["uses_math"]:
         files.update(emit_math_files(program.number_type))

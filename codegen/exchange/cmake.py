@@ -27,4 +27,4 @@ def emit_cmake_file(program: Program) -> dict[str, str]:
         "headers": [file for file in files if file.endswith(".h")],
         "flags": [flag for flag in FLAGS if flag not in SET_BY_CMAKE],
     }
-    return {FILE: render("cmake_lists.txt.jinja", context)}
+    return {FILE: render("cmake/cmake_lists.txt.jinja", context)}

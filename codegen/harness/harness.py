@@ -29,7 +29,7 @@ class HarnessMain:
     files: tuple[str, ...] = ()
 
 
-LOCKSTEP = HarnessMain("lockstep_main.c.jinja")
+LOCKSTEP = HarnessMain("harness/lockstep_main.c.jinja")
 """Writes all that the program carries after each tick."""
 
 

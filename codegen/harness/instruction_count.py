@@ -12,7 +12,7 @@ from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.program import Program
 
-MAIN = HarnessMain("instructions_main.c.jinja", ("instructions.h", "instructions.c"))
+MAIN = HarnessMain("harness/instructions_main.c.jinja", ("instructions.h", "instructions.c"))
 ICOUNT_OPTIONS = ("-icount", "shift=0")
 """Of the emulator: one instruction takes 1 ns."""
 

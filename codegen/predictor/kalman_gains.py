@@ -62,7 +62,9 @@ def _compile_recursion(states: int, outputs: int) -> Any:
     """Return the compiled recursion for a size, kept from an earlier run if there was one."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         source = Path(name) / "kalman_gains.c"
-        source.write_text(render("kalman_gains.c.jinja", {"states": states, "seen": outputs}))
+        source.write_text(
+            render("predictor/kalman_gains.c.jinja", {"states": states, "seen": outputs})
+        )
         key = key_of([source], [*find_compiler(), *FLAGS], compiler_version())
         path = get_or_build(key, lambda made: compile_program([source], made, FLAGS), source.parent)
         function = ctypes.CDLL(str(path)).modewright_gains

@@ -351,7 +351,7 @@ def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Pat
             "tracks": simd_context,
             "mathematics": next((f for f in files if MATH_SOURCE.match(f)), ""),
         }
-        files["predictor.c"] = render("predictor.c.jinja", context)
+        files["predictor.c"] = render("predictor/predictor.c.jinja", context)
         for file, text in files.items():
             source_text = (
                 FUNCTION_START.sub("static ", text) if file.startswith("ha_math") else text

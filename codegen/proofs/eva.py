@@ -116,7 +116,7 @@ def _main(program: Program) -> str:
         for name, most in counter_limits(restrict_to_step(program)).items()
     ]
     given = {"name": program.name, "real": real, "inputs": inputs, "page": page, "counts": counts}
-    return render("values_main.c.jinja", given)
+    return render("proofs/values_main.c.jinja", given)
 
 
 def _any(program: Program, variable: Variable) -> str:

@@ -167,9 +167,9 @@ def _emit_files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[
     entries = [name for name in INLINED_ENTRIES if name in program.blocks]
     inline = [(name, context["entries"][name]["lines"]) for name in entries]
     files = {
-        f"{MODULE_NAME}.h": render("module.h.jinja", {**context, "digest": ""}),
+        f"{MODULE_NAME}.h": render("emit/module.h.jinja", {**context, "digest": ""}),
         f"{MODULE_NAME}_stepper.c": render(
-            "stepper.c.jinja",
+            "simulator/stepper.c.jinja",
             {
                 **context,
                 "calls": calls,

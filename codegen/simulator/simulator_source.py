@@ -62,13 +62,13 @@ def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) 
     }
     context = _driver_context(assembly, programs, signal_names, modules)
     files = {
-        "run.h": render("run.h.jinja", context),
-        "run.c": render("run_driver.c.jinja", context),
+        "run.h": render("simulator/run.h.jinja", context),
+        "run.c": render("simulator/run_driver.c.jinja", context),
     }
     numbers: dict[NumberType, None] = {"float64": None} if context["uses_math"] else {}
     for name, program in programs.items():
-        files[f"{program.name}.h"] = render("module.h.jinja", modules[name])
-        files[f"{program.name}_run.c"] = render("run_module.c.jinja", modules[name])
+        files[f"{program.name}.h"] = render("emit/module.h.jinja", modules[name])
+        files[f"{program.name}_run.c"] = render("simulator/run_module.c.jinja", modules[name])
         if modules[name]["uses_math"]:
             numbers[program.number_type] = None
     for number in numbers:

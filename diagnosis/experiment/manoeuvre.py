@@ -51,7 +51,7 @@ def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
 
 @cache
 def _read_manoeuvres() -> Mapping[str, Mapping[str, Any]]:
-    text = resources.files("diagnosis").joinpath("manoeuvres.yaml").read_text("utf-8")
+    text = resources.files("diagnosis.experiment").joinpath("manoeuvres.yaml").read_text("utf-8")
     menu: Mapping[str, Mapping[str, Any]] = yaml.safe_load(text)
     return menu
 

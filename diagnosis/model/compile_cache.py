@@ -27,7 +27,13 @@ from codegen.toolchain.build_cache import cache_subfolder
 from diagnosis.model.parameter import FreeParameter
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 
-COMPILATION_MODULES = ("candidate", "layers", "recipe", "series", "uncertain")
+COMPILATION_MODULES = (
+    "candidate",
+    "compile_cache",
+    "parameter",
+    "placed_effect",
+    "sampled_recording",
+)
 """The files of diagnosis that candidates are made by."""
 
 

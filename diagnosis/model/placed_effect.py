@@ -112,7 +112,7 @@ def shipped_effects() -> tuple[Effect, ...]:
 
 def disturbance_effect(kind: str, place: str) -> PlacedEffect:
     """Return the drift of a balance, an element or an output."""
-    path = Path(str(resources.files("diagnosis"))) / "drifts" / f"drift_of_{kind}.yaml"
+    path = Path(str(resources.files("diagnosis.model"))) / "disturbances" / f"drift_of_{kind}.yaml"
     return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 

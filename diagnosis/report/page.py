@@ -195,7 +195,7 @@ def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
 
 
 def _render_page(context: Mapping[str, Any]) -> str:
-    folder = resources.files("diagnosis").joinpath("templates")
+    folder = resources.files("diagnosis.report").joinpath("templates")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
         undefined=jinja2.StrictUndefined,

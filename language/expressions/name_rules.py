@@ -26,7 +26,7 @@ DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE
 @cache
 def reserved_words() -> Mapping[str, frozenset[str]]:
     """Return the words by language: GRAMMAR, YAML, C, C++, A2L, GENERATED."""
-    text = resources.files("language").joinpath("reserved.txt").read_text("utf-8")
+    text = resources.files("language.expressions").joinpath("reserved.txt").read_text("utf-8")
     sections: dict[str, frozenset[str]] = {}
     for section in text.split("\n[")[1:]:
         head, _, words = section.partition("\n")

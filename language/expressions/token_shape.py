@@ -116,5 +116,5 @@ def _shape_depth(shape: ParseShape) -> int:
 
 @cache
 def _parser(start_rule: str) -> lark.Lark:
-    grammar = resources.files("language").joinpath("expression.lark").read_text("utf-8")
+    grammar = resources.files("language.expressions").joinpath("expression.lark").read_text("utf-8")
     return lark.Lark(grammar, parser="lalr", start=start_rule)

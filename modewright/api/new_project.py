@@ -25,7 +25,7 @@ TEMPLATE_TARGETS = {
 
 def skeleton_files(name: str) -> dict[str, str]:
     """Return the files of a project by path; its system has the project's name."""
-    folder = resources.files("modewright") / "skeleton_files"
+    folder = resources.files("modewright.api") / "new_project_files"
     return {
         place: (folder / source).read_text("utf-8").replace("PROJECT", name)
         for source, place in TEMPLATE_TARGETS.items()

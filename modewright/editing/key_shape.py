@@ -102,7 +102,7 @@ COMMON_KEYS = (
 @cache
 def shapes() -> Mapping[str, Shape]:
     """Return all shapes by name; that of a kind of file has its name."""
-    folder = files("modewright.editing") / "shapes"
+    folder = files("modewright.editing") / "key_shapes"
     found: dict[str, Shape] = {}
     for file in sorted(folder.iterdir(), key=lambda file: file.name):
         if file.name.endswith(".yaml"):

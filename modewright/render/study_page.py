@@ -208,8 +208,8 @@ def _embed_svg(name: str, data: bytes) -> str:
 
 
 def _render_template(context: Mapping[str, Any]) -> str:
-    own = resources.files("modewright").joinpath("templates")
-    shared = resources.files("diagnosis").joinpath("templates")
+    own = resources.files("modewright.render").joinpath("templates")
+    shared = resources.files("diagnosis.report").joinpath("templates")
 
     def text_of(name: str) -> str:
         folder = shared if name == "report.css.jinja" else own

@@ -93,7 +93,7 @@ def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
     methods = _conversion_methods(description, program.number_type)
     method_names = {conversion: method["name"] for conversion, method in methods.items()}
     return render(
-        "a2l.jinja",
+        "a2l/a2l.jinja",
         {
             "name": description.name,
             "about": sanitise_string(description.about),

@@ -51,7 +51,7 @@ def emit_wrapper(program: Program, version: Version) -> dict[str, str]:
 
 def read_headers(version: Version) -> dict[str, bytes]:
     """Return the headers of the standard by name."""
-    folder = resources.files("codegen").joinpath("fmi", "headers")
+    folder = resources.files("codegen.exchange.fmi").joinpath("headers")
     return {name: folder.joinpath(name).read_bytes() for name in HEADERS[version]}
 
 

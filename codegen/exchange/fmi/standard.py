@@ -51,7 +51,9 @@ class Refusal:
 
 def refusals(version: Version) -> Iterator[Refusal]:
     """Yield the functions of a version that no template makes, in the order of its header."""
-    file = resources.files("codegen").joinpath("fmi", "headers", f"fmi{version}FunctionTypes.h")
+    file = resources.files("codegen.exchange.fmi").joinpath(
+        "headers", f"fmi{version}FunctionTypes.h"
+    )
     implemented = {f"fmi{version}{name}" for name in IMPLEMENTED[version].split()}
     implemented |= {
         f"fmi{version}{what}{kind}" for kind in FMI_TYPES[version] for what in ("Get", "Set")

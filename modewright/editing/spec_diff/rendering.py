@@ -63,7 +63,7 @@ def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
 
 def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
     """Return the changes as one HTML page that needs no other file."""
-    folder = resources.files("modewright.editing").joinpath("templates")
+    folder = resources.files("modewright.editing.spec_diff").joinpath("templates")
     environment = jinja2.Environment(
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=True
     )

@@ -11,7 +11,7 @@ import pytest
 from codegen.toolchain import templates as rendering
 from codegen.toolchain.templates import TEMPLATE_CACHE, render
 
-TEMPLATE = "words_fed.jinja"
+TEMPLATE = "coverage/words_fed.jinja"
 NOTHING: dict[str, list[str]] = {"inputs": []}
 
 

@@ -21,7 +21,7 @@ from modewright.runtime.output_files import (
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from modewright import files
+from modewright.runtime import output_files as files
 
 count = int(sys.argv[2])
 replace, write = os.replace, os.fdopen
