@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 from expectation.expectations import Condition, ModePredicate, RegionRef, RunningStatistic
 from expectation.mode_names import (
     format_region,

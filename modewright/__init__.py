@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from diagnosis.report.diagnosis_report import DiagnosisReport
     from engine.results.plot import Picture
     from engine.results.run_comparison import RunDifference
-    from engine.results.trajectory import Event, Trajectory
+    from engine.results.samples import Event
+    from engine.results.trajectory import Trajectory
     from language.text.diagnostic import Problem, SpecError, render_all
     from lockstep.comparison import Verdict
     from modewright.api.calibrations import (

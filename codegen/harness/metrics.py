@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
+from codegen.harness.stack_usage import stack_usage
 from codegen.harness.worst_case_instructions import Unbounded, worst_case_instructions
-from codegen.proofs.stack_usage import stack_usage
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, ARM_SIZE, output_of
 from codegen.toolchain.machine import CORTEX_FLAGS

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
+from codegen.harness.stack_usage import check_stack
 from codegen.proofs.acsl.mode_contract import check_contracts
 from codegen.proofs.eva import check_values
 from codegen.proofs.misra import check_misra
 from codegen.proofs.sanitizer_run import check_sanitizers
-from codegen.proofs.stack_usage import check_stack
 from codegen.proofs.warnings import check_compiler_warnings
 from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.program import Program

@@ -17,7 +17,8 @@ from engine.execution.invariant_monitor import invariant_event
 from engine.execution.range_monitor import format_range_violation, range_event
 from engine.execution.transition_events import mode_names, transition_event
 from engine.results.row_recorder import recorded_columns
-from engine.results.trajectory import Event, Trajectory, column_array, fault_names
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory, column_array, fault_names
 from language.ir.number_type import round_to_type
 from language.ir.program import InvariantInfo, Program, unqualified_name
 from language.model.system import Scenario, System

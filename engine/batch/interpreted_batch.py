@@ -21,7 +21,8 @@ from engine.batch.batch import (
 from engine.batch.parameter_binding import ParameterBinding, group_variants
 from engine.interpreter.apply_calibration import DERIVE_BLOCKS
 from engine.interpreter.interpreter import Interpreter, Stepper
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 from engine.simulation.event_schedule import TimeGrid
 from engine.simulation.simulate import BuildStepper, simulate
 from language.ir.number_type import round_to_type

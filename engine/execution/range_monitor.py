@@ -8,7 +8,7 @@ from fractions import Fraction
 from operator import le
 
 from engine.interpreter.interpreter import Stepper
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from language.ir.program import Program, unqualified_name
 from language.programs.simulation_assembly import RANGE_TOLERANCE
 

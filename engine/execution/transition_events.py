@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from engine.interpreter.interpreter import Stepper
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program, TransitionInfo
 from language.ir.regions import CHART
 

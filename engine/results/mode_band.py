@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
-from engine.results.trajectory import SignalArray, Trajectory
+from engine.results.samples import SampledRun, SignalArray
 from language.lowering.program_builder import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
@@ -48,7 +48,7 @@ class ModeSegment:
 
 
 def draw_band(
-    axis: Axes, trajectory: Trajectory, band: ModeBand, window: tuple[float, float]
+    axis: Axes, trajectory: SampledRun, band: ModeBand, window: tuple[float, float]
 ) -> list[ModeSegment]:
     """Draw a strip with a legend of all its modes; return what `name_stretches` names."""
     names = trajectory.modes[band.signal]

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.results.mode_band import PALETTE, ModeBand, draw_band, label_segments
-from engine.results.trajectory import Trajectory
+from engine.results.samples import SampledRun
 from language.reading.mode_reader import IMPLICIT_MODE
 from language.text.diagnostic import suggest_name
 from language.text.sanitise import escape_invisible
@@ -76,7 +76,7 @@ class Picture:
 
 
 def draw_picture(
-    runs: Sequence[Trajectory],
+    runs: Sequence[SampledRun],
     panels: Sequence[Panel],
     bands: Sequence[ModeBand],
     title: str,
@@ -113,7 +113,7 @@ def draw_picture(
 
 
 def draw_overview(
-    runs: Sequence[Trajectory],
+    runs: Sequence[SampledRun],
     patterns: Sequence[str] = (),
     span: tuple[float, float] | None = None,
     title: str = "",
@@ -136,7 +136,7 @@ def draw_overview(
 
 
 def panels_by_unit(
-    runs: Sequence[Trajectory], patterns: Sequence[str] = (), labels: Sequence[str] = ("A", "B")
+    runs: Sequence[SampledRun], patterns: Sequence[str] = (), labels: Sequence[str] = ("A", "B")
 ) -> list[Panel]:
     """Return panels of signals by unit, those far apart in size in panels of their own."""
     by_unit: dict[str, list[str]] = {}
@@ -160,12 +160,12 @@ def panels_by_unit(
     return panels
 
 
-def _has_modes(run: Trajectory, name: str) -> bool:
+def _has_modes(run: SampledRun, name: str) -> bool:
     """Tell whether a signal is of modes, not of an automaton that has none of its own."""
     return set(run.modes.get(name, {}).values()) not in (set(), {IMPLICIT_MODE})
 
 
-def _group_by_magnitude(names: Sequence[str], runs: Sequence[Trajectory]) -> list[list[str]]:
+def _group_by_magnitude(names: Sequence[str], runs: Sequence[SampledRun]) -> list[list[str]]:
     """Return names in groups of similar size, none with more than there are colours."""
     peaks = {name: max(_peak(run, name) for run in runs) for name in names}
     groups: list[list[str]] = []
@@ -184,7 +184,7 @@ def _group_by_magnitude(names: Sequence[str], runs: Sequence[Trajectory]) -> lis
     return result
 
 
-def _peak(run: Trajectory, name: str) -> float:
+def _peak(run: SampledRun, name: str) -> float:
     """Return the largest finite magnitude of a signal, 0 if there is none."""
     values = np.abs(run.signals.get(name, np.zeros(0)).astype(np.float64))
     return float(np.max(values, initial=0.0, where=np.isfinite(values)))
@@ -199,7 +199,7 @@ def _matches(name: str, patterns: Sequence[str]) -> bool:
     return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def _require_matches(runs: Sequence[Trajectory], patterns: Sequence[str]) -> None:
+def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> None:
     known = list(dict.fromkeys(name for run in runs for name in run.signals))
     for pattern in patterns:
         if not fnmatch.filter(known, pattern):
@@ -208,7 +208,7 @@ def _require_matches(runs: Sequence[Trajectory], patterns: Sequence[str]) -> Non
 
 
 def _time_window(
-    runs: Sequence[Trajectory], span: tuple[float, float] | None
+    runs: Sequence[SampledRun], span: tuple[float, float] | None
 ) -> tuple[float, float]:
     """Return what is shown: the span, its infinite ends replaced by those of the runs [s]."""
     times = [float(run.times[k]) for run in runs if len(run.times) for k in (0, -1)]
@@ -222,7 +222,7 @@ def _time_window(
 
 
 def _draw_panel(
-    axis: Axes, runs: Sequence[Trajectory], panel: Panel, window: tuple[float, float]
+    axis: Axes, runs: Sequence[SampledRun], panel: Panel, window: tuple[float, float]
 ) -> None:
     for k, line in enumerate(panel.lines):
         run = runs[line.run]
@@ -239,7 +239,7 @@ def _draw_panel(
     axis.grid(alpha=0.3)
 
 
-def _mark_events(axis: Axes, run: Trajectory, window: tuple[float, float]) -> None:
+def _mark_events(axis: Axes, run: SampledRun, window: tuple[float, float]) -> None:
     """Mark when a mode became another one, not what fired and left the modes as they were."""
     times = {e.time for e in run.events if e.target not in ("", e.source)}
     instants = sorted(time for time in times if window[0] <= time <= window[1])

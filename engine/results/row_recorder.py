@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.results.trajectory import SignalArray as Column, column_array
+from engine.results.samples import SignalArray as Column
+from engine.results.trajectory import column_array
 from language.expressions.units import display_unit
 from language.ir.program import Program, ValueType
 from language.lowering.connection_program import output_block

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.results.trajectory import Event, SignalArray, Trajectory
+from engine.results.samples import Event, SignalArray
+from engine.results.trajectory import Trajectory
 from language.ir.regions import CHART
 
 Reals = NDArray[np.float64]

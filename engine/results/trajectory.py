@@ -6,41 +6,20 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.samples import Event, SignalArray
 from language.ir.program import Program
-from language.ir.regions import CHART
 from language.text.diagnostic import MissingToolError
 
 if TYPE_CHECKING:
     from engine.results.plot import Picture
 
-SignalArray = NDArray[np.float64] | NDArray[np.int64]
 TIME_HEADER = "t [s]"
 """Head of the first column of every table of samples."""
-
-
-@dataclass(frozen=True)
-class Event:
-    """A transition: time [s], micro-step at that instant, and what changed.
-
-    In a chart a transition `to: []` has no target: nothing is entered.
-    Of another `kind` is a signal that left its range, or an invariant that ceased to hold:
-    `transition` names it, `message` says how, `source` and `target` are both the mode.
-    """
-
-    time: float
-    micro_step: int
-    instance: str
-    transition: str
-    source: str
-    target: str
-    region: str = CHART
-    kind: Literal["transition", "range", "invariant"] = "transition"
-    message: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,9 +80,7 @@ class Trajectory:
 
     def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
         """Return a picture: signals by unit (patterns such as `plant.*`; all), modes, events."""
-        from engine.results.plot import (
-            draw_overview,  # matplotlib takes a second: only if asked for
-        )
+        from engine.results.plot import draw_overview
 
         return draw_overview([self], signals, span)
 

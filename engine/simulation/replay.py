@@ -14,7 +14,8 @@ import numpy as np
 from engine.execution.transition_events import fired_by_micro_step, mode_names, transition_event
 from engine.interpreter.interpreter import Interpreter, Stepper
 from engine.recordings.recording import Channel, Recording
-from engine.results.trajectory import Event, SignalArray, Trajectory, column_array, fault_names
+from engine.results.samples import Event, SignalArray
+from engine.results.trajectory import Trajectory, column_array, fault_names
 from language.expressions.units import display_unit
 from language.ir.program import Program
 from language.ir.regions import CHART

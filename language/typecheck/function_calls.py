@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from language.expressions.migration_hints import FUNCTION_HINTS
 from language.expressions.syntax_tree import (
@@ -19,11 +18,8 @@ from language.expressions.units import PURE_NUMBER, Dimension, dimension_sqrt
 from language.text.diagnostic import suggest_name
 from language.typecheck.integer_functions import integer_call_range
 from language.typecheck.memory_calls import ALLOWED_PLACES, infer_lookup, infer_memory_call
-from language.typecheck.types import IntType
-
-if TYPE_CHECKING:
-    from language.typecheck.infer import TypeChecker
-    from language.typecheck.types import ExprType
+from language.typecheck.types import ExprType, IntType
+from language.typecheck.typing_context import TypingContext
 
 ANGLE = Dimension(angle=1)
 SAME_UNIT_FUNCTIONS = {"abs": 1, "min": 2, "max": 2, "clip": 3}
@@ -42,7 +38,7 @@ ARGUMENT_COUNTS = {
 FUNCTION_NAMES = (*ARGUMENT_COUNTS, *MEMORY_FUNCTIONS, "lookup", "in", "der")
 
 
-def infer_function_call(checker: TypeChecker, tree: FunctionCall) -> ExprType | None:
+def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
     """Return what a function returns; None where a problem was reported."""
     name, arguments = tree.function, tree.arguments
     if name == "in":
@@ -93,7 +89,7 @@ def is_integer_call(arguments: Sequence[SyntaxTree], are_integers: Sequence[bool
 
 
 def _infer_integer_call(
-    checker: TypeChecker, tree: FunctionCall, argument_types: Sequence[ExprType | None]
+    checker: TypingContext, tree: FunctionCall, argument_types: Sequence[ExprType | None]
 ) -> IntType | None:
     """`min`, `max`, `abs` and `clip` of whole numbers are whole; what is inside is copied."""
     if _nesting_depth(tree) > MAX_NESTING:
@@ -114,7 +110,7 @@ def _nesting_depth(tree: SyntaxTree) -> int:
 
 
 def _infer_elementary(
-    checker: TypeChecker, tree: FunctionCall, dimensions: list[Dimension]
+    checker: TypingContext, tree: FunctionCall, dimensions: list[Dimension]
 ) -> Dimension | None:
     name, first = tree.function, dimensions[0]
     if name in SAME_UNIT_FUNCTIONS or name == "atan2":
@@ -142,7 +138,7 @@ def _infer_elementary(
     return PURE_NUMBER
 
 
-def _infer_in(checker: TypeChecker, tree: FunctionCall) -> ExprType:
+def _infer_in(checker: TypingContext, tree: FunctionCall) -> ExprType:
     name = tree.arguments[0]
     if not isinstance(name, Name) or name.path not in checker.environment.modes:
         shown = name.path if isinstance(name, Name) else "..."

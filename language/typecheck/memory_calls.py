@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from language.expressions.syntax_tree import (
     DELAY_FUNCTIONS,
     EDGE_FUNCTIONS,
@@ -13,10 +11,8 @@ from language.expressions.syntax_tree import (
 )
 from language.expressions.units import SECOND
 from language.text.diagnostic import suggest_name
-
-if TYPE_CHECKING:
-    from language.typecheck.infer import TypeChecker
-    from language.typecheck.types import ExprType
+from language.typecheck.types import ExprType
+from language.typecheck.typing_context import TypingContext
 
 ALLOWED_PLACES = {
     "previous": "it is for equations, updates, resets and guards of a sampled automaton",
@@ -26,7 +22,7 @@ ALLOWED_PLACES = {
 """What functions with memory are for."""
 
 
-def infer_memory_call(checker: TypeChecker, tree: FunctionCall) -> ExprType | None:
+def infer_memory_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
     """`delay` and `previous` have the kind of what they keep, the others are conditions."""
     name, arguments = tree.function, tree.arguments
     wanted = 2 if name == "delay" else 1
@@ -51,7 +47,7 @@ def infer_memory_call(checker: TypeChecker, tree: FunctionCall) -> ExprType | No
     return "truth"
 
 
-def infer_lookup(checker: TypeChecker, tree: FunctionCall) -> ExprType | None:
+def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
     """`lookup(table, x)` or `lookup(table, x, y)`: each argument fits its axis."""
     first, *arguments = tree.arguments
     table = checker.environment.tables.get(first.path) if isinstance(first, Name) else None

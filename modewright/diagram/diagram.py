@@ -31,13 +31,13 @@ class Diagram:
         """Return the diagram as Mermaid text, for Markdown that Git hosts show."""
         from modewright.diagram.mermaid import render_mermaid
 
-        return render_mermaid(self)
+        return render_mermaid(self.name, self.regions, self.arrows)
 
     def svg(self) -> str:
         """Return the diagram as an SVG document."""
         from modewright.diagram.svg import render_svg
 
-        return render_svg(self)
+        return render_svg(self.name, self.regions, self.arrows)
 
     def _repr_svg_(self) -> str:
         return self.svg()

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from language.text.sanitise import escape_invisible
 from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox, lift_arrow
-from modewright.diagram.diagram import Diagram
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
 
@@ -15,16 +14,14 @@ KIND_MARKS = {"history": "(H) "}
 """What stands before the name of a mode that is no plain one."""
 
 
-def render_mermaid(diagram: Diagram) -> str:
-    """Return the diagram as Mermaid text; a transition stands where both its modes are inside."""
+def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...]) -> str:
+    """Return regions as Mermaid text; a transition stands where both its modes are inside."""
     lines = ["stateDiagram-v2", "    direction LR"]
-    if len(diagram.regions) == 1:
-        lines += _region_lines(diagram.regions[0], diagram.arrows, 1)
+    if len(regions) == 1:
+        lines += _region_lines(regions[0], arrows, 1)
     else:
-        lines.append(
-            f'    state "{_escape_label(diagram.name)}" as {identifier_of((diagram.name,))}_ {{'
-        )
-        lines += _parallel_lines(diagram.regions, diagram.arrows, 2)
+        lines.append(f'    state "{_escape_label(name)}" as {identifier_of((name,))}_ {{')
+        lines += _parallel_lines(regions, arrows, 2)
         lines.append("    }")
     return "\n".join(lines) + "\n"
 

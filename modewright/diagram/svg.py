@@ -9,7 +9,6 @@ from html import escape
 
 from language.text.sanitise import escape_invisible
 from modewright.diagram.boxes import Arrow, ModeBox, RegionBox, lift_arrow
-from modewright.diagram.diagram import Diagram
 from modewright.diagram.layered_layout import Edge, Layout, Point, Size, compute_layout
 
 CHARACTER_WIDTH, LINE_HEIGHT, TITLE_HEIGHT = 7.0, 14.0, 20.0
@@ -44,27 +43,27 @@ def _escape_xml(text: str) -> str:
     return escape(escape_invisible(text))
 
 
-def render_svg(diagram: Diagram) -> str:
-    """Return the diagram as an SVG document."""
-    drawn = _draw_regions(diagram.regions, diagram.arrows)
-    title = CHARACTER_WIDTH * 1.2 * len(diagram.name)
-    if any(arrow.shade for arrow in diagram.arrows):
+def render_svg(name: str, regions: Sequence[RegionBox], arrows: Sequence[Arrow]) -> str:
+    """Return the regions and arrows of a diagram as an SVG document."""
+    drawn = _draw_regions(regions, arrows)
+    title = CHARACTER_WIDTH * 1.2 * len(name)
+    if any(arrow.shade for arrow in arrows):
         title += CHARACTER_WIDTH * (6 + sum(len(note) + 3 for note in SHADE_LABELS.values()))
     width = max(drawn.size[0], title, 120.0) + 2 * PADDING
     height = drawn.size[1] + TITLE_HEIGHT + 2 * PADDING
     rows = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"'
         f' viewBox="0 0 {width:.0f} {height:.0f}">',
-        f"<title>{_escape_xml(diagram.name)}</title>",
+        f"<title>{_escape_xml(name)}</title>",
         f"<style>{STYLE}</style>",
         "<defs>"
         + "".join(_arrow_marker(k, colour) for k, colour in enumerate(PALETTE))
         + "</defs>",
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="white"/>',
-        f'<text class="n" x="{PADDING}" y="{PADDING + 10}">{_escape_xml(diagram.name)}</text>',
+        f'<text class="n" x="{PADDING}" y="{PADDING + 10}">{_escape_xml(name)}</text>',
     ]
-    if any(arrow.shade for arrow in diagram.arrows):
-        rows.append(_draw_legend(PADDING + CHARACTER_WIDTH * (1.2 * len(diagram.name) + 3)))
+    if any(arrow.shade for arrow in arrows):
+        rows.append(_draw_legend(PADDING + CHARACTER_WIDTH * (1.2 * len(name) + 3)))
     for (x, y), text in drawn.translate(PADDING, PADDING + TITLE_HEIGHT):
         rows.append(f'<g transform="translate({x:.1f} {y:.1f})">{text}</g>')
     return "\n".join([*rows, "</svg>", ""])

@@ -12,10 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from engine.results.run_comparison import ModeSequence, RunDifference
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 from lockstep.comparison import Verdict
+from modewright.api.doctor import HealthCheck
 from modewright.api.simulation import Replayed
-from modewright.runtime.doctor import HealthCheck
 
 MAX_EVENTS = 40
 """Most transitions shown to a person; all of them are in --json."""

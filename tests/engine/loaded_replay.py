@@ -10,7 +10,7 @@ from pathlib import Path
 
 from engine.interpreter.interpreter import Stepper
 from engine.recordings.recording import Recording, read_recording
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from engine.simulation.replay import Replay, replay, used_columns
 from language.ir.program import Program
 from language.loading.load import automaton_of, program_of

@@ -18,8 +18,8 @@ def doctor(as_json: Json = False) -> None:
     modewright doctor
     modewright doctor --json
     """
+    from modewright.api.doctor import run_health_checks
     from modewright.render import run as show
-    from modewright.runtime.doctor import run_health_checks
 
     found = []
     for finding in run_health_checks():

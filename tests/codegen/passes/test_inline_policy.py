@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.harness.stack_usage import LIMIT
 from codegen.passes.inline_policy import select_noinline_blocks
-from codegen.proofs.stack_usage import LIMIT
 from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.number_type import NumberType
 from modewright.api.code_generation import metrics

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from codegen.emit.c_module import emit_c_files
+from codegen.harness.stack_usage import check_stack
 from codegen.proofs.acsl.mode_contract import check_contracts, prove_contracts, write_contracts
 from codegen.proofs.acsl.wp import KERNEL
 from codegen.proofs.misra import check_misra
 from codegen.proofs.sanitizer_run import check_sanitizers
-from codegen.proofs.stack_usage import check_stack
 from codegen.proofs.warnings import check_compiler_warnings
 from codegen.toolchain.external_tools import DEBIAN_PACKAGES, run_tool
 from codegen.toolchain.tool_verdict import ToolVerdict

@@ -12,7 +12,8 @@ from matplotlib.colors import to_hex
 
 from engine.results.mode_band import INACTIVE_COLOUR, PALETTE
 from engine.results.plot import draw_overview
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 
 
 def run(scale: float = 1.0) -> Trajectory:

@@ -10,7 +10,8 @@ import pytest
 
 from engine.results.comparison_plot import draw_difference
 from engine.results.run_comparison import compare_runs
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 
 
 def run(values: list[float], modes: list[int] | None = None, step: float = 1.0) -> Trajectory:

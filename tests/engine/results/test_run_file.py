@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from engine.results.run_file import encode_run, read_run, side_path
-from engine.results.trajectory import Event, Trajectory
+from engine.results.samples import Event
+from engine.results.trajectory import Trajectory
 from language.text.diagnostic import MissingToolError, SpecError
 
 HARD = [0.1 + 0.2, -0.0, 5e-324, 2.2250738585072014e-308, np.inf, -np.inf, np.nan, 1e300, 1 / 3]

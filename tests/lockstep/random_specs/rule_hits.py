@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from engine.interpreter.interpreter import Interpreter
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from language.ir.program import Program, TransitionInfo
 from tests.lockstep.random_specs.probe import ORDER, SWITCH, TWO
 from tests.lockstep.random_specs.spec import Spec

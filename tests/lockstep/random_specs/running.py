@@ -8,7 +8,7 @@ from random import Random
 
 from engine.execution.event_loop import ContinuousRun, SimulationStopped
 from engine.interpreter.interpreter import Interpreter
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from language.ir.program import Program
 from lockstep.tick_log import TickLog
 from tests.lockstep.random_specs.spec import Spec

@@ -6,7 +6,7 @@ from typing import Literal
 
 from rich.console import Console
 
-from engine.results.trajectory import Event
+from engine.results.samples import Event
 from modewright.render.run import MAX_EVENTS, events_table
 
 Kind = Literal["transition", "range"]

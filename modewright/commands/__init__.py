@@ -1,1 +1,0 @@
-"""Commands: one file each; heavy imports stand inside the functions so that --help is quick."""
