@@ -18,7 +18,7 @@ from tests.benchmark.reference_solution import Solution
 
 HERE = Path(__file__).resolve().parent
 PEERS = HERE / "peers"
-BUILD = HERE.parent.parent / "build" / "bench"
+BUILD = HERE.parents[1] / "build" / "bench"
 PARAMETERS = 23
 SUMMARY = 4
 MOST_EVENTS = 200

@@ -152,7 +152,7 @@ def test_coverage_colours_the_graph_and_is_told(
     ],
 )
 def test_guards_with_memory_are_one_condition_with_a_probe(spec: str) -> None:
-    path = ROOT / "tests" / "rules" / spec
+    path = ROOT / "tests" / "semantics" / "rules" / spec
     automaton = load_automaton(str(path), Project(path.parent.parent))
     decisions, _, arrays = instrument_programs({"one": (automaton, [])})
     assert set(arrays["one"]) == {decision.key for decision in decisions["one"]}

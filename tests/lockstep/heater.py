@@ -9,7 +9,7 @@ from lockstep.tick_log import TickLog
 from modewright.api.simulation import program
 from tests.lockstep.programs import Tick, record_ticks
 
-SPEC = Path(__file__).parents[1] / "codegen" / "golden" / "heater.yaml"
+SPEC = Path(__file__).parents[1] / "codegen" / "emit" / "golden" / "heater.yaml"
 PERIOD = 0.1
 ROUND = 30
 """Ticks of one round: a request that ends early, a rest, a heating up to the limit."""

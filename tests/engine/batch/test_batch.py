@@ -17,7 +17,7 @@ from engine.simulation.simulate import simulate
 from language.model.system import Scenario, StimulusPiece
 from modewright.api.simulation import load
 
-RULES = Path(__file__).parents[2] / "rules"
+RULES = Path(__file__).parents[2] / "semantics" / "rules"
 HORIZON = Fraction(3, 20)
 EARLY = Fraction(1, 20)
 MEASURES = tuple(

@@ -9,7 +9,7 @@ import pytest
 import modewright as mw
 
 RULE = "edges_of_a_continuous_automaton_are_events_of_their_argument"
-FOLDER = Path(__file__).parents[2] / "rules" / RULE
+FOLDER = Path(__file__).parents[2] / "semantics" / "rules" / RULE
 
 
 def test_edges_are_seen_by_a_library_as_by_the_program() -> None:

@@ -190,7 +190,7 @@ def test_every_arrow_starts_at_its_source_and_ends_at_its_target(
 
 def test_the_mode_that_faults_lead_to_says_so() -> None:
     rule = "a_fault_enters_the_fault_mode_before_any_other_transition"
-    text = mw.graph("guarded", ROOT / "tests" / "rules" / rule).mermaid()
+    text = mw.graph("guarded", ROOT / "tests" / "semantics" / "rules" / rule).mermaid()
     (line,) = (line for line in text.splitlines() if "entered on a fault" in line)
     assert line.strip().startswith('state "safe<br/>entered on a fault')
 

@@ -19,7 +19,7 @@ from language.text.diagnostic import Problem, SpecError
 from modewright.api import studies
 
 HERE = Path(__file__).parent
-ROOT = HERE.parent.parent
+ROOT = HERE.parents[2]
 ENDINGS = (".yaml", ".csv", ".command")
 REPAIRS = (re.compile(r"^did you mean `(.+?)`\?"), re.compile(r"^write `(\S+?)`:"))
 """Helps that give the very text to write at the place of the problem."""

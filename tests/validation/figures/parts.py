@@ -59,7 +59,7 @@ def verify_parts(
 def _key_of(pairs: Programs) -> str:
     """Return the digest of what runs: the Programs, their C, the engine."""
     total = hashlib.sha256()
-    for path in sorted((ROOT / "engine").glob("*.py")):
+    for path in sorted((ROOT / "engine").rglob("*.py")):
         total.update(path.read_bytes())
     for _, made in pairs:
         total.update("".join((digest(made), *emit_c_files(made).values())).encode())

@@ -9,7 +9,7 @@ import pytest
 from build_wheel import LayoutError, layout_of, setup_arguments
 from rename_imports import Packages, RenameError, rename_imports
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PACKAGES = Packages(
     frozenset({"engine", "spec", "sweep"}),
     frozenset(

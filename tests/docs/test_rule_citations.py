@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 SEMANTICS, CODE_RULES = "docs/semantics.md", "docs/code_rules.md"
 LAST = {SEMANTICS: 20, CODE_RULES: 25}
 """Rules that each page has."""
@@ -158,7 +158,7 @@ def test_each_cited_rule_exists() -> None:
 
 def test_each_case_names_a_rule_that_exists() -> None:
     known = {rule.name for rule in _rules()}
-    for path in sorted((ROOT / "tests" / "rules").glob("*/expected.yaml")):
+    for path in sorted((ROOT / "tests" / "semantics" / "rules").glob("*/expected.yaml")):
         said = re.match(r"rule: (.*)", path.read_text("utf-8"))
         assert said, path
         names = re.findall(r"\d+", said[1])
