@@ -1,1 +1,1 @@
-"""The checked model: automata, charts, systems and queries about them."""
+"""The checked model: classes of automata, charts and systems, and queries about them."""

@@ -1,6 +1,7 @@
-"""Once: a fact of an automaton, a mode or a field that is found once and kept beside it.
+"""Analysis cache: a decorator that stores the result of an analysis in the analysed object.
 
-They are frozen, so what follows from one stays true; a changed copy starts without its facts.
+The objects are frozen dataclasses, so a result stays valid for the life of its object. A copy made
+by `dataclasses.replace` starts without results.
 """
 
 from __future__ import annotations
@@ -14,11 +15,16 @@ Fact = TypeVar("Fact")
 
 
 def cache_on_owner(compute: Callable[[Owner], Fact]) -> Callable[[Owner], Fact]:
-    """Return a function that finds a fact of each thing once; nobody changes what it returns."""
+    """Decorate a function of one object so that it computes its result once for each object.
+
+    The result is stored in the `__dict__` of the object under the qualified name of the function.
+    Callers share the result and must not modify it.
+    """
     name = f"once {compute.__module__}.{compute.__qualname__}"
 
     @wraps(compute)
     def cached(thing: Owner) -> Fact:
+        """Return the stored result for `thing`; compute and store it at the first call."""
         kept = vars(thing)
         if name not in kept:
             kept[name] = compute(thing)

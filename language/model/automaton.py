@@ -1,4 +1,9 @@
-"""Model: a checked automaton - regions of modes with balances, transitions, observers and runs."""
+"""Automaton: the data classes of a checked hybrid automaton.
+
+An automaton consists of regions of modes. A mode has balances, equations, transitions, and
+optionally an observer or a run of a model. The readers build these classes, the checks examine
+them, and the lowering translates them to a Program.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +27,7 @@ from language.typecheck.types import ExprType as ValueKind
 
 @dataclass(frozen=True)
 class Balance:
-    """`left = right`, where left is a coefficient times der(state)."""
+    """An equation `left = right` in which `left` is a coefficient times `der(state)`."""
 
     state: str
     left: SyntaxTree
@@ -32,7 +37,7 @@ class Balance:
 
 @dataclass(frozen=True)
 class Invariant:
-    """An assertion about a mode: what holds in it, and what is told where it does not."""
+    """An assertion about a mode: its condition, and the message of the event of a violation."""
 
     condition: Formula
     message: str
@@ -40,9 +45,11 @@ class Invariant:
 
 @dataclass(frozen=True)
 class Rewind:
-    """Back to where `until` turned true, at most `within` [s] ago (language/programs/rewind.py).
+    """A rollback of a transition to the instant at which `until` became true.
 
-    Where that is not found it fires as without it: a fault bit is set if that `is_fault`.
+    The instant lies at most `within` [s] in the past (language/programs/rewind.py). If no such
+    instant is found, the transition fires without a rollback, and the fault bit `rewind_limit` is
+    set if `is_fault`.
     """
 
     until: Formula
@@ -53,12 +60,14 @@ class Rewind:
 
 @dataclass(frozen=True)
 class Transition:
-    """From its mode to `target` when the guard held for `wait`, with resets.
+    """A change from the mode `source` to `target`, enabled when `when` has been true for `wait`.
 
-    In a chart it may wait for one of `events`, raise others, have several `targets` (none: it
-    stays), enter what its target was left in (`history`), and not leave its source (`internal`);
-    where it `completes` its guard is that its source has come to its end. Of a transition table
-    its target is `in_cell`: several may share the guard.
+    The other fields matter in a chart. `events` are the events that the transition reacts to
+    (empty: any micro-step), `raises` the events that it raises. `targets` are its target modes; an
+    empty tuple means that it has none. `history` says whether a superstate is entered at the modes
+    that were active last. An `internal` transition does not leave its source. The guard of a
+    completion transition (`is_completion`) is that a final mode is active in the source.
+    `is_table_cell` marks a transition of a transition table.
     """
 
     name: str
@@ -84,12 +93,13 @@ class Transition:
 
 @dataclass(frozen=True)
 class Observer:
-    """A Kalman filter: dx/dt = A x + B u + f, y = C x + g, by row and column name.
+    """A Kalman filter dx/dt = A x + B u + f, y = C x + g, with matrices by row and column name.
 
-    `of` is the mode of the model that A, B, f, C and g are taken from, at the point `at`; f and g
-    read `constants` by their names. Where it `runs`, the run of its mode predicts the states.
-    `limits` are those of the variances; `correct` is an input: whether a tick has measurements.
-    A new value of an input in `unknown_instant` was taken at some instant of that time before.
+    If `of` is set, A, B, f, C and g are taken from that mode of the model at the point `at`; f and
+    g may read `constants` by name. If `predicts_by_run` is set, the run of the observer's mode
+    predicts the states. `variance_limits` are the lower and upper limits of the variances.
+    `correct` names an input that tells whether a tick has measurements. `unknown_instant` gives for
+    an input the time [s] within which its new value was sampled, at an unknown instant.
     """
 
     states: tuple[str, ...]
@@ -117,10 +127,11 @@ class Observer:
 
 @dataclass(frozen=True)
 class ModelRun:
-    """A mode of the model run inside the tick, following the model's own transitions.
+    """A mode of the model that is integrated inside a tick of a sampled automaton (rule 2c).
 
-    Where it does not follow them it keeps the one flow. `linearise` is the point at which the
-    flows are replaced by their tangents, None where they are not.
+    If `follow` is false, the run ignores the transitions of the model and keeps the flow of `mode`.
+    `linearise` is the point at which each flow is replaced by its tangent, or None for no
+    replacement.
     """
 
     mode: str
@@ -136,9 +147,10 @@ class ModelRun:
 
 @dataclass(frozen=True)
 class Mode:
-    """A discrete state: what holds and what happens in it.
+    """A discrete state with its equations, flow, actions and transitions.
 
-    `beside` are the regions that run parallel to a mode of the chart; others have none.
+    `parallel_regions` are the regions that run parallel to a mode of the region `chart`; it is
+    empty for other modes.
     """
 
     name: str
@@ -159,16 +171,20 @@ class Mode:
 
     @property
     def label(self) -> str:
-        """The name of the mode, with that of its region if that is not the chart."""
+        """The name of the mode as an identifier: underscores replace dots.
+
+        It is prefixed by the name of the region unless that is `chart`.
+        """
         name = self.name if self.region == CHART else f"{self.region}_{self.name}"
         return name.replace(".", "_")
 
 
 @dataclass(frozen=True)
 class Region:
-    """A parallel region: one of its modes is active at any time (rule 14).
+    """A set of modes of which one is active at any time (rule 14).
 
-    One that stands inside a mode is in none, and has the number `inactive`, while that is left.
+    A region inside a mode is inactive while that mode is left; its mode variable then holds the
+    number `inactive`. For a region of the root `inactive` is None.
     """
 
     name: str
@@ -179,13 +195,13 @@ class Region:
 
     @cached_property
     def max_transitions(self) -> int:
-        """The largest number of transitions that leave one mode."""
+        """The largest number of transitions that leave one mode of the region."""
         return max(len(mode.transitions) for mode in self.modes.values())
 
 
 @dataclass(frozen=True)
 class Element:
-    """A part of the physics on which effects may be laid; `far` are what acts at its far end."""
+    """A two-terminal part to which effects can be applied; `far` names what acts at its far end."""
 
     name: str
     kind: Literal["elastic", "inertia"]
@@ -197,10 +213,11 @@ class Element:
 
 @dataclass(frozen=True)
 class Automaton:
-    """A hybrid automaton: sampled if it has a period, continuous otherwise.
+    """A hybrid automaton: sampled if it has a period [s], continuous otherwise.
 
-    `modes` and `initial` are those of the chart; `regions` run parallel to it. Where modes stand
-    inside modes, `modes` are the innermost ones, `superstates` all others; `tree` is their order.
+    `modes` and `initial` belong to the region `chart`, and `regions` run parallel to it. In a chart
+    with nested modes, `modes` holds the innermost modes, `superstates` the others, and `statechart`
+    the tree.
     """
 
     name: str
@@ -231,45 +248,46 @@ class Automaton:
     statechart: Chart | None = None
 
     def output_source(self, output: str) -> str:
-        """Return the state or equation that an output reads: its own name unless it says more."""
+        """Return the state or equation that an output reads: by default the one of its own name."""
         return self.output_sources.get(output, output)
 
     @property
     def is_sampled(self) -> bool:
-        """Tell whether the automaton ticks."""
+        """Whether the automaton executes once a period."""
         return self.period is not None
 
     @cached_property
     def root_region(self) -> Region:
-        """The modes at the root, as a region."""
+        """The modes of the root as the region `chart`."""
         return Region(CHART, self.modes, self.initial, self.span)
 
     @cached_property
     def all_regions(self) -> tuple[Region, ...]:
-        """The chart, then the regions beside it."""
+        """The region `chart`, then the parallel regions in the order of the file."""
         return (self.root_region, *self.regions)
 
     @cached_property
     def all_modes(self) -> tuple[Mode, ...]:
-        """The modes of all regions, those of the chart first; superstates last."""
+        """The modes of all regions, those of `chart` first, then the superstates."""
         inner = (mode for region in self.all_regions for mode in region.modes.values())
         return (*inner, *self.superstates)
 
     @cached_property
     def modes_by_key(self) -> Mapping[str, Mode]:
-        """All modes by their key path."""
+        """All modes, superstates included, by key path."""
         return {mode.key: mode for mode in self.all_modes}
 
     @cached_property
     def _regions_by_name(self) -> Mapping[str, Region]:
+        """All regions by name; of equal names the first one counts."""
         return {region.name: region for region in reversed(self.all_regions)}
 
     def region(self, name: str) -> Region:
-        """Return the region of a name."""
+        """Return the region of a name. Raises KeyError."""
         return self._regions_by_name[name]
 
     def source_mode(self, transition: Transition) -> Mode:
-        """Return the mode that a transition leaves."""
+        """Return the mode, possibly a superstate, that a transition leaves."""
         found = self.region(transition.region).modes.get(transition.source)
         return found or next(
             mode
@@ -278,17 +296,21 @@ class Automaton:
         )
 
     def target_mode(self, transition: Transition) -> Mode:
-        """Return the mode that a transition enters."""
+        """Return the innermost mode that a transition names as its target. Raises KeyError."""
         return self.region(transition.region).modes[transition.target]
 
     @cached_property
     def state_variables(self) -> Mapping[str, State]:
-        """The states and discrete variables: all that assignments may write."""
+        """The states and discrete variables by name: the variables that assignments may write."""
         return {**self.states, **self.discrete}
 
     @cached_property
     def enum_literals(self) -> Mapping[str, int]:
-        """The names of enumerations with their numbers, those of the model too."""
+        """The integer values of all enumeration literals by name, those of the model included.
+
+        A literal's value is its index in the declaration. A literal of this automaton overrides an
+        equal name of the model.
+        """
         lists = [thing.values for thing in self.parameters.values()]
         lists += [thing.values for thing in self.inputs.values()]
         lists += [thing.values for thing in self.discrete.values()]

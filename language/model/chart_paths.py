@@ -1,7 +1,7 @@
-"""Chart target: what the name of a mode means where it stands in a chart.
+"""Chart paths: resolution of the names of modes in a chart.
 
-A name is looked for among the siblings of the transition's mode, then among those of its parents,
-at last among the modes inside it; a dotted path from the root is always exact.
+A name is searched among the siblings of the source mode of the transition, then among the siblings
+of each ancestor, and last among the children of the source. A dotted path from the root is exact.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from language.model.statechart import ROOT, Chart, ChartNode
 
 
 class NamedNode(Protocol):
-    """What is needed of a node to look inside it."""
+    """The attributes of a tree node that a search by path needs."""
 
     @property
     def name(self) -> str:
-        """Its own name."""
+        """The name of the node, without those of its ancestors."""
 
     @property
     def children(self) -> Sequence[int]:
-        """The places of those inside it."""
+        """The indices of the child nodes."""
 
 
 def find_descendant(nodes: Sequence[NamedNode], owner: int, path: str) -> int | None:
-    """Return the node that a path names from one that holds it."""
+    """Return the index of the node at a dotted path below the node `owner`, or None."""
     for part in path.split("."):
         found = [child for child in nodes[owner].children if nodes[child].name == part]
         if not found:
@@ -36,7 +36,13 @@ def find_descendant(nodes: Sequence[NamedNode], owner: int, path: str) -> int | 
 
 
 def resolve_target(chart: Chart, source: ChartNode, name: str) -> ChartNode | None:
-    """Return the node that a transition of another names."""
+    """Return the node that the target `name` of a transition of `source` denotes, or None.
+
+    A dotted name is first tried as a path from the root, without and with the prefix `chart.`.
+    Otherwise the first part of the name is searched among the children of each ancestor of
+    `source`, from the inside out, then among the children of `source`; the remaining parts are
+    resolved below the hit.
+    """
     first, _, rest = name.partition(".")
     if rest:
         for start in (name, f"{CHART}.{name}"):
@@ -54,13 +60,16 @@ def resolve_target(chart: Chart, source: ChartNode, name: str) -> ChartNode | No
 
 
 def target_names(chart: Chart) -> list[str]:
-    """Return the names by which modes can be targets."""
+    """Return the names that `to` may contain: the short names of all nodes, then all paths."""
     nodes = [node for node in chart.nodes if node.index != ROOT]
     return [*(node.name for node in nodes), *(node.path for node in nodes)]
 
 
 def mode_paths(chart: Chart) -> dict[str, ChartNode]:
-    """Return the names by which `in(...)` asks for modes: of the chart with it and without."""
+    """Return the nodes that `in(...)` may name, by path: modes and regions, but no histories.
+
+    A node inside the root region `chart` is listed with and without the prefix `chart.`.
+    """
     paths: dict[str, ChartNode] = {}
     for node in chart.nodes:
         if node.index != ROOT and node.kind != "history":
@@ -71,10 +80,11 @@ def mode_paths(chart: Chart) -> dict[str, ChartNode]:
 
 
 def fault_modes(chart: Chart) -> dict[str, ChartNode]:
-    """Return the modes that a fault may enter: those of the chart, of none of its regions."""
+    """Return the nodes that `fault_mode` may name: nodes whose region is `chart`, by path."""
     return {name: node for name, node in mode_paths(chart).items() if node.region == CHART}
 
 
 def _is_in_root_region(chart: Chart, node: ChartNode) -> bool:
+    """Tell whether the outermost ancestor of a node is the region `chart`."""
     *_, region = chart.ancestors(node)
     return region.name == CHART

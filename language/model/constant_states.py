@@ -1,6 +1,7 @@
-"""Resting: states whose rate is 0 in a mode, as it is written or by an equation that is 0.
+"""Constant states: states whose rate is zero in a mode.
 
-Nothing of them is computed, so they stay what they are to the last bit.
+A rate counts as zero if it is the literal 0 or an equation whose formulas are all 0. The
+integration leaves out such states, so they keep their value bit for bit.
 """
 
 from __future__ import annotations
@@ -13,19 +14,22 @@ from language.model.region_queries import equation_formulas
 
 @cache_on_owner
 def constant_states(mode: Mode) -> frozenset[str]:
-    """Return the states that rest in a mode of the chart."""
+    """Return the states whose balance in a mode has a right side of zero."""
     flow = mode.flow.values()
     return frozenset(balance.state for balance in flow if _is_zero(mode, balance.right))
 
 
 def varying_states(automaton: Automaton, mode: str) -> tuple[str, ...]:
-    """Return the states that move in a mode, in the order of the file."""
+    """Return the states that are not constant in the mode of a name, in the order of the file."""
     constant = constant_states(automaton.modes[mode])
     return tuple(name for name in automaton.states if name not in constant)
 
 
 def ever_varying_states(automaton: Automaton) -> tuple[str, ...]:
-    """Return the states that move in one mode at least."""
+    """Return the states that vary in at least one mode of the region `chart`.
+
+    They are in the order of the file.
+    """
     constant = frozenset(automaton.states).intersection(
         *map(constant_states, automaton.modes.values())
     )
@@ -33,17 +37,21 @@ def ever_varying_states(automaton: Automaton) -> tuple[str, ...]:
 
 
 def never_varying_states(automaton: Automaton) -> frozenset[str]:
-    """Return the states that rest in all modes."""
+    """Return the states that are constant in all modes of the region `chart`."""
     return frozenset(automaton.states).difference(ever_varying_states(automaton))
 
 
 def written_states(automaton: Automaton) -> tuple[str, ...]:
-    """Return the states that a run writes: those that move, and those that a transition resets."""
+    """Return the states that a simulation writes, in the order of the file.
+
+    These are the states that vary in some mode and the states that some transition resets.
+    """
     reset = {n for mode in automaton.all_modes for one in mode.transitions for n in one.reset}
     return tuple(n for n in automaton.states if n in ever_varying_states(automaton) or n in reset)
 
 
 def _is_zero(mode: Mode, tree: SyntaxTree) -> bool:
+    """Tell whether an expression is the literal 0 or a name of equations that are all zero."""
     match tree:
         case NumberLiteral(value):
             return value == 0

@@ -1,4 +1,4 @@
-"""Declaration: what an automaton declares - parameters, tables, inputs, states, and formulas."""
+"""Declarations: the data classes of parameters, inputs, states and their formulas."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ ParameterKind = Literal["fixed", "tunable", "derived"]
 
 @dataclass(frozen=True)
 class Formula:
-    """An expression and the key path that it stands under; `whole`: its value is whole."""
+    """An expression with the key path at which it is written.
+
+    `is_integer` tells that the type of its value is `int`.
+    """
 
     tree: SyntaxTree
     key: str
@@ -28,22 +31,22 @@ class Formula:
 
     @cached_property
     def reads(self) -> tuple[str, ...]:
-        """The names that the expression reads, from left to right."""
+        """The names that the expression reads, from left to right, with repetitions."""
         return tuple(name.path for name in names(self.tree))
 
     @property
     def span(self) -> Span:
-        """The place of the expression."""
+        """The place of the expression in its file."""
         return self.tree.span
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """What a fit needs to know of a parameter (SI).
+    """The settings of a parameter for a fit to recordings; values are in SI.
 
-    `neutral` is the value at which the effect that brought it vanishes, `absent` where there is
-    none, `plain` the value at which it is a plainer one than its name says; `starts` are values to
-    start from; `per` is `recording` for one value each.
+    `neutral` is the value at which the effect of the parameter vanishes, or `absent` if there is no
+    such value. `plain` is the value at which the effect reduces to a simpler one. `starts` are
+    start values of the fit. With `per: recording` each recording has a value of its own.
     """
 
     neutral: Fraction | Literal["absent"] | None = None
@@ -55,9 +58,10 @@ class Fitting:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value in SI (exact) or, if derived, an expression of other parameters.
+    """A parameter with an exact value in SI or, if derived, an expression of other parameters.
 
-    The value of a `bool` is 0 or 1, that of an `enum` the place in `values`.
+    The value of a `bool` is 0 or 1, the value of an `enum` the index in `values`. A parameter with
+    a `table` has neither value nor expression.
     """
 
     name: str
@@ -77,9 +81,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class RangePolicy:
-    """What becomes of a value outside its range (rule 18), and the fault bit that it sets.
+    """The reaction to a value outside its range (rule 18), and the fault bit that it sets.
 
-    `fallback` (a value in SI, or `hold`) is for a value that is not finite.
+    `fallback` (a value in SI, or `hold`) replaces a value that is not finite.
     """
 
     on_range: Literal["saturate", "hold", "fault"] = "saturate"
@@ -89,7 +93,7 @@ class RangePolicy:
 
 @dataclass(frozen=True)
 class Input:
-    """A value from outside; `values` are those of an `enum`."""
+    """An input of an automaton; `values` are the literals of an `enum`."""
 
     name: str
     unit: Unit
@@ -104,13 +108,13 @@ class Input:
 
     @property
     def is_bool(self) -> bool:
-        """Tell whether it is true or false."""
+        """Whether the type of the input is `bool`."""
         return self.type == "bool"
 
 
 @dataclass(frozen=True)
 class State:
-    """A continuous variable, or what a sampled automaton carries from tick to tick."""
+    """A continuous state, or a variable that a sampled automaton retains from tick to tick."""
 
     name: str
     unit: Unit
@@ -127,4 +131,4 @@ class State:
 MICRO_STEP_LIMIT_FAULT = "micro_step_limit"
 
 BUILTIN_FAULTS = ("event_limit", MICRO_STEP_LIMIT_FAULT, "rewind_limit", "stale_calibration")
-"""Faults that the product names itself."""
+"""The fault bits that the product sets itself; a spec must not declare them."""

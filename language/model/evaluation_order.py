@@ -1,4 +1,4 @@
-"""Order: what reads what, so that each name comes after those that it reads."""
+"""Evaluation order: equations in the order of their dependences, and modes that are unreachable."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from language.text.diagnostic import Problems, Span, SpecError
 
 @cache_on_owner
 def equation_order(mode: Mode) -> list[str]:
-    """Return the names of a mode's equations so that each comes after those that it reads.
+    """Return the names of the equations of a mode, each after the equations that it reads.
 
-    Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
+    Ties are resolved by the order in the file. Raises SpecError if there is an algebraic loop; the
+    message names its members.
     """
     formulas = equation_formulas(mode)
     edges = reversed_edges(
@@ -43,7 +44,11 @@ def equation_order(mode: Mode) -> list[str]:
 def report_cycle(
     trees: Mapping[str, SyntaxTree], spans: Mapping[str, Span], what: str, problems: Problems
 ) -> None:
-    """Report names whose values follow from each other in a circle."""
+    """Report the first cycle among named expressions that read each other, if there is one.
+
+    `what` is the key of the expressions, such as `initial`. The problem is placed at the span of
+    the first member.
+    """
     cycle = find_cycle(_reader_edges({name: [tree] for name, tree in trees.items()}))
     if cycle:
         label = f"`{what}` values in a circle: {format_cycle(cycle)}"
@@ -54,9 +59,10 @@ def report_cycle(
 def unreachable_modes(
     modes: Mapping[str, Mode], initial: str, ignored_keys: Set[str] = frozenset()
 ) -> list[str]:
-    """Return the modes that no chain of transitions from the initial mode enters.
+    """Return the modes that no sequence of transitions from `initial` enters.
 
-    The silent ones, by key path, never fire.
+    They are in the order of `modes`. `ignored_keys` are the key paths of transitions that never
+    fire.
     """
     edges = {
         mode.name: [way.target for way in mode.transitions if way.key not in ignored_keys]
@@ -67,11 +73,12 @@ def unreachable_modes(
 
 
 def _format_places(cycle: Sequence[str], spans: Mapping[str, Span]) -> str:
+    """Return the places of all members of a cycle but the first, as text for a hint."""
     return "".join(f"; `{name}` is at {spans[name]}" for name in cycle[1:])
 
 
 def _reader_edges(trees: Mapping[str, Sequence[SyntaxTree]]) -> dict[str, list[str]]:
-    """From each name to those that read it."""
+    """Return the edges from each name to the names whose expressions read it."""
     reads = {
         name: [read.path for tree in alternatives for read in names(tree)]
         for name, alternatives in trees.items()

@@ -1,4 +1,4 @@
-"""Reading: the names that the expressions of an automaton read."""
+"""Names read: the names that the expressions of an automaton read."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from language.text.diagnostic import Span
 
 
 def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[str]:
-    """Yield the names in all expressions of an automaton, its own ones, no model's.
+    """Yield the names in all expressions of an automaton, in no defined order and with repetitions.
 
-    `include_waits`: those of `wait` too.
+    The expressions of its model are left out. Expressions of `wait` are left out unless
+    `include_waits` is set.
     """
     stack: list[Any] = [
         getattr(automaton, field.name)

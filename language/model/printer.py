@@ -1,4 +1,4 @@
-"""Model text: a checked model printed, one value a line, with SI values and dimensions."""
+"""Printer of the checked model: one value a line, values in SI, with dimensions."""
 
 from __future__ import annotations
 
@@ -30,12 +30,19 @@ SKIPPED_FIELDS = ("name", "key", "span")
 
 
 def format_model(automaton: Automaton) -> str:
-    """Return a checked automaton as text: every value in SI, every operation in parentheses."""
+    """Return a checked automaton as text, one field a line, indented by depth.
+
+    Values are in SI and each operation is in parentheses. Fields with default values, keys and
+    places are left out.
+    """
     return "\n".join([f"automaton {automaton.name}", *_field_lines(automaton, 1)]) + "\n"
 
 
 def format_tree(tree: SyntaxTree) -> str:
-    """Return an expression with every operation in parentheses and literals in SI."""
+    """Return an expression as text with each operation in parentheses and literals in SI.
+
+    A tree of an unknown class gives `?`.
+    """
     match tree:
         case NumberLiteral(value, unit, _):
             return _format_number(value) + (
@@ -67,6 +74,7 @@ def format_tree(tree: SyntaxTree) -> str:
 
 
 def _field_lines(thing: object, depth: int) -> Iterator[str]:
+    """Yield the lines of the fields of a dataclass that differ from their defaults."""
     assert dataclasses.is_dataclass(thing) and not isinstance(thing, type)
     for item in dataclasses.fields(thing):
         if item.name not in SKIPPED_FIELDS and getattr(thing, item.name) != item.default:
@@ -74,6 +82,7 @@ def _field_lines(thing: object, depth: int) -> Iterator[str]:
 
 
 def _value_lines(name: str, value: object, depth: int) -> Iterator[str]:
+    """Yield the lines of a named value; an empty collection has none."""
     head = INDENT * depth + name
     short = _format_inline(value)
     if short is not None:
@@ -90,7 +99,10 @@ def _value_lines(name: str, value: object, depth: int) -> Iterator[str]:
 
 
 def _format_inline(value: object) -> str | None:
-    """Return what fits on the line of its name; None for what has lines of its own."""
+    """Return a value as text if it fits on the line of its name, otherwise None.
+
+    A place (`Span`) gives an empty text: its name alone is printed.
+    """
     match value:
         case bool():
             return "true" if value else "false"
@@ -116,8 +128,10 @@ def _format_inline(value: object) -> str | None:
 
 
 def _item_name(item: object) -> str:
+    """Return the name of an item of a tuple, or of its class if it has none."""
     return str(getattr(item, "name", type(item).__name__))
 
 
 def _format_number(value: Fraction) -> str:
+    """Return an integer exactly, and a fraction as the shortest text of its float64 value."""
     return str(value.numerator) if value.denominator == 1 else repr(float(value))

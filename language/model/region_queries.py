@@ -1,7 +1,8 @@
-"""Region: what parallel regions give to a mode of the chart - names, guards, sources (rule 14).
+"""Region queries: the equations, balances and transitions of a mode and its parallel regions.
 
-All regions read one snapshot. An equation may stand in the modes of any one region; while a mode
-of the chart is active, those of the regions beside it are chosen by the region's own mode.
+All regions read one snapshot (rule 14). An equation may be defined in the modes of one parallel
+region only. While a mode of the region `chart` is active, the active mode of that parallel region
+selects the formula.
 """
 
 from __future__ import annotations
@@ -15,13 +16,20 @@ from language.model.declaration import Formula
 
 
 def equation_names(mode: Mode) -> list[str]:
-    """Return the names of the equations that hold while a mode is active."""
+    """Return the names of the equations that are defined while a mode is active.
+
+    These are the equations of the mode, then those of its parallel regions.
+    """
     return list(equation_formulas(mode))
 
 
 @cache_on_owner
 def equation_formulas(mode: Mode) -> dict[str, tuple[Formula, ...]]:
-    """Return each equation's formulas: one, or those of the modes of a region beside."""
+    """Return the formulas of each equation that is defined while a mode is active.
+
+    An equation of the mode itself has one formula; an equation of a parallel region has one formula
+    for each mode of the region that defines it.
+    """
     formulas: dict[str, tuple[Formula, ...]] = {}
     formulas.update({name: (formula,) for name, formula in mode.equations.items()})
     for region in mode.parallel_regions:
@@ -33,19 +41,25 @@ def equation_formulas(mode: Mode) -> dict[str, tuple[Formula, ...]]:
 
 @cache_on_owner
 def region_equations(region: Region) -> list[str]:
-    """Return the names that the modes of a region define."""
+    """Return the names of the equations that the modes of a region define, each once."""
     return list(dict.fromkeys(name for mode in region.modes.values() for name in mode.equations))
 
 
 def region_of_equation(mode: Mode, name: str) -> Region | None:
-    """Return the region beside a mode that defines an equation, None for the mode's own."""
+    """Return the parallel region of a mode that defines an equation, or None for the mode itself.
+
+    Raises StopIteration if neither defines it.
+    """
     if name in mode.equations:
         return None
     return next(region for region in mode.parallel_regions if name in region_equations(region))
 
 
 def region_of_balance(mode: Mode, state: str) -> Region | None:
-    """Return the region beside a mode that balances a state, None for the mode's own."""
+    """Return the parallel region of a mode that balances a state, or None for the mode itself.
+
+    Raises StopIteration if neither has a balance of the state.
+    """
     if state in mode.flow:
         return None
     modes_of = {region.name: region.modes.values() for region in mode.parallel_regions}
@@ -53,7 +67,7 @@ def region_of_balance(mode: Mode, state: str) -> Region | None:
 
 
 def possible_balances(mode: Mode) -> Iterator[Balance]:
-    """Yield every balance that may hold while a mode of the chart is active."""
+    """Yield the balances of a mode, then those of all modes of its parallel regions."""
     yield from mode.flow.values()
     for region in mode.parallel_regions:
         for other in region.modes.values():
@@ -61,7 +75,7 @@ def possible_balances(mode: Mode) -> Iterator[Balance]:
 
 
 def watched_transitions(mode: Mode) -> Iterator[Transition]:
-    """Yield every transition that may be watched while a mode of the chart is active."""
+    """Yield the transitions of a mode, then those of all modes of its parallel regions."""
     yield from mode.transitions
     for region in mode.parallel_regions:
         for other in region.modes.values():
@@ -70,15 +84,19 @@ def watched_transitions(mode: Mode) -> Iterator[Transition]:
 
 @cache_on_owner
 def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
-    """Return the transitions of a mode with their index, the smallest priority first (rule 3a)."""
+    """Return pairs of index and transition of a mode, in ascending order of `priority` (rule 3a).
+
+    A transition without a priority has priority 0; equal priorities are in the order of the file.
+    """
     pairs = list(enumerate(mode.transitions))
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 
 
 def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
-    """Return the source of a transition as a mode that has the equations of all other regions.
+    """Return the source of a transition with the equations of one mode configuration.
 
-    Of another region its initial mode counts; for a search of witnesses, which prove nothing.
+    All other regions are in their initial mode. The result has no parallel regions. It serves the
+    search of witnesses, which proves nothing.
     """
     source = automaton.source_mode(transition)
     found: dict[str, Formula] = {}
@@ -90,14 +108,17 @@ def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
 
 
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
-    """Return the modes of the chart with the regions that run beside them."""
+    """Return copies of modes whose `parallel_regions` are `regions`, by name."""
     return {
         name: dataclasses.replace(mode, parallel_regions=regions) for name, mode in modes.items()
     }
 
 
 def equation_closure(mode: Mode, names: Iterable[str]) -> set[str]:
-    """Return the equations of a mode that the wanted names need."""
+    """Return the names of the equations of a mode on which `names` depend, directly or indirectly.
+
+    The names themselves are included if they are equations.
+    """
     needed: set[str] = set()
     known = equation_formulas(mode)
     stack = [name for name in names if name in known]

@@ -1,9 +1,9 @@
-"""Chart: modes inside modes as a tree - what is active together, what a transition leaves.
+"""Statechart: the tree of nested modes of a chart, with its exit and entry sets.
 
-The nodes stand in the order of the file, each before those inside it. A node of kind `compound` is
-in one of its children, a `parallel` one in all of them: these are regions. The innermost nodes of
-a region have numbers; its variable holds that of the active one. The words are those of W3C's
-SCXML (2015, appendix D), whose selection and entry these charts follow.
+The nodes are in the order of the file, each before its descendants. Of a node of kind `compound`
+one child is active; of a `parallel` node all children are active, and these are regions. The
+innermost nodes of a region have numbers, and the mode variable of the region holds the number of
+the active one. Selection and entry follow W3C SCXML (2015, appendix D), whose terms are used here.
 """
 
 from __future__ import annotations
@@ -17,16 +17,19 @@ NodeKind = Literal["atomic", "compound", "parallel", "history"]
 HistoryKind = Literal["", "shallow", "deep"]
 TransitionOrder = Literal["outer_first", "inner_first"]
 ROOT = 0
-"""The node that holds the regions of the root; it is never left."""
+"""The index of the node that contains the regions of the root; it is never left."""
 
 
 @dataclass(frozen=True)
 class ChartNode:
-    """A mode or region in the tree; `last` is the last node inside it.
+    """A mode, region or history in the tree of a chart.
 
-    `path` names it from the root, `region` is the region whose variable tells of it, `number` is
-    what that holds. `mode` is the key path of its Mode. `initial` are the nodes that it is entered
-    at; of a history those where nothing was left before. `rank` orders regions side by side.
+    `last_descendant` is the index of its last descendant, or its own. `path` is the dotted path
+    from the root. `region` is the region whose mode variable shows that the node is active, and
+    `number` the value of that variable; compound nodes and histories have none. `mode_key` is the
+    key path of its Mode. `initial` are the indices of the nodes that are entered by default; for a
+    history, those that are entered if nothing was active before. `priority` orders parallel
+    regions.
     """
 
     index: int
@@ -46,13 +49,13 @@ class ChartNode:
     priority: int = 0
 
     def contains(self, other: int) -> bool:
-        """Tell whether a node is this one or inside it."""
+        """Tell whether the node of an index is this node or a descendant."""
         return self.index <= other <= self.last_descendant
 
 
 @dataclass(frozen=True)
 class ChartEvent:
-    """An event: its number in the queue, and whether it comes as an input."""
+    """An event: its number in the queue, and whether it is raised by an input."""
 
     name: str
     number: int
@@ -61,9 +64,9 @@ class ChartEvent:
 
 @dataclass(frozen=True)
 class ChartTransition:
-    """A transition in the tree: its source, targets, and the node whose inside it leaves.
+    """A transition in the tree: its source, its targets, and the node whose descendants it exits.
 
-    `domain` is None where nothing is left: the transition has no target.
+    `domain` is None for a transition without a target, which exits nothing.
     """
 
     source: int
@@ -73,7 +76,7 @@ class ChartTransition:
 
 @dataclass(frozen=True)
 class Chart:
-    """The tree of an automaton with its events; `ways` are by the key path of the transition."""
+    """The tree of a chart with its events; `transitions` are by the key path of the transition."""
 
     nodes: tuple[ChartNode, ...]
     events: Mapping[str, ChartEvent]
@@ -83,10 +86,11 @@ class Chart:
 
     @cached_property
     def regions(self) -> tuple[ChartNode, ...]:
-        """All regions, outer ones first; those side by side by their rank."""
+        """All regions in preorder; siblings are in ascending order of priority, then of index."""
         result: list[ChartNode] = []
 
         def visit(node: ChartNode) -> None:
+            """Append the regions below a node."""
             children = [self.nodes[child] for child in node.children]
             if node.kind == "parallel":
                 children.sort(key=lambda child: (child.priority, child.index))
@@ -99,6 +103,7 @@ class Chart:
 
     @cached_property
     def _leaves(self) -> Mapping[str, tuple[ChartNode, ...]]:
+        """The numbered nodes of each region, by the name of the region."""
         result: dict[str, list[ChartNode]] = {region.region: [] for region in self.regions}
         for node in self.nodes:
             if node.number is not None:
@@ -106,45 +111,51 @@ class Chart:
         return {name: tuple(nodes) for name, nodes in result.items()}
 
     def leaves(self, region: str) -> tuple[ChartNode, ...]:
-        """Return the innermost nodes of a region: its variable holds the number of one."""
+        """Return the innermost nodes of a region in the order of the file."""
         return self._leaves[region]
 
     def leaves_of(self, node: ChartNode) -> tuple[ChartNode, ...]:
-        """Return the nodes of its own region that a node is active in."""
+        """Return the innermost nodes of the node's region that are the node or its descendants."""
         return tuple(leaf for leaf in self.leaves(node.region) if node.contains(leaf.index))
 
     def region_node(self, name: str) -> ChartNode:
-        """Return the node of a region."""
+        """Return the node of the region of a name. Raises StopIteration."""
         return next(region for region in self.regions if region.region == name)
 
     def ancestors(self, node: ChartNode) -> Iterator[ChartNode]:
-        """Yield a node and all that hold it, up to those of the root."""
+        """Yield a node, then its ancestors from the inside out; the root is left out."""
         while node.index != ROOT:
             yield node
             node = self.nodes[node.parent]
 
     def region_ancestors(self, leaf: ChartNode) -> tuple[ChartNode, ...]:
-        """Return a node and those that hold it, in its own region: the region itself is last."""
+        """Return a node and its ancestors in its own region, from the inside out.
+
+        The last node is that of the region itself.
+        """
         return tuple(node for node in self.ancestors(leaf) if node.region == leaf.region)
 
     def child_regions(self, node: ChartNode) -> tuple[ChartNode, ...]:
-        """Return the regions of a parallel node, none of another."""
+        """Return the children of a node that are regions; empty for a node that is not parallel."""
         children = (self.nodes[child] for child in node.children)
         return tuple(child for child in children if child.is_region)
 
     def parent_region(self, region: ChartNode) -> ChartNode | None:
-        """Return the region that a region stands in; None for one of the root."""
+        """Return the region that directly contains a region, or None for a region of the root."""
         parent = self.nodes[region.parent]
         return None if parent.index == ROOT else self.region_node(parent.region)
 
     def is_region_inside(self, region: ChartNode, other: ChartNode) -> bool:
-        """Tell whether a region stands somewhere inside another."""
+        """Tell whether a region is a proper descendant of another one."""
         return region.index != other.index and other.contains(region.index)
 
     def domain(self, source: ChartNode, targets: Iterable[ChartNode], internal: bool) -> int | None:
-        """Return the innermost compound node around source and targets: its inside is left.
+        """Return the index of the innermost compound node that contains source and targets.
 
-        An internal transition to what is inside its source does not leave that.
+        This is the transition domain of SCXML; the transition exits its active descendants. The
+        domain itself is neither the source nor a target, except that an internal transition to
+        descendants of a compound source has the source as its domain. Returns None without targets,
+        and ROOT if no compound node contains all of them.
         """
         target_indices = [target.index for target in targets]
         if not target_indices:
@@ -161,15 +172,19 @@ class Chart:
         return ROOT
 
     def exited_domains(self, transitions: Iterable[ChartTransition]) -> frozenset[int]:
-        """Return the domains of some transitions."""
+        """Return the set of domains of transitions; transitions without a target are left out."""
         return frozenset(way.domain for way in transitions if way.domain is not None)
 
     def are_nested(self, left: int, right: int) -> bool:
-        """Tell whether of two nodes one holds the other."""
+        """Tell whether one of two nodes contains the other or they are the same."""
         return self.nodes[left].contains(right) or self.nodes[right].contains(left)
 
     def entry_set(self, node: ChartNode, targets: Iterable[int]) -> list[ChartNode]:
-        """Return the nodes that entering one enters, outer ones first, nothing remembered."""
+        """Return the nodes that an entry of `node` activates, in preorder, without any history.
+
+        `targets` below the node are entered instead of `initial`. A history gives its `initial`
+        nodes and what lies between them and its parent. All regions of a parallel node are entered.
+        """
         targets = [w for w in targets if node.contains(w) and w != node.index]
         if node.kind == "history":
             inside = [self.nodes[w] for w in node.initial]
@@ -188,10 +203,10 @@ class Chart:
         return result
 
     def initial_configuration(self) -> list[ChartNode]:
-        """Return the nodes that are active at the start."""
+        """Return the nodes that are active at the start, by region of the root."""
         regions = (node for node in self.regions if node.parent == ROOT)
         return [node for region in regions for node in self.entry_set(region, ())]
 
     def depth(self, node: ChartNode) -> int:
-        """Return how many nodes hold a node."""
+        """Return the number of nodes from the root to a node: 1 for a region of the root."""
         return sum(1 for _ in self.ancestors(node))

@@ -1,4 +1,4 @@
-"""Experiment: a checked system with its connections, a scenario for it, and maps of recordings."""
+"""System: the data classes of systems, scenarios and recording maps."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from language.typecheck.types import TypeName
 
 @dataclass(frozen=True)
 class StimulusPiece:
-    """An input from `start` [s] on: value + slope * (t - start), or a formula of `time` (SI)."""
+    """An input from `start` [s] on: value + slope * (t - start), or a formula of `time`; SI."""
 
     start: Fraction
     value: Fraction
@@ -28,15 +28,15 @@ class StimulusPiece:
 
     @property
     def varies(self) -> bool:
-        """Tell whether the input changes between events."""
+        """Whether the value changes within the piece; True for every formula."""
         return self.slope != 0 or self.formula is not None
 
 
 @dataclass(frozen=True)
 class Stimulus:
-    """An input over time: right-continuous pieces, the first at time 0. Their starts are events.
+    """An input over time as right-continuous pieces, the first at time 0; each start is an event.
 
-    `column` names the column of the scenario's recording that gives the pieces instead.
+    If `column` is set, that column of the scenario's recording replaces the pieces.
     """
 
     pieces: tuple[StimulusPiece, ...]
@@ -45,20 +45,20 @@ class Stimulus:
 
     @property
     def steps(self) -> tuple[tuple[Fraction, Fraction], ...]:
-        """When each piece starts, and its value there."""
+        """The start [s] and the value there of each piece."""
         return tuple((piece.start, piece.value) for piece in self.pieces)
 
     @property
     def varies(self) -> bool:
-        """Tell whether the input changes between events."""
+        """Whether the input changes within some piece."""
         return any(piece.varies for piece in self.pieces)
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A measured output; the stages apply in the order of the fields (0: stage absent), SI.
+    """A measured output with its stages in the order of the fields, in SI (rule 19c).
 
-    `period` is None where the sensor gives its value whenever it is read.
+    A stage of value 0 is absent. A sensor with the period None gives its value whenever it is read.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class DelayedSignal:
-    """A delayed signal in a connection: `source` as it was `delay` [s] ago."""
+    """A signal in a connection with the value that `source` had `delay` [s] ago."""
 
     name: str
     source: str
@@ -84,7 +84,7 @@ class DelayedSignal:
 
 @dataclass(frozen=True)
 class RecordingSource:
-    """The recording that a scenario takes inputs from, and how its columns become signals."""
+    """The recording from which a scenario takes inputs, with the map of its columns."""
 
     path: Path
     mapping: RecordingMap
@@ -93,7 +93,7 @@ class RecordingSource:
 
 @dataclass(frozen=True)
 class Instance:
-    """A named use of an automaton in a system."""
+    """A named use of an automaton in a system; `offset` [s] is the time of its first tick."""
 
     name: str
     automaton: Automaton
@@ -104,7 +104,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class SystemInput:
-    """An input of a system."""
+    """An input of a system; `values` are the literals of an `enum`."""
 
     name: str
     unit: Unit
@@ -115,15 +115,16 @@ class SystemInput:
 
     @property
     def is_bool(self) -> bool:
-        """Tell whether it is true or false."""
+        """Whether the type of the input is `bool`."""
         return self.type == "bool"
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What an input of an instance reads: a signal by name, a constant (SI) or an expression.
+    """The source of an input of an instance: a signal by name, a constant (SI) or an expression.
 
-    Signals are inputs of the system, its sensors and lines, and outputs `instance.output`.
+    `target` is the instance and its input. Signals are inputs of the system, sensors, delayed
+    signals, and outputs written `instance.output`.
     """
 
     target: tuple[str, str]
@@ -132,7 +133,7 @@ class Connection:
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The signals that are read."""
+        """The names of the signals that the connection reads, each once."""
         if isinstance(self.source, Formula):
             return tuple(dict.fromkeys(name.path for name in names(self.source.tree)))
         return (self.source,) if isinstance(self.source, str) else ()
@@ -140,11 +141,11 @@ class Connection:
 
 @dataclass(frozen=True)
 class System:
-    """Instances, how they are connected; `order`: how they and sensors run.
+    """Instances of automata with sensors and connections.
 
-    `dimensions` are those of the outputs that are expressions with a real value.
-
-    `alone` is the name of the one instance where the system was made around an automaton.
+    `order` is the order in which instances and sensors run at one instant. `dimensions` are those
+    of the outputs that are expressions with a real value. `sole_instance` is the name of the only
+    instance if the system was built for an automaton on its own.
     """
 
     name: str
@@ -161,7 +162,11 @@ class System:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """What can be recorded: inputs, outputs of instances, sensors, outputs of the system."""
+        """The names of the signals that can be recorded, each once.
+
+        These are the inputs, the outputs of instances as `instance.output`, the sensors and the
+        outputs of the system, in this order.
+        """
         parts = [
             f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
         ]
@@ -170,7 +175,7 @@ class System:
 
 @dataclass(frozen=True)
 class ScheduledCalibration:
-    """A calibration from a time on: values [SI] of tunable parameters by instance and name."""
+    """A calibration that applies from `time` [s] on: values [SI] by instance and parameter."""
 
     time: Fraction
     values: Mapping[tuple[str, str], Fraction]
@@ -178,10 +183,10 @@ class ScheduledCalibration:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Inputs, initial values, horizon of a system and what is recorded of it.
+    """The inputs, initial values and horizon of a simulation, and the signals that it records.
 
-    `horizon` is None where it is that of the recording; an initial value given as a text is the
-    first value of that column; `signals` is empty where everything is recorded.
+    `horizon` [s] is None if the recording determines it. An initial value that is a string is the
+    first value of that column of the recording. All signals are recorded if `signals` is empty.
     """
 
     name: str
@@ -199,7 +204,11 @@ class Scenario:
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """One signal of a recording: its columns (mean of them), target, unit and form."""
+    """The use of one or several columns of a recording as a signal.
+
+    Of several `columns` the mean is used. The signal is the input `to`, or it is compared with the
+    output `compare`. `delay` is in s. `time` names a time column of its own.
+    """
 
     name: str
     columns: tuple[str, ...]
@@ -216,18 +225,19 @@ class ColumnMapping:
 
 
 Window = tuple[Fraction, Fraction]
-"""From and to, both included [s], in the time of the recording."""
+"""Start and end [s] of an interval in the time of a recording, both included."""
 
 ALL_FILES = ""
-"""The key of windows that are not those of one file."""
+"""The key of windows that apply to every file."""
 
 
 @dataclass(frozen=True)
 class RecordingMap:
-    """How the columns of a recording become signals.
+    """The assignment of the columns of a recording to signals.
 
-    `windows` are the times to use, by file name or `EVERY_FILE`; where there is none, all is used.
-    `time` is empty where files carry time stamps themselves; `databases` are DBC files.
+    `windows` are the time intervals to use, by file name or `ALL_FILES`; without any, the whole
+    recording is used. `time` is empty if the files carry time stamps themselves. `databases` are
+    the names of DBC files.
     """
 
     name: str
@@ -240,5 +250,8 @@ class RecordingMap:
     databases: tuple[ScalarNode, ...] = ()
 
     def windows_of(self, file: str) -> tuple[Window, ...]:
-        """Return the windows of a file; none where all of it is used."""
+        """Return the windows of a file, else those for all files.
+
+        An empty result means that the whole file is used.
+        """
         return self.windows.get(file, self.windows.get(ALL_FILES, ()))

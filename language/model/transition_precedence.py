@@ -1,4 +1,4 @@
-"""Precedence: which transitions of a chart come before another one, wherever both are enabled."""
+"""Transition precedence: which transitions of a chart win over another one that is enabled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from language.model.statechart import ChartNode
 
 
 def node_of(automaton: Automaton, mode: Mode) -> ChartNode | None:
-    """Return the node of a mode in its chart, None where modes stand side by side alone."""
+    """Return the node of a mode in the chart of its automaton, or None without a chart."""
     nodes = automaton.statechart.nodes if automaton.statechart else ()
     return next((node for node in nodes if node.mode_key == mode.key), None)
 
@@ -20,9 +20,11 @@ def node_of(automaton: Automaton, mode: Mode) -> ChartNode | None:
 def preceding_transitions(
     automaton: Automaton, mode: Mode, transition: Transition
 ) -> list[Transition]:
-    """Return the transitions that win against one of a mode, guards and waits aside.
+    """Return the transitions that take precedence over one of a mode, guards and waits aside.
 
-    Those of smaller priority, and with `order: outer_first` those of the modes around it.
+    These are the transitions of the mode that come before it by priority and, with `order:
+    outer_first`, those of the superstates around the mode. Only transitions that are possible in
+    every micro-step in which `transition` is possible are returned.
     """
     position = [way for _, way in transitions_by_priority(mode)].index(transition)
     result = [way for _, way in transitions_by_priority(mode)[:position]]
@@ -39,9 +41,10 @@ def preceding_transitions(
 def inner_preceding_transitions(
     automaton: Automaton, mode: Mode
 ) -> Iterator[tuple[Mode, list[Transition]]]:
-    """Yield the innermost modes of a superstate with the transitions inside that win against its.
+    """Yield each innermost mode of a superstate with the inner transitions that win over its own.
 
-    With `order: outer_first` there are none.
+    The transitions are those of the innermost mode and of its ancestors below the superstate.
+    Yields nothing with `order: outer_first`, without a chart, and for an innermost mode.
     """
     chart, node = automaton.statechart, node_of(automaton, mode)
     if chart is None or node is None or chart.order != "inner_first":
@@ -54,7 +57,10 @@ def inner_preceding_transitions(
 
 
 def covers_events(automaton: Automaton, transition: Transition, other: Transition) -> bool:
-    """Tell whether a transition may be taken in every micro-step in which another may."""
+    """Tell whether a transition reacts to all events to which another transition reacts.
+
+    A transition without `event` reacts to all. Events that can never occur are ignored.
+    """
     if not transition.events or not other.events:
         return not transition.events
     return {*other.events} & possible_events(automaton) <= {*transition.events}
@@ -62,7 +68,7 @@ def covers_events(automaton: Automaton, transition: Transition, other: Transitio
 
 @cache_on_owner
 def possible_events(automaton: Automaton) -> frozenset[str]:
-    """Return the events of a chart that are inputs or that a transition raises."""
+    """Return the events of a chart that are inputs or that some transition raises."""
     signals = automaton.statechart.events if automaton.statechart else {}
     raised = (way.raises for mode in automaton.all_modes for way in mode.transitions)
     inputs = (name for name, signal in signals.items() if signal.is_input)
@@ -70,10 +76,11 @@ def possible_events(automaton: Automaton) -> frozenset[str]:
 
 
 def is_guard_portable(transition: Transition) -> bool:
-    """Tell whether the guard of a mode can be read where one inside it reads its own.
+    """Tell whether a guard has the same meaning in a mode inside its own mode.
 
-    Edges and beats are those of an activation. Of `after` is known that no mode is active for
-    longer than one around it.
+    This is false for guards with `rising`, `falling`, `changed`, `every` and other functions with
+    memory, because their memory belongs to an activation. It is true for `after`: no mode is active
+    for longer than its superstate.
     """
     parts = walk(transition.when.tree)
     used = {part.function for part in parts if isinstance(part, FunctionCall)}
@@ -81,6 +88,7 @@ def is_guard_portable(transition: Transition) -> bool:
 
 
 def _transitions_of(automaton: Automaton, node: ChartNode) -> tuple[Transition, ...]:
+    """Return the transitions of the mode of a node; empty for a node without a mode."""
     return (
         automaton.modes_by_key[node.mode_key].transitions
         if node.mode_key in automaton.modes_by_key
@@ -89,4 +97,5 @@ def _transitions_of(automaton: Automaton, node: ChartNode) -> tuple[Transition, 
 
 
 def _position_of(chain: tuple[ChartNode, ...], node: ChartNode) -> int:
+    """Return the index of a node in a chain of ancestors."""
     return next(place for place, each in enumerate(chain) if each.index == node.index)

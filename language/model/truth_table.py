@@ -1,4 +1,4 @@
-"""Truth: a table of conditions and rows, of which exactly one holds."""
+"""Truth table: data classes of a table of conditions and rows of which exactly one applies."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from language.text.diagnostic import Span
 
 @dataclass(frozen=True)
 class TruthRow:
-    """A row of a truth table: what each condition is (None: whatever), and what it then writes.
+    """A row of a truth table: the required value of each condition, and the assignments of the row.
 
-    A row of no marks was told to be none; `is_rest` is the last one, `else`: what no other is for.
+    A mark None stands for either value. A row without marks had an error that was reported.
+    `is_else` marks the row `else`, which applies if no other row does.
     """
 
     name: str
@@ -25,7 +26,10 @@ class TruthRow:
 
 @dataclass(frozen=True)
 class TruthTable:
-    """Conditions by name, and rows of which exactly one holds (language/lowering/truth_tables.py)."""
+    """Conditions by name, and rows of which exactly one applies.
+
+    The module language/lowering/truth_tables.py translates it.
+    """
 
     name: str
     conditions: Mapping[str, Formula]
@@ -35,12 +39,12 @@ class TruthTable:
 
     @property
     def assigned_names(self) -> tuple[str, ...]:
-        """The discrete variables that some row writes, each once."""
+        """The discrete variables that at least one row assigns, each once."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.assignments))
 
 
 def truth_table_formulas(tables: Iterable[TruthTable]) -> list[Formula]:
-    """Return the conditions of truth tables, and what their rows write."""
+    """Return the conditions and the assigned expressions of truth tables, table by table."""
     formulas: list[Formula] = []
     for table in tables:
         formulas += table.conditions.values()
