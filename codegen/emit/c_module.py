@@ -1,4 +1,7 @@
-"""Source: a Program as C99 - header, source, mathematics (rules C12 and C13)."""
+"""C modules: prints a Program as a header, a source file and a memory map (rules C12, C13 and C16).
+
+`run_c_passes` prepares the Program, `module_context` collects the values of the templates.
+"""
 
 from __future__ import annotations
 
@@ -54,12 +57,17 @@ FAULT_REASONS = {
     STALE_CALIBRATION: "solved numbers belong to another calibration",
     ZENO: "more transitions than a step may have: its rest is dropped",
 }
+"""Comments of the fault bits that the product sets (rule C16)."""
 
 RANGE_REASON = "{} was outside its range"
+"""The comment of a fault bit of a range."""
 
 
 def fault_reason(program: Program, fault: str) -> str:
-    """Return why a fault bit is set; nothing where only the spec knows."""
+    """Return the comment that tells why a fault bit is set.
+
+    For a fault of a range it names the signals. A fault that the spec declares has an empty text.
+    """
     if fault in FAULT_REASONS:
         return FAULT_REASONS[fault]
     ops = (op for block in program.blocks.values() for op in walk_ops(block))
@@ -71,29 +79,33 @@ def fault_reason(program: Program, fault: str) -> str:
 
 
 ENTRIES = ("init", "derive", "step")
+"""The blocks that are entry points of a module."""
 
 COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")
-"""Blocks that are kept out of the way of what a step does nearly always."""
+"""Prefixes of blocks that run rarely and are not inlined."""
 
 NOT_INLINED = {
     "RARELY": "Runs rarely: not inlined",
     "NOT_INLINED": "Computes much: its values are on the stack only while it runs",
 }
-"""Keywords of functions of a module, with why."""
+"""Keywords of functions that are not inlined, with the comments of their definitions."""
 
 STATIC_PATTERN = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
-"""How the definition of such a function begins, as a pattern."""
+"""Pattern of the first words of a function definition in generated C."""
 
 INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
+"""Elementary functions that are inline functions of the ha_math header."""
 
 
 def emit_c_files(
     program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
 ) -> dict[str, str]:
-    """Return the generated files of a Program by name: one that has a `step`.
+    """Return the C files of a Program by name: header, memory map, source, and ha_math if it is
+    used.
 
-    `by_magnitude` as in `gated`, `fast_path` as in `leaping`. A continuous automaton has none where an
-    input varies inside a step: then ValueError.
+    `by_magnitude` is passed to `merge_range_checks`, `fast_path` to `add_fast_path`. Raises
+    ValueError for a Program without a block `step`: an input of a continuous automaton varies
+    inside a step.
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
@@ -114,7 +126,11 @@ def emit_c_files(
 def run_c_passes(
     program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
 ) -> Program:
-    """Return the Program that C is printed of: the same bits, in the way that suits C."""
+    """Return the Program that is printed as C, after the passes of the C generator (rule C18).
+
+    The passes are `restrict_to_step`, `remove_dead_stores`, `merge_range_checks` and
+    `add_fast_path`. They keep the bits of all results.
+    """
     return add_fast_path(
         merge_range_checks(remove_dead_stores(restrict_to_step(program), ("work.",)), by_magnitude),
         fast_path,
@@ -122,7 +138,11 @@ def run_c_passes(
 
 
 def restrict_to_step(program: Program) -> Program:
-    """Return a Program with only what its `step` runs, as the C has it: no invariants."""
+    """Return a Program without what its C does not execute.
+
+    A continuous Program keeps what its entry points run. A sampled Program loses its invariants
+    (rule 11b).
+    """
     if program.period is None:
         return finalise_program(program, ENTRIES)
     blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
@@ -131,7 +151,7 @@ def restrict_to_step(program: Program) -> Program:
 
 
 def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dict[str, Any]:
-    """Return what the templates of a Program's files read."""
+    """Return the context of the templates of a module: names, structures, functions and flags."""
     number = program.number_type
     loop_variables = loop_locals(program)
     local = locals_of(program, loop_variables)
@@ -171,7 +191,9 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
 
 
 def _name_context(program: Program) -> dict[str, Any]:
-    """What the files are called, and the numbers that have names."""
+    """Return the part of the context with names: files, modes, transitions, enumerations,
+    faults.
+    """
     return {
         "name": program.name,
         "guard": f"{program.name.upper()}_H",
@@ -202,12 +224,14 @@ def _name_context(program: Program) -> dict[str, Any]:
 
 
 def _format_pace(program: Program) -> str:
+    """Return the comment with the period, or with the major step of a continuous automaton."""
     if program.period is None:
         return f"Major step: {program.major_step} s"
     return f"Period: {program.period} s"
 
 
 def _describe_step(program: Program) -> str:
+    """Return the comment of the function that executes one step."""
     if program.period is None:
         return (
             f"{program.major_step} s of flow under the inputs of the step before, then those of now"
@@ -216,12 +240,15 @@ def _describe_step(program: Program) -> str:
 
 
 def _shared_work_variables(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
+    """Return the work variables of a step that are not local to one function."""
     inside = {name for names in local.values() for name in names}
     return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
 
 
 def _work_type(program: Program, page_layout: PageLayout, scratch: Scratch | None) -> str:
-    """Return the type of a step's values: where others see it, with the name of the module."""
+    """Return the C type of the work variables of a step; it has the name of the module if it is
+    public.
+    """
     is_seen = page_layout.holds_solved and scratch is not None and scratch.is_in_instance
     return f"{program.name}_Work" if is_seen else "Work"
 
@@ -229,6 +256,7 @@ def _work_type(program: Program, page_layout: PageLayout, scratch: Scratch | Non
 def _scratch_context(
     program: Program, scratch: Scratch, kinds: Mapping[str, str]
 ) -> dict[str, Any]:
+    """Return the template context of the work variables of a step."""
     return {
         "block": scratch.block,
         "begun": _initial_assignments(program, scratch, kinds),
@@ -239,7 +267,10 @@ def _scratch_context(
 def _initial_assignments(
     program: Program, scratch: Scratch, kinds: Mapping[str, str]
 ) -> list[tuple[str, str]] | None:
-    """Return what is set when a step begins, and to what; None where all of it is."""
+    """Return pairs of a work variable and the zero that it is set to at the start of a step.
+
+    Returns None if the whole structure is set to zero.
+    """
     if scratch.is_zeroed:
         return None
     zero = {
@@ -258,7 +289,7 @@ def _emit_functions(
     page_layout: PageLayout,
     scratch: Scratch | None,
 ) -> list[dict[str, Any]]:
-    """Return the functions of a module, those that are called first."""
+    """Return the template contexts of all functions, callees first."""
     noinline = select_noinline_blocks(program)
     modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
     functions = []
@@ -292,6 +323,7 @@ def _emit_function(
     scratch: Scratch | None,
     keyword: str,
 ) -> dict[str, Any]:
+    """Return the template context of the function of one block: its parameters and lines."""
     c_names = CNames(
         program,
         local,
@@ -323,13 +355,17 @@ def _emit_function(
 
 
 def _inline_keyword(name: str, noinline: frozenset[str]) -> str:
+    """Return the keyword of a function: `RARELY`, `NOT_INLINED` or `inline` (rule C23)."""
     if name.startswith(COLD_BLOCKS):
         return "RARELY"
     return "NOT_INLINED" if name in noinline else "inline"
 
 
 def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
-    """Return what stands between the parentheses of a function, in lines that are not too long."""
+    """Return the text between the parentheses of a function, broken into lines of at most
+
+    MAX_LINE_WIDTH characters.
+    """
     lines = [""]
     for place, parameter in enumerate(parameters):
         text = parameter + ("," if place + 1 < len(parameters) else "")
@@ -341,12 +377,15 @@ def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
 
 
 def _redirect_derived(block: str, line: str) -> str:
-    """`X_Derive` writes through its own pointer, not through an instance."""
+    """Return a line of a function; `X_Derive` writes derived constants through its own pointer."""
     return line.replace("self->derived.", "derived->") if block == "derive" else line
 
 
 def _order_callees_first(program: Program) -> list[str]:
-    """Return the blocks so that each comes after those that it runs: no prototypes needed."""
+    """Return the names of the blocks such that each comes after those that it runs: C needs no
+
+    prototypes.
+    """
     done: dict[str, None] = {}
 
     def visit(name: str) -> None:
@@ -362,4 +401,5 @@ def _order_callees_first(program: Program) -> list[str]:
 
 
 def _called_blocks(program: Program, name: str) -> list[str]:
+    """Return the blocks that a block runs directly."""
     return [op.block for op in walk_ops(program.blocks[name]) if isinstance(op, RunBlock)]

@@ -1,144 +1,147 @@
-"""Graph: names that read each other, in order; circles; what can be reached."""
+"""Graphs of names: topological order, depth-first post-order, cycles, components, reachability.
+
+The algorithms are those of networkx. Its import takes longer than the check of a small spec, so a
+small graph is ordered here by the definition of the order, which takes quadratic time, and networkx
+is imported for a large graph or for a cycle that is reported. Both give the same result.
+"""
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 Edges = Mapping[str, Iterable[str]]
-"""From each name to the names that come after it, all of them keys."""
+"""The successors of each node; every node is a key, in the order that breaks ties."""
+
+MAX_SMALL_GRAPH = 200
+"""Largest number of nodes of a small graph: its order takes less than 5 ms, the import 150 ms."""
 
 
 def topological_sort(edges: Edges) -> list[str] | None:
-    """Return the names so that each comes before those that it leads to, None in a circle.
+    """Return the nodes with each node before its successors; None if the graph has a cycle.
 
-    Of several that may come next, the first in the order of the keys does (Kahn 1962, with a heap).
+    Of the nodes that may come next, the first in the order of the keys comes first (Kahn 1962).
     """
-    names = list(edges)
-    place = {name: position for position, name in enumerate(names)}
-    after = {name: set(targets) for name, targets in edges.items()}
-    waiting = dict.fromkeys(names, 0)
-    for targets in after.values():
-        for target in targets:
-            waiting[target] += 1
-    free = [place[name] for name in names if not waiting[name]]
-    order: list[str] = []
-    while free:
-        name = names[heapq.heappop(free)]
-        order.append(name)
-        for target in after[name]:
-            waiting[target] -= 1
-            if not waiting[target]:
-                heapq.heappush(free, place[target])
-    return order if len(order) == len(names) else None
+    if len(edges) > MAX_SMALL_GRAPH:
+        import networkx
 
-
-def post_order(reads: Edges) -> list[str]:
-    """Return the names, each directly after those that it reads and that are not there yet.
-
-    In a circle, which is reported elsewhere, one member comes before what it reads.
-    """
+        position = {name: index for index, name in enumerate(edges)}
+        try:
+            return list(
+                networkx.lexicographical_topological_sort(_digraph(edges), key=position.__getitem__)
+            )
+        except networkx.NetworkXUnfeasible:
+            return None
+    predecessors = {name: set(sources) for name, sources in reversed_edges(edges).items()}
     order: dict[str, None] = {}
-    begun: set[str] = set()
-    for start in reads:
-        stack = [] if start in begun else [(start, iter(list(reads[start])))]
-        begun.add(start)
-        while stack:
-            name, waiting = stack[-1]
-            needed = next((read for read in waiting if read in reads and read not in begun), None)
-            if needed is None:
-                order[name] = None
-                stack.pop()
-            else:
-                begun.add(needed)
-                stack.append((needed, iter(list(reads[needed]))))
+    while len(order) < len(predecessors):
+        ready = (
+            n for n, before in predecessors.items() if n not in order and before <= order.keys()
+        )
+        name = next(ready, None)
+        if name is None:
+            return None
+        order[name] = None
     return list(order)
 
 
+def post_order(edges: Edges) -> list[str]:
+    """Return the nodes in depth-first post-order: each after its successors, except in a cycle.
+
+    The search starts from the nodes in the order of the keys. Successors that are no keys are left
+    out.
+    """
+    if len(edges) > MAX_SMALL_GRAPH:
+        import networkx
+
+        return list(networkx.dfs_postorder_nodes(_digraph(edges)))
+    order: list[str] = []
+    visited: set[str] = set()
+
+    def visit(name: str) -> None:
+        if name in edges and name not in visited:
+            visited.add(name)
+            for successor in edges[name]:
+                visit(successor)
+            order.append(name)
+
+    for name in edges:
+        visit(name)
+    return order
+
+
 def find_cycle(edges: Edges) -> list[str]:
-    """Return the members of a circle, each leading to the next; an empty list if there is none."""
-    done: set[str] = set()
-    for start in edges:
-        path: dict[str, None] = {}
-        stack = [(start, iter(list(edges[start])))] if start not in done else []
-        path.update(dict.fromkeys([start] if stack else []))
-        while stack:
-            name, targets = stack[-1]
-            target = next((t for t in targets if t not in done), None)
-            if target is None:
-                done.add(name)
-                del path[name]
-                stack.pop()
-            elif target in path:
-                members = list(path)
-                return members[members.index(target) :]
-            else:
-                path[target] = None
-                stack.append((target, iter(list(edges[target]))))
-    return []
+    """Return the nodes of the first cycle of a depth-first search, in the order of its edges.
+
+    The last node leads to the first one. The list is empty if the graph has no cycle.
+    """
+    if len(edges) <= MAX_SMALL_GRAPH and topological_sort(edges) is not None:
+        return []
+    import networkx
+
+    try:
+        return [source for source, _ in networkx.find_cycle(_digraph(edges))]
+    except networkx.NetworkXNoCycle:
+        return []
 
 
 def strongly_connected_components(edges: Edges) -> list[list[str]]:
-    """Return the groups of names that lead to each other, each in the order of the keys.
+    """Return the strongly connected components, each after the components that it leads to.
 
-    Tarjan 1972, with a stack of its own.
+    The nodes of a component are in the order of the keys.
     """
-    numbers: dict[str, int] = {}
-    lowest: dict[str, int] = {}
-    waiting: dict[str, None] = {}
-    result: list[list[str]] = []
-    place = {name: position for position, name in enumerate(edges)}
-    for start in edges:
-        stack = [(start, iter(list(edges[start])))] if start not in numbers else []
-        while stack:
-            name, targets = stack[-1]
-            if name not in numbers:
-                numbers[name] = lowest[name] = len(numbers)
-                waiting[name] = None
-            target = next(targets, None)
-            if target is None:
-                stack.pop()
-                if stack:
-                    above = stack[-1][0]
-                    lowest[above] = min(lowest[above], lowest[name])
-                if lowest[name] == numbers[name]:
-                    result.append(_pop_component(waiting, name, place))
-            elif target not in numbers:
-                stack.append((target, iter(list(edges[target]))))
-            elif target in waiting:
-                lowest[name] = min(lowest[name], numbers[target])
-    return result
+    position = {name: index for index, name in enumerate(edges)}
+    if len(edges) > MAX_SMALL_GRAPH:
+        import networkx
 
-
-def _pop_component(waiting: dict[str, None], first: str, place: Mapping[str, int]) -> list[str]:
-    """Take the names from `first` on off what waits: one group."""
-    group: list[str] = []
-    while not group or group[-1] != first:
-        group.append(waiting.popitem()[0])
-    return sorted(group, key=place.__getitem__)
+        found = networkx.strongly_connected_components(_digraph(edges))
+        return [sorted(component, key=position.__getitem__) for component in found]
+    reached = {name: reachable(edges, name) for name in edges}
+    components: dict[str, list[str]] = {}
+    for name in reversed(post_order(edges)):
+        root = next((r for r in components if name in reached[r] and r in reached[name]), name)
+        components.setdefault(root, []).append(name)
+    return [sorted(c, key=position.__getitem__) for c in reversed(list(components.values()))]
 
 
 def reachable(edges: Edges, start: str) -> set[str]:
-    """Return what can be reached from a name, the name included."""
-    result, stack = {start}, [start]
-    while stack:
-        for target in edges.get(stack.pop(), ()):
-            if target not in result:
-                result.add(target)
-                stack.append(target)
-    return result
+    """Return the nodes that a path from `start` reaches, `start` included.
+
+    A node that is no key has no successors.
+    """
+    nodes, pending = {start}, [start]
+    while pending:
+        new = set(edges.get(pending.pop(), ())) - nodes
+        nodes |= new
+        pending += new
+    return nodes
 
 
 def reversed_edges(edges: Edges) -> dict[str, list[str]]:
-    """Return the edges in the other direction; what is no key is left out."""
-    result: dict[str, list[str]] = {name: [] for name in edges}
-    for name, targets in edges.items():
-        for target in targets:
-            if target in result:
-                result[target].append(name)
-    return result
+    """Return the predecessors of each node; successors that are no keys are left out."""
+    predecessors: dict[str, list[str]] = {name: [] for name in edges}
+    for name, successors in edges.items():
+        for successor in successors:
+            if successor in predecessors:
+                predecessors[successor].append(name)
+    return predecessors
 
 
 def format_cycle(cycle: Sequence[str]) -> str:
-    """Return a circle as text, back to its first member."""
+    """Return a cycle as text: its nodes in backticks, joined by arrows, back to the first one."""
     return " -> ".join(f"`{name}`" for name in [*cycle, cycle[0]])
+
+
+def _digraph(edges: Edges) -> Any:
+    """Return the graph of the keys as a networkx DiGraph; its nodes keep their order."""
+    import networkx
+
+    graph = networkx.DiGraph()
+    graph.add_nodes_from(edges)
+    graph.add_edges_from(
+        (name, successor)
+        for name, successors in edges.items()
+        for successor in successors
+        if successor in edges
+    )
+    return graph

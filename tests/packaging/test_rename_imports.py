@@ -14,14 +14,8 @@ PACKAGES = Packages(
     frozenset({"engine", "spec", "sweep"}),
     frozenset(
         {
-            *(
-                "engine",
-                "engine.interpreter.value_frame",
-                "engine.runs",
-                "engine.runs.cruise",
-                "spec",
-            ),
-            *("sweep", "sweep.execution.worker", "modewright", "modewright.sweep"),
+            *("engine", "engine.frame", "engine.runs", "engine.runs.cruise", "spec"),
+            *("sweep", "sweep.worker", "modewright", "modewright.sweep"),
         }
     ),
 )
@@ -35,17 +29,14 @@ def rewritten(text: str) -> str:
     ("before", "after"),
     [
         ("from engine import frame", "from modewright._engine import frame"),
-        (
-            "from engine.interpreter.value_frame import Frame",
-            "from modewright._engine.frame import Frame",
-        ),
+        ("from engine.frame import Frame", "from modewright._engine.frame import Frame"),
         ("from engine.runs.cruise import *", "from modewright._engine.runs.cruise import *"),
         (
-            "from engine.interpreter.value_frame import (  # why\n    Frame,\n)",
+            "from engine.frame import (  # why\n    Frame,\n)",
             "from modewright._engine.frame import (  # why\n    Frame,\n)",
         ),
         (
-            "if TYPE_CHECKING:\n    from engine.interpreter.value_frame import Frame",
+            "if TYPE_CHECKING:\n    from engine.frame import Frame",
             "if TYPE_CHECKING:\n    from modewright._engine.frame import Frame",
         ),
         (
@@ -54,34 +45,22 @@ def rewritten(text: str) -> str:
         ),
         ("import engine", "import modewright._engine as engine"),
         ("import engine as e", "import modewright._engine as e"),
+        ("import engine.frame as frame", "import modewright._engine.frame as frame"),
         (
-            "import engine.interpreter.value_frame as frame",
-            "import modewright._engine.frame as frame",
-        ),
-        (
-            "import os, engine, sweep.execution.worker as worker",
+            "import os, engine, sweep.worker as worker",
             "import os, modewright._engine as engine, modewright._sweep.worker as worker",
         ),
         ('files("spec") / "spec"', 'files("modewright._spec") / "spec"'),
         ("resources.files('engine')", "resources.files('modewright._engine')"),
         ('files(anchor="engine")', 'files(anchor="modewright._engine")'),
-        (
-            'import_module("engine.interpreter.value_frame")',
-            'import_module("modewright._engine.frame")',
-        ),
+        ('import_module("engine.frame")', 'import_module("modewright._engine.frame")'),
         ('sys.modules["engine"]', 'sys.modules["modewright._engine"]'),
         (
             'RUN = (sys.executable, "-P", "-m", "sweep")',
             'RUN = (sys.executable, "-P", "-m", "modewright._sweep")',
         ),
-        (
-            'run(python, "-m", "engine.interpreter.value_frame")',
-            'run(python, "-m", "modewright._engine.frame")',
-        ),
-        (
-            'P = {"Frame": "engine.interpreter.value_frame"}',
-            'P = {"Frame": "modewright._engine.frame"}',
-        ),
+        ('run(python, "-m", "engine.frame")', 'run(python, "-m", "modewright._engine.frame")'),
+        ('P = {"Frame": "engine.frame"}', 'P = {"Frame": "modewright._engine.frame"}'),
     ],
 )
 def test_what_names_a_module_is_rewritten(before: str, after: str) -> None:
@@ -100,23 +79,23 @@ def test_what_names_a_module_is_rewritten(before: str, after: str) -> None:
         "from engines import frame",
         "import numpy.engine",
         "engine = 1",
-        "sweep.execution.worker = engine.interpreter.value_frame",
+        "sweep.worker = engine.frame",
         'root / "spec"',
         'NAMES = ("engine", "sweep")',
         'name == "spec"',
         '"engine.py"',
         '"spec.toml"',
-        '"engine.interpreter.value_frame is a module"',
-        'f"engine.interpreter.value_frame{x}"',
-        'f"{x}engine.interpreter.value_frame"',
-        'b"engine.interpreter.value_frame"',
-        '"engine/interpreter/value_frame.py"',
+        '"engine.frame is a module"',
+        'f"engine.frame{x}"',
+        'f"{x}engine.frame"',
+        'b"engine.frame"',
+        '"engine/frame.py"',
         '"modewright.sweep"',
         "import_module(PLACES.get(name, 'modewright.sweep'))",
         'Option("--map", "-m", help="spec")',
-        "# import engine.interpreter.value_frame",
-        '"""Docstring:\n\nimport engine.interpreter.value_frame\n"""',
-        'def f():\n    """engine.interpreter.value_frame"""\n',
+        "# import engine.frame",
+        '"""Docstring:\n\nimport engine.frame\n"""',
+        'def f():\n    """engine.frame"""\n',
         "",
     ],
 )
@@ -127,7 +106,7 @@ def test_what_names_no_module_stays(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("import engine.interpreter.value_frame", "write `from engine import frame`"),
+        ("import engine.frame", "write `from engine import frame`"),
         ("import engine.runs.cruise", "write `from engine.runs import cruise`"),
         ("from engine.gone import x", "`engine.gone`: there is no such module"),
         ("import gone, engine.gone as g", "there is no such module"),
@@ -139,13 +118,10 @@ def test_what_names_no_module_stays(text: str) -> None:
         ('import_module(f"engine.{name}")', "a name made of `engine.` and more"),
         ('files("engine" "")', "one plain literal"),
         ('x = "engine" ".frame"', "one plain literal"),
-        ('x = r"engine.interpreter.value_frame"', "one plain literal"),
-        (
-            'x: "engine.interpreter.value_frame.Frame"',
-            '"engine.interpreter.value_frame.Frame" names no module, but begins like one',
-        ),
+        ('x = r"engine.frame"', "one plain literal"),
+        ('x: "engine.frame.Frame"', '"engine.frame.Frame" names no module, but begins like one'),
         ('run("import sys\\nimport engine")', "code in a string"),
-        ('run("from engine.interpreter.value_frame import Frame")', "code in a string"),
+        ('run("from engine.frame import Frame")', "code in a string"),
         ('run(python, "-m", "engine.gone")', "there is no such module"),
     ],
 )

@@ -6,15 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from engine.results.mode_band import ModeBand
-from engine.results.plot import Panel, PlotLine, draw_picture
-from modewright.api import simulation as api
 from modewright.cli.common.console import console
 from modewright.cli.common.exit_codes import PROBLEMS
-from modewright.render import run as show
-from modewright.runtime.output_files import make_folder, write_files
+from modewright.runtime.output_files import make_folder
 
 
 def demo(
@@ -27,43 +22,8 @@ def demo(
     \b
     modewright demo --out build
     """
-    from modewright.cli.commands import demo as shown
+    from modewright.render.demo import run_demo
 
     make_folder(out)
-    if not shown.run_demo(out, console()):
+    if not run_demo(out, console()):
         raise typer.Exit(PROBLEMS)
-
-
-SYSTEM, SCENARIO = "ev_driveline", "tip_out"
-
-WINDOW = (0.45, 1.15)
-"""The part of the scenario in which the gap is crossed [s]."""
-
-
-def run_demo(folder: Path, console: Console) -> bool:
-    """Run the demo, print its tables, write `tip_out.png`; tell whether no bit differs."""
-    console.print("Tip-out of an EV driveline with backlash, 30 -> -20 N*m at 0.4785 s")
-    trajectory, verdicts = api.lockstep(SYSTEM, SCENARIO)
-    torque = [
-        PlotLine("plant.T_hs", "plant"),
-        PlotLine("est.T_hs", "estimator, 1 kHz"),
-        PlotLine("simple.T_hs", "simplified, 100 Hz", dashed=True),
-    ]
-    gap = [
-        PlotLine("plant.theta_b", "plant", 1e3),
-        PlotLine("est.theta_b", "estimator, 1 kHz", 1e3, dashed=True),
-    ]
-    panels = [Panel("half-shaft torque [N*m]", torque), Panel("position in the gap [mrad]", gap)]
-    bands = [
-        ModeBand("plant", "plant.mode"),
-        ModeBand("1 kHz", "est.mode"),
-        ModeBand("100 Hz", "simple.mode"),
-    ]
-    title = "Tip-out: contact is lost, the gap is crossed, the estimators follow"
-    path = folder / "tip_out.png"
-    write_files({path: draw_picture([trajectory], panels, bands, title, WINDOW).data()})
-    console.print(show.events_table(trajectory.events))
-    console.print()
-    show.print_verdicts(console, verdicts)
-    console.print(f"\npicture: {path}", highlight=False, soft_wrap=True)
-    return trajectory.stopped is None and all(verdict.is_equal for verdict in verdicts)

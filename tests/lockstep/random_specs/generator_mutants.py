@@ -51,8 +51,8 @@ def _strict(expr: Expr, place: Any) -> str:
 
 def _everywhere(name: str, value: Any) -> Patch:
     def apply(patch: pytest.MonkeyPatch) -> None:
-        for module in ("expression", "statement"):
-            patch.setattr(f"codegen.{module}.{name}", value)
+        for module in ("c_expression", "c_statement"):
+            patch.setattr(f"codegen.emit.{module}.{name}", value)
 
     return apply
 

@@ -19,8 +19,8 @@ from tests.validation.figures.store import ROOT
         "/data/cases_labels.json",
         "/data/LABELS/a.json",
         "/data/labels.pyc.json",
-        ROOT / "tests" / "concealed" / "library.py",
-        ROOT / "tests" / "open_generator" / "__pycache__" / "label.pyc",
+        ROOT / "tests" / "generators" / "concealed" / "library.py",
+        ROOT / "tests" / "generators" / "open" / "__pycache__" / "label.pyc",
     ],
 )
 def test_what_is_concealed_is_seen(path: Path | str) -> None:
