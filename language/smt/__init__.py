@@ -1,1 +1,1 @@
-"""Satisfiability of guards over the reals: queries, elimination, sampling, z3."""
+"""Satisfiability of guards over the reals: queries, linear elimination, sampling, z3."""

@@ -1,8 +1,10 @@
-"""Moment: what names are at one instant in one mode, and after transitions of that instant.
+"""Guard snapshot: binds names to symbolic values at one instant in one mode.
 
-Every expression is lowered as for a Program; what it needs of equations becomes steps before it.
-Of parallel regions each equation is chosen by the region's own mode, which is a variable here. What
-functions with memory give is any value: an edge only where its condition is as it says.
+Expressions are lowered as for a Program. The equations that an expression reads become assignments
+before it. An equation of a parallel region is selected by the mode of that region, which is a
+variable. The result of a function with memory is a free variable; an edge additionally requires the
+present level of its condition. Applying a transition yields the snapshot after its exit, reset and
+entry stages (rule 6).
 """
 
 from __future__ import annotations
@@ -39,12 +41,15 @@ from language.model.transition_precedence import node_of
 from language.smt.query import SymbolicAssignment, VariableDomain
 
 TIME_IN_MODE = "memory.elapsed"
-"""The time since the entry of the mode: in ticks of a sampled automaton, else in seconds."""
+"""Variable of the time since the entry of the mode: in ticks if sampled, else in seconds."""
 
 
 @dataclass
 class SymbolicPath:
-    """What is computed at an instant, in order, and what is known of it besides."""
+    """Assignments along a sequence of snapshots, in order, with assumptions and domains.
+
+    `domains` are those of the variables that the path introduces.
+    """
 
     assignments: list[SymbolicAssignment] = field(default_factory=list)
     assumptions: list[Expr] = field(default_factory=list)
@@ -53,7 +58,7 @@ class SymbolicPath:
 
 
 class GuardSnapshot:
-    """A mode of one region at an instant; `after` a transition comes the next one."""
+    """Symbolic values of all names in one mode of one region at an instant."""
 
     def __init__(
         self,
@@ -62,7 +67,7 @@ class GuardSnapshot:
         path: SymbolicPath | None = None,
         values: Mapping[str, Expr] | None = None,
     ) -> None:
-        """Begin an instant, or go on with the values that a transition left."""
+        """Start a path, or continue one with the values that a transition left."""
         self.automaton = automaton
         self.mode = mode
         self.path = path or SymbolicPath()
@@ -78,12 +83,18 @@ class GuardSnapshot:
         self.bindings.update(self._mode_bindings())
 
     def lower_expression(self, tree: SyntaxTree) -> Expr:
-        """Return an expression of this moment. Raises KeyError where a name is not known here."""
+        """Return a lowered expression; the equations that it reads are assigned first.
+
+        Raises KeyError if a name has no value in this snapshot.
+        """
         self._define_equations([tree])
         return lower_expression(tree, self.bindings)
 
     def lower_guard(self, transition: Transition) -> Expr:
-        """Return when a transition is enabled, events aside: where it completes, by the modes."""
+        """Return the condition under which a transition is enabled, without its events.
+
+        For a completion transition of a chart, this is the condition that its source is complete.
+        """
         chart = self.automaton.statechart
         node = node_of(self.automaton, self.automaton.source_mode(transition))
         if transition.is_completion and chart and node:
@@ -91,39 +102,52 @@ class GuardSnapshot:
         return self.lower_expression(transition.when.tree)
 
     def in_enclosing_mode(self, outer: Mode) -> GuardSnapshot:
-        """Return this moment as a mode around ours has it: it is active for as long, or longer."""
-        seen = copy.copy(self)
-        seen.bindings = {key: value for key, value in self.bindings.items() if key[:6] != "after "}
-        seen.time_in_mode = f"{TIME_IN_MODE} {outer.key}"
-        ages = Ref(seen.time_in_mode, True), Ref(TIME_IN_MODE, True)
+        """Return a copy of the snapshot for a mode that encloses this one.
+
+        The time in the enclosing mode is a new variable that is not below the time in this mode.
+        """
+        result = copy.copy(self)
+        result.bindings = {
+            key: value for key, value in self.bindings.items() if key[:6] != "after "
+        }
+        result.time_in_mode = f"{TIME_IN_MODE} {outer.key}"
+        ages = Ref(result.time_in_mode, True), Ref(TIME_IN_MODE, True)
         self.path.domains.update(
             (age.name, VariableDomain("whole", low=Fraction(0))) for age in ages
         )
         self.path.assumptions.append(Compare(">=", *ages))
-        return seen
+        return result
 
     def apply_transition(self, transition: Transition) -> GuardSnapshot:
-        """Return the moment after a transition: exit, reset and entry, each read as a whole."""
+        """Return the snapshot after the exit, reset and entry stages of a transition.
+
+        The assignments of a stage read the values before the stage (rule 5).
+        """
         target = self.automaton.target_mode(transition)
         carried = self._apply_stage(self.mode.exit, {})
         carried = self._apply_stage(transition.reset, carried)
-        there = GuardSnapshot(
+        entered = GuardSnapshot(
             self.automaton, target, self.path, {**self._carried_values(), **carried}
         )
         if target.entry:
-            entered = there._apply_stage(target.entry, {})
-            there = GuardSnapshot(
-                self.automaton, target, self.path, {**there._carried_values(), **entered}
+            assigned = entered._apply_stage(target.entry, {})
+            entered = GuardSnapshot(
+                self.automaton, target, self.path, {**entered._carried_values(), **assigned}
             )
-        return there
+        return entered
 
     def _carried_values(self) -> dict[str, Expr]:
+        """Return the symbolic values of states and discrete variables."""
         return {name: self.bindings[name] for name in self.automaton.state_variables}
 
     def _apply_stage(
         self, formulas: Mapping[str, Formula], values: dict[str, Expr]
     ) -> dict[str, Expr]:
-        """Return what is carried after a stage; its equations are those of this moment."""
+        """Return `values` updated with the assignments of one stage.
+
+        The formulas read `values` and the equations of this snapshot. Each assignment gets a new
+        name in the path.
+        """
         self._define_equations(formula.tree for formula in formulas.values())
         known = {**self.bindings, **values}
         found = dict(values)
@@ -136,7 +160,10 @@ class GuardSnapshot:
         return found
 
     def _mode_bindings(self) -> dict[str, Expr]:
-        """Return what `in(...)` is: of our own region it is certain, of others any mode."""
+        """Return the values of `in(...)`: constants for this region, comparisons for other regions.
+
+        The mode variables of other regions are added to the domains of the path.
+        """
         model = self.automaton.model
         found = _run_mode_bindings(model, self.path.domains) if model else {}
         if self.automaton.statechart:
@@ -152,7 +179,11 @@ class GuardSnapshot:
         return found
 
     def _chart_mode_bindings(self, chart: Chart) -> dict[str, Expr]:
-        """Return what `in(...)` is inside a chart: around our own mode only what holds it."""
+        """Return the values of `in(...)` in a chart and restrict the mode variables of its regions.
+
+        A region that contains the mode can have only modes that are nested with it. A region
+        elsewhere can also be inactive.
+        """
         own = next(node for node in chart.nodes if node.mode_key == self.mode.key)
         for region in self.automaton.all_regions:
             leaves = chart.leaves(region.name)
@@ -171,7 +202,10 @@ class GuardSnapshot:
         return found
 
     def _define_equations(self, trees: Iterable[SyntaxTree]) -> None:
-        """Make the equations known that some expressions need, each after those that it reads."""
+        """Assign the equations that expressions need, each after the equations that it reads.
+
+        Functions with memory in the expressions are bound too.
+        """
         trees = list(trees)
         needed: dict[str, list[tuple[int | None, str, Formula]]] = {}
         stack = [name for tree in trees for name in _names_read(tree)]
@@ -189,7 +223,11 @@ class GuardSnapshot:
             self.define_memory(tree)
 
     def _alternatives(self, name: str) -> Iterator[tuple[int | None, str, Formula]]:
-        """Yield the formulas that an equation can have: our mode's, else by another region's."""
+        """Yield the formulas of an equation as mode number, region and formula.
+
+        A formula of this mode is the only one, with mode number None; otherwise each mode of the
+        other regions that defines the name contributes one.
+        """
         if name in self.mode.equations:
             yield None, self.mode.region, self.mode.equations[name]
             return
@@ -201,6 +239,10 @@ class GuardSnapshot:
     def _define_equation(
         self, name: str, alternatives: list[tuple[int | None, str, Formula]]
     ) -> None:
+        """Assign an equation: its only formula, or a selection by the mode variable of its region.
+
+        The last alternative is the value if no other mode is active.
+        """
         is_whole = alternatives[0][2].is_integer
         value: Expr | None = None
         for number, region, formula in reversed(alternatives):
@@ -217,7 +259,7 @@ class GuardSnapshot:
         self.bindings[name] = Ref(target, is_whole)
 
     def define_memory(self, tree: SyntaxTree) -> None:
-        """Make the functions with memory known; what is inside of one comes first."""
+        """Bind the functions with memory in a tree; inner calls come first."""
         for part in reversed(walk(tree)):
             if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
                 key = memory_key(part)
@@ -225,9 +267,15 @@ class GuardSnapshot:
                     self.bindings[key] = self._memory_value(part)
 
     def _memory_value(self, call: FunctionCall) -> Expr:
+        """Return the symbolic result of a function with memory.
+
+        `after` compares the time in the mode with its argument. `rising` and `falling` are a free
+        change and the present level. All others are free variables. After a transition, edges and
+        `every` are false because the activation is new.
+        """
         automaton = self.automaton
         if self.suffix and call.function in (*EDGE_FUNCTIONS, "every"):
-            return Value(False)  # nothing was seen before in this activation
+            return Value(False)  # there is no earlier instant in this activation
         if call.function == "after":
             if self.suffix:
                 return Value(_after_seconds(automaton, call) <= 0)
@@ -246,7 +294,7 @@ class GuardSnapshot:
             if call.function == "every" and automaton.is_sampled:
                 aged = self._is_in_mode_for(call)
                 if evaluate_ticks(automaton, call.arguments[0]) == 1:
-                    return aged  # each tick after the first
+                    return aged  # true at each tick after the first
                 self.path.assumptions.append(Binary("or", Unary("not", Ref(name)), aged))
             return Ref(name)
         kind = expression_type(automaton, call.arguments[0])
@@ -254,7 +302,7 @@ class GuardSnapshot:
         return Ref(name, kind == "whole")
 
     def _changed_value(self, call: FunctionCall) -> Expr:
-        """Return whether a condition changed, which is what a rise and a fall of it share."""
+        """Return whether a condition changed, as a variable that `rising` and `falling` share."""
         change = FunctionCall("changed", call.arguments, call.span)
         key = memory_key(change)
         if key not in self.bindings:
@@ -262,13 +310,19 @@ class GuardSnapshot:
         return self.bindings[key]
 
     def _is_in_mode_for(self, call: FunctionCall) -> Expr:
-        """Return that a mode has been active for the whole ticks of a time."""
+        """Return the condition that the mode has been active for a number of ticks.
+
+        The number is the first argument of the call in ticks.
+        """
         self.path.domains[self.time_in_mode] = VariableDomain("whole", low=Fraction(0))
         ticks = integer(evaluate_ticks(self.automaton, call.arguments[0]))
         return Compare(">=", Ref(self.time_in_mode, True), ticks)
 
     def _domain_of(self, tree: SyntaxTree) -> VariableDomain:
-        """Return the bounds of a name that is delayed."""
+        """Return the domain of a delayed input or state: its range.
+
+        Unbounded for other expressions.
+        """
         path = getattr(tree, "path", "")
         thing = self.automaton.inputs.get(path) or self.automaton.state_variables.get(path)
         if thing is None or thing.range is None:
@@ -281,22 +335,26 @@ class GuardSnapshot:
 
 @cache_on_owner
 def _mode_activity(chart: Chart) -> dict[str, tuple[ChartNode, Expr]]:
-    """Return the modes of a chart by their paths, with whether each is active."""
+    """Return the nodes of a chart by mode path, each with the condition that it is active."""
     paths = mode_paths(chart).items()
     return {path: (node, is_active(chart, node, "mode")) for path, node in paths}
 
 
 def _after_seconds(automaton: Automaton, call: FunctionCall) -> Fraction:
-    """Return the time of `after` exactly [s]."""
+    """Return the exact time of an `after` call [s]."""
     return evaluate_exactly(Formula(call.arguments[0], ""), automaton)
 
 
 def _names_read(tree: SyntaxTree) -> list[str]:
+    """Return the names that an expression reads."""
     return list(Formula(tree, "").reads)
 
 
 def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> dict[str, Expr]:
-    """Return what `in(model.mode)` is: a run may be in any mode of the model."""
+    """Return the values of `in(model.mode)`: a run can be in any mode of its model.
+
+    The mode variables of the run are added to `domains`.
+    """
     found: dict[str, Expr] = {}
     for region in model.all_regions:
         selector = Ref(f"run.{region.name}", True)
@@ -310,7 +368,10 @@ def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> 
 
 
 def _mode_domain(modes: Iterable[Mode]) -> VariableDomain:
-    """Return the numbers of some modes, with the names that a witness shows."""
+    """Return the domain of a mode variable: the mode numbers, and the names for witnesses.
+
+    There are no names if a number is negative.
+    """
     by_number = {mode.number: mode.name for mode in modes}
     names: tuple[str, ...] = ()
     if min(by_number) >= 0:

@@ -1,7 +1,8 @@
-"""Along: how expressions change along the flow of a mode (Lie derivatives), inputs held.
+"""Lie derivatives: the rates of expressions along the flow of a mode, with inputs held constant.
 
-At a corner of `abs`, `min`, `max`, `clip` or `if` it is the branch taken there. What delays or
-looks up has none. Rules: Griewank and Walther, Evaluating Derivatives (2nd ed. 2008), table 2.3.
+At a corner of `abs`, `min`, `max`, `clip` or `if`, the derivative is that of the active branch.
+Delays and tables have no derivative here. Rules: Griewank and Walther, Evaluating Derivatives (2nd
+ed. 2008), table 2.3.
 """
 
 from __future__ import annotations
@@ -26,17 +27,24 @@ from language.lowering.expressions import lower_rate
 from language.smt.guard_snapshot import GuardSnapshot
 
 ZERO = real(0.0)
+"""Derivative of a constant."""
 
 
 class UnknownRateError(Exception):
-    """An expression whose change along the flow is not known."""
+    """Error of an expression whose derivative along the flow is unknown."""
 
 
 class LieDerivative:
-    """The flow of a moment's mode; what is needed of it becomes steps of the story."""
+    """Derivatives along the flow of the mode of a snapshot.
+
+    Assignments that they need are appended to the symbolic path of the snapshot.
+    """
 
     def __init__(self, snapshot: GuardSnapshot) -> None:
-        """Make the rates of all states known. Raises NoRate where a region gives one."""
+        """Compute the rates of all states.
+
+        Raises UnknownRateError if the mode has no balance for a state.
+        """
         self.snapshot = snapshot
         self.assignments = snapshot.path.assignments
         self.rates: dict[str, Expr] = {}
@@ -57,7 +65,10 @@ class LieDerivative:
             self.rates[known.name] = Ref(target)
 
     def differentiate(self, expr: Expr) -> Expr:
-        """Return the derivative of an expression with respect to time. Raises NoRate."""
+        """Return the derivative of an expression with respect to time.
+
+        Raises UnknownRateError for a function without a rule.
+        """
         match expr:
             case Value():
                 return ZERO
@@ -86,6 +97,11 @@ class LieDerivative:
         raise UnknownRateError
 
     def _rate_of_name(self, name: str) -> Expr:
+        """Return the rate of a name; zero for an input, parameter or discrete variable.
+
+        The rate of an assigned name is stored by a further assignment. Raises UnknownRateError for
+        the state of a function with memory.
+        """
         if name in self.rates:
             return self.rates[name]
         found = next((value for target, value in self.assignments if target == name), None)
@@ -102,6 +118,11 @@ class LieDerivative:
         return change
 
     def _rate_of_call(self, function: str, arguments: tuple[Expr, ...], expr: Expr) -> Expr:
+        """Return the derivative of a call by the chain rule; zero if all arguments are constant.
+
+        `expr` is the call itself, whose value some rules reuse. Raises UnknownRateError for
+        functions without a rule.
+        """
         changes = [self.differentiate(argument) for argument in arguments]
         if all(change == ZERO for change in changes):
             return ZERO
@@ -140,22 +161,27 @@ class LieDerivative:
 
 
 def _reduce_power(base: Expr, degree: Expr) -> Expr:
+    """Return `pow(base, degree - 1)`."""
     return Call("pow", (base, subtract(degree, real(1.0))))
 
 
 def _negate(expr: Expr) -> Expr:
+    """Return `-expr`; zero remains zero."""
     return expr if expr == ZERO else Unary("-", expr)
 
 
 def _add_rates(left: Expr, right: Expr) -> Expr:
+    """Return the sum of two rates without zero terms."""
     if left == ZERO:
         return right
     return left if right == ZERO else add(left, right)
 
 
 def _multiply_rate(left: Expr, right: Expr) -> Expr:
+    """Return the product of two factors; zero if one of them is zero."""
     return ZERO if ZERO in (left, right) else multiply(left, right)
 
 
 def _select_rate(condition: Expr, then: Expr, other: Expr) -> Expr:
+    """Return the conditional expression, or the branch if both branches are equal."""
     return then if then == other else Select(condition, then, other)

@@ -1,8 +1,9 @@
-"""Halfspaces: linear conditions that exclude each other, found exactly without a solver.
+"""Linear bounds: disproves conjunctions of linear relations exactly, without a solver.
 
-Each relation of linear sides bounds a direction: `2 * x - v > 1` and `v >= 2 * x` bound the same
-one from below and from above. Bounds that leave nothing prove that conditions never hold together;
-that they leave something proves nothing.
+Each relation between linear expressions bounds the value along a direction: `2 * x - v > 1` and `v
+>= 2 * x` bound the same direction from below and from above. An empty interval, or an infeasible
+set of inequalities (Fourier-Motzkin), proves that the conditions never hold together. The converse
+does not follow.
 """
 
 from __future__ import annotations
@@ -17,19 +18,26 @@ from language.smt.fourier_motzkin import Inequality, is_infeasible
 from language.smt.query import SolverQuery, VariableDomain
 
 Direction = tuple[tuple[str, Fraction], ...]
+"""Coefficients by variable, sorted by name, scaled so that the first coefficient is 1."""
 LinearForm = tuple[dict[str, Fraction], Fraction]
-"""Coefficients by variable, and the constant."""
+"""Coefficients by variable, and the constant term."""
 NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+"""Relation that holds where the relation of the key does not."""
 FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
+"""Relation after both sides are multiplied by a negative number."""
 
 
 def is_disproved_by_bounds(query: SolverQuery) -> bool:
-    """Tell whether bounds of linear forms prove that the conditions never hold together."""
+    """Return whether linear bounds prove that the conditions never hold together."""
     return narrow_domains(query) is None
 
 
 def narrow_domains(query: SolverQuery) -> dict[str, VariableDomain] | None:
-    """Return what single variables can be where the conditions hold; None if they never do."""
+    """Return narrower domains of variables that the conditions imply; None if they never hold.
+
+    Only variables that a relation bounds alone, or that stand alone as a Boolean, are in the
+    result. Conditions that are not linear are ignored.
+    """
     forms = _LinearForms(query)
     bounds: dict[Direction, _DirectionBounds] = {}
     truths: dict[str, bool] = {}
@@ -42,18 +50,21 @@ def narrow_domains(query: SolverQuery) -> dict[str, VariableDomain] | None:
                 case Ref(name) if truths.setdefault(name, is_true) != is_true:
                     return None
                 case Compare(operator, left, right):
-                    found = forms.difference(left, right)
+                    form = forms.difference(left, right)
                     relation = str(operator) if is_true else NEGATED_RELATION[operator]
-                    if found is not None and _apply_relation(found, relation, bounds, query):
+                    if form is not None and _apply_relation(form, relation, bounds, query):
                         return None
-                    inequalities += _inequalities(found, relation)
+                    inequalities += _inequalities(form, relation)
     if is_infeasible(inequalities):
         return None
     return {**_domains_from_bounds(bounds, query), **_domains_from_truths(truths, query)}
 
 
 def _inequalities(form: LinearForm | None, operator: str) -> Iterator[Inequality]:
-    """Yield what `form operator 0` says, as what is above 0."""
+    """Yield `form operator 0` as inequalities `form > 0` or `form >= 0`.
+
+    There are none if the form is None or the operator is `!=`.
+    """
     if form is not None and operator in (">", ">=", "=="):
         yield form[0], form[1], operator == ">"
     if form is not None and operator in ("<", "<=", "=="):
@@ -64,28 +75,30 @@ def _inequalities(form: LinearForm | None, operator: str) -> Iterator[Inequality
 def _domains_from_bounds(
     bounds: Mapping[Direction, _DirectionBounds], query: SolverQuery
 ) -> dict[str, VariableDomain]:
-    found: dict[str, VariableDomain] = {}
-    for direction, held in bounds.items():
+    """Return the domains of the variables that are bounded alone, without their defaults."""
+    result: dict[str, VariableDomain] = {}
+    for direction, interval in bounds.items():
         if len(direction) == 1:
             name = direction[0][0]
-            extent = query.domains[name]
-            found[name] = replace(extent, low=held.low, high=held.high, default=None)
-    return found
+            domain = query.domains[name]
+            result[name] = replace(domain, low=interval.low, high=interval.high, default=None)
+    return result
 
 
 def _domains_from_truths(
     truths: Mapping[str, bool], query: SolverQuery
 ) -> dict[str, VariableDomain]:
-    extents = query.domains
+    """Return the domains of the Boolean variables with their required values as defaults."""
+    domains = query.domains
     return {
-        name: replace(extents[name], default=value)
+        name: replace(domains[name], default=value)
         for name, value in truths.items()
-        if name in extents
+        if name in domains
     }
 
 
 class _DirectionBounds:
-    """From where to where the value of a direction goes, and which ends are left out."""
+    """Interval of the value along a direction; each end is open, closed or absent (None)."""
 
     def __init__(self) -> None:
         self.low: Fraction | None = None
@@ -93,12 +106,14 @@ class _DirectionBounds:
         self.is_low_open = self.is_high_open = False
 
     def tighten_low(self, limit: Fraction, is_open: bool) -> None:
+        """Raise the lower bound to a limit if the limit is stricter."""
         if self.low is None or limit > self.low:
             self.low, self.is_low_open = limit, is_open
         elif limit == self.low:
             self.is_low_open |= is_open
 
     def tighten_high(self, limit: Fraction, is_open: bool) -> None:
+        """Lower the upper bound to a limit if the limit is stricter."""
         if self.high is None or limit < self.high:
             self.high, self.is_high_open = limit, is_open
         elif limit == self.high:
@@ -106,6 +121,7 @@ class _DirectionBounds:
 
     @property
     def is_empty(self) -> bool:
+        """Whether no value lies between the bounds."""
         if self.low is None or self.high is None:
             return False
         touching = self.low == self.high and (self.is_low_open or self.is_high_open)
@@ -115,7 +131,10 @@ class _DirectionBounds:
 def _apply_relation(
     form: LinearForm, operator: str, bounds: dict[Direction, _DirectionBounds], query: SolverQuery
 ) -> bool:
-    """Take in `form operator 0`; tell whether nothing is left."""
+    """Intersect the bounds of a direction with `form operator 0`; return whether nothing remains.
+
+    A form without variables is compared with 0. The operator `!=` changes nothing.
+    """
     factors, constant = form
     if operator not in FLIPPED_RELATION:
         return False
@@ -127,33 +146,34 @@ def _apply_relation(
     direction = tuple((name, factors[name] / scale) for name in names)
     if direction not in bounds:
         bounds[direction] = _declared_bounds(direction, query)
-    held, limit = bounds[direction], -constant / scale
+    interval, limit = bounds[direction], -constant / scale
     if operator in (">", ">=", "=="):
-        held.tighten_low(limit, operator == ">")
+        interval.tighten_low(limit, operator == ">")
     if operator in ("<", "<=", "=="):
-        held.tighten_high(limit, operator == "<")
-    return held.is_empty
+        interval.tighten_high(limit, operator == "<")
+    return interval.is_empty
 
 
 def _declared_bounds(direction: Direction, query: SolverQuery) -> _DirectionBounds:
-    """Return the bounds of a direction that follow from those of its variables."""
-    found = _DirectionBounds()
+    """Return the bounds of a direction that follow from the domains of its variables."""
+    bounds = _DirectionBounds()
     low, high = Fraction(0), Fraction(0)
     has_low = has_high = True
     for name, factor in direction:
-        extent = query.domains[name]
-        first, last = (extent.low, extent.high) if factor > 0 else (extent.high, extent.low)
+        domain = query.domains[name]
+        first, last = (domain.low, domain.high) if factor > 0 else (domain.high, domain.low)
         has_low, has_high = has_low and first is not None, has_high and last is not None
         low += factor * (first or 0)
         high += factor * (last or 0)
     if has_low:
-        found.tighten_low(low, False)
+        bounds.tighten_low(low, False)
     if has_high:
-        found.tighten_high(high, False)
-    return found
+        bounds.tighten_high(high, False)
+    return bounds
 
 
 def _relation_holds(value: Fraction, operator: str) -> bool:
+    """Return whether `value operator 0` holds."""
     match operator:
         case "<":
             return value < 0
@@ -169,7 +189,11 @@ def _relation_holds(value: Fraction, operator: str) -> bool:
 def _split_conjunction(
     condition: Expr, is_true: bool, forms: _LinearForms
 ) -> Iterator[tuple[Expr, bool]]:
-    """Yield the parts that all have to be true, or false, for a condition to be as it is said."""
+    """Yield the parts of a condition, each with its required truth, that imply the condition.
+
+    `and` (or a negated `or`) is split, `not` inverts the truth, and a name with an assignment is
+    expanded.
+    """
     match condition:
         case Unary("not", operand):
             yield from _split_conjunction(operand, not is_true, forms)
@@ -186,18 +210,22 @@ def _split_conjunction(
 
 
 class _LinearForms:
-    """Linear forms of expressions over the variables of a question; each step's found once."""
+    """Linear forms of expressions over the variables of a query.
+
+    Assigned names are expanded, and the form of each name is cached.
+    """
 
     def __init__(self, query: SolverQuery) -> None:
-        self.question = query
+        self.query = query
         self.assignments = dict(query.assignments)
         self.forms_by_name: dict[str, LinearForm | None] = {}
 
     def difference(self, left: Expr, right: Expr) -> LinearForm | None:
-        """Return left - right as a form, None if it is not linear."""
+        """Return `left - right` as a linear form, or None if it is not linear."""
         return self._add_scaled(self._form_of(left), self._form_of(right), Fraction(-1))
 
     def _form_of(self, expr: Expr) -> LinearForm | None:
+        """Return an expression as a linear form, or None if it is not linear."""
         match expr:
             case Value(value):
                 return _constant_form(value)
@@ -226,13 +254,14 @@ class _LinearForms:
         return None
 
     def _form_of_name(self, name: str) -> LinearForm | None:
+        """Return the form of an assigned name, a variable or a constant; None for anything else."""
         if name not in self.forms_by_name:
             if name in self.assignments:
                 self.forms_by_name[name] = self._form_of(self.assignments[name])
-            elif name in self.question.domains:
+            elif name in self.query.domains:
                 self.forms_by_name[name] = {name: Fraction(1)}, Fraction(0)
             else:
-                value = self.question.parameter_values.get(name)
+                value = self.query.parameter_values.get(name)
                 self.forms_by_name[name] = _constant_form(value)
         return self.forms_by_name[name]
 
@@ -240,17 +269,18 @@ class _LinearForms:
     def _add_scaled(
         left: LinearForm | None, right: LinearForm | None, factor: Fraction
     ) -> LinearForm | None:
-        """Return left + factor * right."""
+        """Return `left + factor * right` without zero coefficients; None if an operand is None."""
         if left is None or right is None:
             return None
-        found = dict(left[0])
+        coefficients = dict(left[0])
         for name, value in right[0].items():
-            found[name] = found.get(name, Fraction(0)) + factor * value
-        kept = {name: value for name, value in found.items() if value}
-        return kept, left[1] + factor * right[1]
+            coefficients[name] = coefficients.get(name, Fraction(0)) + factor * value
+        nonzero = {name: value for name, value in coefficients.items() if value}
+        return nonzero, left[1] + factor * right[1]
 
 
 def _constant_form(value: object) -> LinearForm | None:
+    """Return a finite number as a form without variables; None for any other value."""
     if isinstance(value, bool) or not isinstance(value, float | int) or not math.isfinite(value):
         return None
     return {}, Fraction(value)

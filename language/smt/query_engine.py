@@ -1,7 +1,7 @@
-"""Inquiry: the answers to questions about one automaton - a witness, never, or open.
+"""Query engine: answers queries about one automaton with a witness, "never" or "open".
 
-First a few sample points are tried, which answers most questions in no time; then z3 is asked. Its
-witnesses too are told only where our own arithmetic says the same.
+Linear bounds and a few sample points decide most queries; z3 decides the others. A witness of z3 is
+reported only if the arithmetic of this project confirms it.
 """
 
 from __future__ import annotations
@@ -34,29 +34,35 @@ from language.smt.z3_backend import SMALL_RESOURCE_LIMIT, Solver, Verdict
 from language.text.diagnostic import Problems
 
 MAX_SEARCHED_POINTS = 20_000
-"""Points tried of all questions that z3 leaves open: a second or two."""
+"""Largest number of points tried for all queries that z3 leaves open: one or two seconds."""
 MAX_SOLVER_QUERIES = 4000
-"""Questions for z3 of one check; beyond they stay open."""
+"""Largest number of z3 queries of one check; further queries remain open."""
 
 
 @dataclass(frozen=True)
 class Witness:
-    """Values at which all conditions of a question hold, as our own arithmetic says."""
+    """Values at which all conditions of a query hold, confirmed by evaluation.
+
+    `text` is their display form, without the state of functions with memory.
+    """
 
     valuation: Valuation
     text: str
 
     @property
     def hint_prefix(self) -> str:
-        """How a help begins: `at x = 0.5; `, empty where no value that is told matters."""
+        """Start of a hint, `at x = 0.5; `; empty if there is no value to show."""
         return f"at {self.text}; " if self.text else ""
 
 
 class QueryEngine:
-    """Asks about one automaton; parameters have their present values unless they are free."""
+    """Builder and solver of the queries about one automaton.
+
+    Parameters have their present values unless a query frees the tunable ones.
+    """
 
     def __init__(self, automaton: Automaton) -> None:
-        """Find what every variable can be."""
+        """Compute the domains of inputs, states, discrete variables and tunable parameters."""
         self.automaton = automaton
         self.query_count = self.point_count = 0
         self.parameter_values = constant_values(parameter_constants(automaton, Problems()))
@@ -71,13 +77,19 @@ class QueryEngine:
         ]
 
     def build_query(self, path: SymbolicPath, conditions: Iterable[Expr]) -> SolverQuery:
-        """Return the question whether some conditions can hold together in a story."""
-        extents = {**self.domains, **path.domains}
-        together = (*conditions, *path.assumptions)
-        return SolverQuery(together, tuple(path.assignments), extents, self.parameter_values)
+        """Return the query whether conditions can hold together after the assignments of a path.
+
+        The assumptions of the path are added to the conditions.
+        """
+        domains = {**self.domains, **path.domains}
+        all_conditions = (*conditions, *path.assumptions)
+        return SolverQuery(all_conditions, tuple(path.assignments), domains, self.parameter_values)
 
     def free_tunables(self, query: SolverQuery) -> SolverQuery | None:
-        """Return the question with all values that tunables can have, None if it reads none."""
+        """Return the query with tunable parameters as variables; None if it depends on none.
+
+        The assignments of derived parameters are put before those of the query.
+        """
         wider = replace(
             query,
             assignments=(*self.derived_assignments, *query.assignments),
@@ -86,7 +98,11 @@ class QueryEngine:
         return wider if any(name in wider.names_read for name in self.tunable_domains) else None
 
     def answer(self, query: SolverQuery) -> Witness | Verdict:
-        """Return a witness, "never", or "open"."""
+        """Return a witness, "never" if the conditions are disproved, or "open".
+
+        The methods are tried in this order: linear bounds, sample points, z3, and a larger set of
+        sample points.
+        """
         narrower = narrow_domains(query)
         if narrower is None:
             return "never"
@@ -99,13 +115,20 @@ class QueryEngine:
         return _build_witness(query, found) if found else "open"
 
     def answer_for_all_tunables(self, query: SolverQuery) -> Witness | Verdict:
-        """Return the answer for all values that tunables can have, the present ones first."""
+        """Return the answer for the present values of tunable parameters.
+
+        If that is "never", return the answer for all values in the ranges of the tunable
+        parameters.
+        """
         found = self.answer(query)
         wider = self.free_tunables(query) if found == "never" else None
         return self.answer(wider) if wider else found
 
     def is_unsatisfiable(self, query: SolverQuery) -> bool:
-        """Tell whether it is proven that conditions never hold together, tunables being any."""
+        """Return whether it is proven that the conditions never hold, for all tunable values.
+
+        The result is False once `MAX_SOLVER_QUERIES` is exceeded.
+        """
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or not _is_proven_unsatisfiable(
             QueryKey(query.key, query)
@@ -115,7 +138,10 @@ class QueryEngine:
         return wider is None or _is_proven_unsatisfiable(QueryKey(wider.key, wider))
 
     def find_confirmed_witness(self, exact: SolverQuery, near: SolverQuery) -> Witness | None:
-        """Return a witness that z3 finds for a question, and that holds for one near to it."""
+        """Return a solution of `exact` by z3 at which `near` holds; None if there is none.
+
+        `near` is `exact` with equalities relaxed to a tolerance, because the solution is rounded.
+        """
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or narrow_domains(exact) is None:
             return None
@@ -127,7 +153,7 @@ class QueryEngine:
         )
 
     def _solve(self, query: SolverQuery) -> Valuation | Verdict:
-        """Return a witness that z3 finds and our own arithmetic confirms, or what z3 says."""
+        """Return a solution of z3 that evaluation confirms, "never", or "open"."""
         self.query_count += 1
         found = shared_solver().solve(query) if self.query_count <= MAX_SOLVER_QUERIES else "open"
         if isinstance(found, str):
@@ -137,7 +163,10 @@ class QueryEngine:
         )
 
     def _search_points(self, query: SolverQuery) -> Valuation | None:
-        """Return a witness among many points, as long as not too many were tried in all."""
+        """Return the first of many sample points at which the query holds; None if there is none.
+
+        The search ends when `MAX_SEARCHED_POINTS` points were tried in all queries of this engine.
+        """
         for point in all_sample_points(query):
             self.point_count += 1
             if self.point_count > MAX_SEARCHED_POINTS:
@@ -149,7 +178,7 @@ class QueryEngine:
 
 @dataclass(frozen=True)
 class QueryKey:
-    """A question by what it says: the same one, asked again, has its answer already."""
+    """Query that is compared and hashed by its key, for the cache of answers."""
 
     key: object
     query: SolverQuery = field(compare=False)
@@ -157,23 +186,27 @@ class QueryKey:
 
 @lru_cache(maxsize=2048)
 def _is_proven_unsatisfiable(query_key: QueryKey) -> bool:
-    """Tell whether conditions are proven never to hold together."""
-    question = query_key.query
-    narrower = narrow_domains(question)
+    """Return whether linear bounds or z3 prove that the conditions never hold together."""
+    query = query_key.query
+    narrower = narrow_domains(query)
     if narrower is None:
         return True
-    if any(question.holds_at(point) for point in first_sample_points(question, narrower)):
+    if any(query.holds_at(point) for point in first_sample_points(query, narrower)):
         return False
-    return shared_solver().solve(question, SMALL_RESOURCE_LIMIT) == "never"
+    return shared_solver().solve(query, SMALL_RESOURCE_LIMIT) == "never"
 
 
 @cache
 def shared_solver() -> Solver:
-    """Return the one solver: what it has made of names and numbers is of use again."""
+    """Return the solver of this process; it reuses the terms of names and numbers."""
     return Solver()
 
 
 def _build_witness(query: SolverQuery, valuation: Valuation) -> Witness:
+    """Return a witness with rounded values.
+
+    Its text leaves out the state of functions with memory.
+    """
     shorter = query.shorten(valuation)
     shown_values = {
         name: value for name, value in shorter.items() if not name.startswith("memory.")
@@ -182,24 +215,33 @@ def _build_witness(query: SolverQuery, valuation: Valuation) -> Witness:
 
 
 def _declared_domains(automaton: Automaton) -> Iterator[tuple[str, VariableDomain]]:
+    """Yield the storage name and domain of each input, state and discrete variable.
+
+    The default of an input is the default of its domain.
+    """
     for name, thing in automaton.inputs.items():
-        extent = _declared_domain(thing, automaton.numbers)
+        domain = _declared_domain(thing, automaton.numbers)
         if thing.default is not None:
             default: Scalar = round_to_type(thing.default, automaton.numbers)
-            extent = replace(extent, default=_cast_to_domain(default, extent))
-        yield f"input.{name}", extent
+            domain = replace(domain, default=_cast_to_domain(default, domain))
+        yield f"input.{name}", domain
     for name, variable in automaton.state_variables.items():
         yield storage_of(automaton, name), _declared_domain(variable, automaton.numbers)
 
 
 def _cast_to_domain(value: Scalar, domain: VariableDomain) -> Scalar:
+    """Return a number as bool or int if the domain has that type."""
     if domain.type == "truth":
         return bool(value)
     return int(value) if domain.type == "whole" else value
 
 
 def _declared_domain(declaration: Input | State | Parameter, numbers: NumberType) -> VariableDomain:
-    """Return what a declared thing can be, with its bounds as a program has them."""
+    """Return the domain of a declaration.
+
+    An enumeration has the indices of its values; other types have their range, rounded to the
+    number type.
+    """
     if declaration.type == "enum":
         places = tuple(range(len(declaration.values)))
         return VariableDomain("whole", numbers=places, names=declaration.values)

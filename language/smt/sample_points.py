@@ -1,4 +1,7 @@
-"""Sample: points of a question that are tried as witnesses, the same ones on every machine."""
+"""Sample points: deterministic candidate witnesses of a query from a low-discrepancy sequence.
+
+Coordinates are van der Corput numbers in a prime base for each variable (Halton 1960).
+"""
 
 from __future__ import annotations
 
@@ -12,25 +15,29 @@ from language.numerics.evaluate import Scalar, evaluate
 from language.smt.query import SolverQuery, Valuation, VariableDomain
 
 SAMPLE_COUNT = 8
-"""Points that are tried before z3 is asked: most guards hold at one of them."""
+"""One more than the number of points that are tried before z3; most guards hold at one of them."""
 MAX_SAMPLE_COUNT = 64
-"""Points that are tried where z3 knows nothing."""
+"""One more than the number of points that are tried if z3 gives no answer."""
 DEFAULT_RANGE = (-10.0, 10.0)
-"""Sampled where a state or input gives no range, in SI."""
+"""Sampled interval of a variable without a range, in SI units."""
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
+"""Bases of the sequence, one for each position of a variable."""
 
 
 def first_sample_points(
     query: SolverQuery, narrowed_domains: Mapping[str, VariableDomain]
 ) -> Iterator[Valuation]:
-    """Yield a few sample points within narrower bounds."""
-    extents = {**query.domains, **narrowed_domains}
+    """Yield `SAMPLE_COUNT - 1` points within the narrowed domains."""
+    domains = {**query.domains, **narrowed_domains}
     for index in range(1, SAMPLE_COUNT):
-        yield _sample_point(query, extents, index)
+        yield _sample_point(query, domains, index)
 
 
 def all_sample_points(query: SolverQuery) -> Iterator[Valuation]:
-    """Yield many sample points, each also moved onto the boundaries that conditions name."""
+    """Yield `MAX_SAMPLE_COUNT - 1` points, each followed by its projections onto boundaries.
+
+    A projection replaces one side of a relation of the conditions so that both sides are equal.
+    """
     found = [part for condition in query.conditions for part in subexpressions(condition)]
     relations = [part for part in found if isinstance(part, Compare)]
     for index in range(1, MAX_SAMPLE_COUNT):
@@ -43,6 +50,7 @@ def all_sample_points(query: SolverQuery) -> Iterator[Valuation]:
 def _sample_point(
     query: SolverQuery, domains: Mapping[str, VariableDomain], index: int
 ) -> Valuation:
+    """Return the point of an index: a value for each variable of the query."""
     return {
         name: _sample_value(domains[name], index, position)
         for position, name in enumerate(query.variables)
@@ -52,6 +60,11 @@ def _sample_point(
 def _boundary_points(
     relation: Compare, point: Valuation, query: SolverQuery
 ) -> Iterator[Valuation]:
+    """Yield copies of a point at which both sides of a relation are equal.
+
+    One side has to be a real variable, which gets the value of the other side. A side that cannot
+    be evaluated is skipped.
+    """
     for side, other in ((relation.left, relation.right), (relation.right, relation.left)):
         if isinstance(side, Ref) and side.name in point and not side.is_integer:
             try:
@@ -62,11 +75,15 @@ def _boundary_points(
 
 
 def neighbouring_points(point: Valuation, query: SolverQuery) -> Iterator[Valuation]:
-    """Yield a point of z3 and, since it is rounded, neighbours of it along each variable."""
+    """Yield a point of z3, its floating-point neighbours, and copies with one sampled coordinate.
+
+    The first point has the defaults of the domains. Neighbours are tried because the solution of z3
+    is rounded.
+    """
     default = {
-        name: extent.default
+        name: domain.default
         for name in point
-        if (extent := query.domains[name]).default is not None
+        if (domain := query.domains[name]).default is not None
     }
     yield {**point, **default}
     yield point
@@ -80,6 +97,11 @@ def neighbouring_points(point: Valuation, query: SolverQuery) -> Iterator[Valuat
 
 
 def _sample_value(domain: VariableDomain, index: int, position: int) -> Scalar:
+    """Return the value of an index for the variable at a position.
+
+    The default has precedence; bools and finite sets are cycled through; numbers are spread over
+    the range.
+    """
     if domain.default is not None:
         return domain.default
     if domain.type == "truth":

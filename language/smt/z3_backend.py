@@ -1,9 +1,9 @@
-"""Solver: exact answers over the reals by z3 (de Moura and Bjorner 2008), or none.
+"""Backend for z3 (de Moura and Bjorner 2008): exact answers to queries over the reals.
 
-Functions without a theory (sin, exp, tables) are any functions within their bounds: what cannot be
-for any of them cannot be. The effort is counted by z3 itself, not by a clock: so the answers are
-the same on every machine. z3 is loaded with the first question. It keeps all terms in one context,
-which is not safe for threads: they take turns.
+A function without a theory (`sin`, `exp`, tables) is uninterpreted within its bounds, so "never"
+holds for the real function too. The effort is limited by the resource count of z3 and not by a
+clock, so the answers are equal on every machine. z3 is imported with the first query. All terms are
+in one context, which is not thread-safe; a lock serialises the queries.
 """
 
 from __future__ import annotations
@@ -20,11 +20,14 @@ from language.numerics.evaluate import ARITHMETIC, RELATIONS, Scalar
 from language.smt.query import SolverQuery, Valuation, VariableDomain
 
 RESOURCE_LIMIT = 200_000
-"""Units of z3's own count for a proof without which a spec is refused: seconds at most."""
+"""z3 resource units for a proof that decides whether a spec is accepted: seconds at most."""
 SMALL_RESOURCE_LIMIT = 10_000
-"""For a warning: a tenth of a second at most; what is linear takes a tenth of that."""
+"""z3 resource units for a warning: at most a tenth of a second.
+
+Linear queries take a tenth of that.
+"""
 IRRATIONAL_DIGITS = 20
-"""Decimal digits of an irrational number: more than a double has."""
+"""Decimal digits of an approximated irrational number: more than a double has."""
 FUNCTION_BOUNDS: Mapping[str, tuple[float, float]] = {
     "sin": (-1.0, 1.0),
     "cos": (-1.0, 1.0),
@@ -34,51 +37,59 @@ FUNCTION_BOUNDS: Mapping[str, tuple[float, float]] = {
     "pow": (0.0, math.inf),
     "log": (-708.4, 709.8),
 }
-"""What is known of functions that z3 has no theory of."""
+"""Bounds of functions that z3 has no theory of."""
 
 Verdict = Literal["never", "open"]
+"""Answer without values: the conditions are disproved ("never") or undecided ("open")."""
 
 
 class UnsupportedExpressionError(Exception):
-    """An expression that has no counterpart in z3."""
+    """Error of an expression that has no counterpart in z3."""
 
 
 class Solver:
-    """Answers questions; each stands for itself, and waits for those of other threads."""
+    """z3 with cached terms; a lock serialises the queries of threads.
+
+    Queries are independent of each other.
+    """
 
     def __init__(self) -> None:
-        """Nothing is asked yet."""
+        """Create the lock; z3 is imported later."""
         self._lock = threading.Lock()
 
     @cached_property
     def z3(self) -> Any:
-        """The library; loading it takes a fifth of a second."""
+        """Module z3; its import takes a fifth of a second."""
         import z3
 
         return z3
 
     @cached_property
     def term_cache(self) -> dict[object, Any]:
-        """Literals and variables that are made already: these are what takes longest."""
+        """Cached z3 literals and variables; their construction takes most of the time."""
         return {}
 
     def solve(
         self, query: SolverQuery, resource_limit: int = RESOURCE_LIMIT
     ) -> Valuation | Verdict:
-        """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
+        """Return rounded values of a solution, "never" if there is none, or "open" if undecided."""
         with self._lock:
             return self._solve_locked(query, resource_limit)
 
     def _solve_locked(self, query: SolverQuery, resource_limit: int) -> Valuation | Verdict:
-        """Return an answer; its terms are given back to z3 before another thread has its turn."""
+        """Return the answer to a query; the caller holds the lock.
+
+        The terms are released before another thread continues. An expression without a counterpart
+        in z3 gives "open".
+        """
         solver = self.z3.Solver()
         solver.set("rlimit", resource_limit)
         try:
             terms = _TermBuilder(self.z3, query, self.term_cache)
-            wanted = [terms.build(condition) for condition in query.conditions]
+            conditions = [terms.build(condition) for condition in query.conditions]
         except (UnsupportedExpressionError, self.z3.Z3Exception):
             return "open"
-        solver.add(*wanted, *terms.facts)
+        solver.add(*conditions, *terms.facts)
         answer = solver.check()
         if answer == self.z3.unsat:
             return "never"
@@ -89,18 +100,18 @@ class Solver:
 
 
 def _model_value(model: Any, variable: Any) -> Scalar:
-    """Return the value of a variable in a model, rounded once."""
-    found = model.eval(variable, model_completion=True)
+    """Return the value of a variable in a z3 model as bool, int or rounded float."""
+    value = model.eval(variable, model_completion=True)
     if variable.sort().name() == "Bool":
-        return str(found) == "True"
+        return str(value) == "True"
     if variable.is_int():
-        return int(found.as_long())
-    exact = found if hasattr(found, "numerator_as_long") else found.approx(IRRATIONAL_DIGITS)
+        return int(value.as_long())
+    exact = value if hasattr(value, "numerator_as_long") else value.approx(IRRATIONAL_DIGITS)
     return float(Fraction(exact.numerator_as_long(), exact.denominator_as_long()))
 
 
 class _TermBuilder:
-    """The expressions of one question as terms of z3; `facts` is what holds of them anyway."""
+    """Builder of z3 terms of one query; `facts` are the constraints of domains and functions."""
 
     def __init__(self, z3: Any, query: SolverQuery, term_cache: dict[object, Any]) -> None:
         self.z3 = z3
@@ -116,7 +127,10 @@ class _TermBuilder:
                 self.terms_by_name[target] = self.build(value)
 
     def build(self, expr: Expr) -> Any:
-        """Return the term of an expression."""
+        """Return the z3 term of an expression.
+
+        Raises UnsupportedExpressionError if there is none.
+        """
         z3 = self.z3
         match expr:
             case Value(value):
@@ -142,6 +156,10 @@ class _TermBuilder:
         raise UnsupportedExpressionError
 
     def _literal(self, value: Scalar) -> Any:
+        """Return a number as a z3 literal.
+
+        Raises UnsupportedExpressionError if it is not finite.
+        """
         if isinstance(value, bool):
             return self.z3.BoolVal(value)
         if isinstance(value, int):
@@ -151,11 +169,16 @@ class _TermBuilder:
         return self._exact(Fraction(value))
 
     def _exact(self, value: Fraction) -> Any:
+        """Return the cached z3 literal of a rational number."""
         if value not in self.term_cache:
             self.term_cache[value] = self.z3.RealVal(f"{value.numerator}/{value.denominator}")
         return self.term_cache[value]
 
     def _term_of_name(self, name: str) -> Any:
+        """Return the term of an assigned name, a variable or a scalar constant.
+
+        Raises UnsupportedExpressionError for other names.
+        """
         if name not in self.terms_by_name:
             if name in self.query.domains:
                 self.terms_by_name[name] = self._variable(name, self.query.domains[name])
@@ -166,6 +189,7 @@ class _TermBuilder:
         return self.terms_by_name[name]
 
     def _variable(self, name: str, domain: VariableDomain) -> Any:
+        """Return the cached term of a variable and add the facts of its domain."""
         key = name, domain
         if key not in self.term_cache:
             self.term_cache[key] = self._declare_variable(name, domain)
@@ -174,7 +198,7 @@ class _TermBuilder:
         return self.variables[name]
 
     def _declare_variable(self, name: str, domain: VariableDomain) -> tuple[Any, list[Any]]:
-        """Return a variable and what its extent says of it."""
+        """Return a new variable and the constraints of its domain."""
         z3 = self.z3
         term = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[domain.type](name)
         facts = []
@@ -187,6 +211,10 @@ class _TermBuilder:
         return term, facts
 
     def _build_call(self, function: str, arguments: tuple[Expr, ...]) -> Any:
+        """Return the z3 term of a function call.
+
+        A function without a theory is an uninterpreted function within its bounds.
+        """
         z3 = self.z3
         if function in ("lookup", "lookup2"):
             count = 1 if function == "lookup" else 2
@@ -217,7 +245,10 @@ class _TermBuilder:
         return self._uninterpreted(function, terms, low, high)
 
     def _square_root(self, square: Any) -> Any:
-        """Return a number that is not negative and gives the square, where there is one."""
+        """Return a non-negative number whose square is the operand if the operand is not negative.
+
+        Equal operands share one root.
+        """
         if square.get_id() not in self.roots:
             root = self.z3.FreshReal("sqrt")
             self.roots[square.get_id()] = root
@@ -225,6 +256,10 @@ class _TermBuilder:
         return self.roots[square.get_id()]
 
     def _lookup(self, table: Expr, arguments: tuple[Expr, ...]) -> Any:
+        """Return a lookup as an uninterpreted function within the smallest and largest table value.
+
+        Raises UnsupportedExpressionError if the table has no values.
+        """
         items = self.query.parameter_values.get(table.name) if isinstance(table, Ref) else None
         if not isinstance(table, Ref) or not isinstance(items, tuple):
             raise UnsupportedExpressionError
@@ -232,11 +267,11 @@ class _TermBuilder:
         return self._uninterpreted(f"lookup {table.name}", terms, min(items), max(items))
 
     def _uninterpreted(self, function: str, terms: list[Any], low: float, high: float) -> Any:
-        """Return what any function within bounds gives: equal arguments have equal values."""
+        """Return an uninterpreted function of real terms; finite bounds are added as facts."""
         z3 = self.z3
-        made = z3.Function(function, *[z3.RealSort()] * (len(terms) + 1))(*terms)
+        term = z3.Function(function, *[z3.RealSort()] * (len(terms) + 1))(*terms)
         if math.isfinite(low):
-            self.facts.append(made >= self._literal(low))
+            self.facts.append(term >= self._literal(low))
         if math.isfinite(high):
-            self.facts.append(made <= self._literal(high))
-        return made
+            self.facts.append(term <= self._literal(high))
+        return term
