@@ -1,4 +1,4 @@
-"""Types of arrays."""
+"""Array types: the type of arrays of real numbers in signatures."""
 
 from __future__ import annotations
 

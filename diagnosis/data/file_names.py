@@ -1,4 +1,4 @@
-"""File names: what recordings are called where bare names would not tell them apart."""
+"""Recording names: names of recordings that are unique within a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from pathlib import Path
 
 
 def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
-    """Return a name for each path: the bare one, or with as many folders as tell all apart."""
+    """Return a display name for each path: the file name, with parent folders if names repeat.
+
+    All names have the same number of path components: the smallest one that makes all of them
+    different. Paths that denote the same file keep the full path.
+    """
     absolute = {path: path.absolute().parts for path in paths}
     names: dict[Path, str] = {}
     for count in range(1, max((len(parts) for parts in absolute.values()), default=0) + 1):
@@ -18,7 +22,11 @@ def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
 
 
 def recording_names(train: Sequence[Path], held_out: Sequence[Path]) -> Mapping[Path, str]:
-    """Return a name for each recording: none that is held out has that of one to learn from."""
+    """Return a unique display name for each training and held-out recording.
+
+    Each group is named by itself. If a held-out recording has the name of a training recording, the
+    held-out names get as many folders as make all names of both groups different.
+    """
     learnt, own = distinguish_file_names(train), distinguish_file_names(held_out)
     if set(learnt.values()) & set(own.values()):
         together = distinguish_file_names([*train, *held_out])

@@ -1,4 +1,4 @@
-"""Apart: what a diagnosis learns from and what judges it share no values of a recording."""
+"""Train/test separation: a check that no values are used both for training and for validation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from engine.recordings.recording_window import file_of, overlap
 
 
 def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
-    """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
+    """Raise ValueError if two recordings overlap in a group, or a training and a held-out one do.
+
+    Recordings overlap if they are the same file or copies of it and their time windows intersect. A
+    held-out file that cannot be read is an error as well. The contents of held-out files are not
+    opened, so among them and against the training files only equal paths count as the same file.
+    """
     for one, other in itertools.combinations(train, 2):
         _require_no_overlap(other, "is named twice: each recording counts once", one)
     for one, other in itertools.combinations(held_out, 2):
@@ -29,7 +34,10 @@ def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]
 def _require_no_overlap(
     file: str | Path, reason: str, other: str | Path, opened: bool = True
 ) -> None:
-    """Raise ValueError where a recording has values of an earlier one."""
+    """Raise ValueError with `reason` if `file` and `other` share values of a recording.
+
+    With `opened`, the contents are compared to recognise copies under another name.
+    """
     if overlap(Path(file), Path(other), opened):
         same = os.path.realpath(file_of(Path(file))) == os.path.realpath(file_of(Path(other)))
         raise ValueError(f"{file} {reason}" if same else f"{file}, a copy of {other}, {reason}")

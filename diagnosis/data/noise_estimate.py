@@ -1,4 +1,4 @@
-"""Noise: how much of a sampled signal is noise and quantisation, from its quietest stretches."""
+"""Noise estimation: the standard deviation of white noise and quantisation of a sampled signal."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
 WINDOW_SAMPLES = 50
-"""Samples of a stretch."""
+"""Samples of a window."""
 NOISE_QUANTILE = 0.2
-"""The part of the stretches that counts as quiet."""
+"""Quantile of the windows, ordered by their spread, at which the noise is read."""
 MAD_TO_STD = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
 
 
 def noise_of(values: Reals) -> float:
-    """Return the standard deviation of the white part of a signal (samples,); NaN is left out.
+    """Return the standard deviation of the white noise in a signal (samples,); NaN is ignored.
 
-    From second differences, which have 6 times the variance of white noise; not less than that
-    of the quantisation.
+    The estimate is the 20 % quantile, over windows of 50 samples, of the median absolute second
+    difference, divided by the square root of 6 (second differences of white noise have 6 times its
+    variance). It is at least the standard deviation of the quantisation, quantum / sqrt(12), and 0
+    for fewer than 5 known values.
     """
     known = values[np.isfinite(values)]
     if len(known) < 5:
@@ -29,7 +31,11 @@ def noise_of(values: Reals) -> float:
 
 
 def _window_medians(sizes: Reals) -> Reals:
-    """Return the median of each stretch of sizes (n,): the first ones have one more of them."""
+    """Return the median of each window of `sizes` (n,), in order of time.
+
+    The windows have at least `WINDOW_SAMPLES` values (one window if there are fewer); the first
+    windows have one value more if n is not a multiple of their number.
+    """
     count = max(1, len(sizes) // WINDOW_SAMPLES)
     width, more = divmod(len(sizes), count)
     edge = more * (width + 1)
@@ -39,7 +45,10 @@ def _window_medians(sizes: Reals) -> Reals:
 
 
 def quantum_of(values: Reals) -> float:
-    """Return the step of a quantised signal: the smallest difference of its values, not 0."""
+    """Return the quantisation step of a signal: the smallest difference of distinct values.
+
+    Differences at rounding level are ignored; the result is 0 if all values are equal.
+    """
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps > 1e-9 * max(1.0, float(np.max(np.abs(values), initial=0.0)))]
     return float(np.min(gaps)) if len(gaps) else 0.0

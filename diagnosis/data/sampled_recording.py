@@ -1,8 +1,9 @@
-"""Series: a recording on the grid of its fastest channel, for prediction from sample to sample.
+"""Sampled recordings: recordings on a uniform time grid, for one-step prediction.
 
-The grid begins where a compared channel has a value. Every value keeps its own sample: a channel
-without one at a sample is NaN there if it is compared; an input holds its latest value, or runs
-straight between its time stamps where the map says `hold: linear`.
+The grid has the period of the fastest channel and begins at a sample of a compared channel. Each
+measured value belongs to its nearest sample; a compared channel is NaN at samples without a value.
+An input is held (zero-order hold), or linear between its time stamps if the recording map says
+`hold: linear`.
 """
 
 from __future__ import annotations
@@ -24,15 +25,16 @@ from language.model.system import RecordingMap
 
 Reals = NDArray[np.float64]
 DECIMATED_PERIOD = Fraction(5, 1000)
-"""Seconds between samples of a thinned recording."""
+"""Period [s] to which faster recordings are decimated."""
 
 
 @dataclass(frozen=True)
 class SampledRecording:
-    """A recording as arrays: `inputs` (samples, inputs) held, `measured` (samples, seen) or NaN.
+    """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
 
-    `period` is the time [s] between samples, `start` that of the first one; `is_linear` says that
-    inputs run straight from sample to sample: of a held one they are the steps.
+    `measured` is NaN where an output has no value. `period` is the time [s] between samples and
+    `start` the time [s] of the first one. With `is_first_order_hold`, inputs are linear between
+    samples instead of constant.
     """
 
     name: str
@@ -49,14 +51,16 @@ class SampledRecording:
 
     @cached_property
     def first_measured(self) -> Reals:
-        """The first known value of each compared signal (seen,), NaN where there is none."""
+        """The first known value of each compared output (outputs,), NaN if there is none."""
         known = np.isfinite(self.measured)
         rows = np.argmax(known, axis=0)
         return np.asarray(self.measured[rows, np.arange(len(rows))], dtype=np.float64)
 
     @cached_property
     def noise(self) -> tuple[Reals, Reals]:
-        """The standard deviation of the noise of the compared signals (seen,) and the inputs."""
+        """The noise standard deviations of the compared outputs (outputs,) and the inputs
+        (inputs,).
+        """
         seen, inputs = (
             [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
         )
@@ -64,7 +68,7 @@ class SampledRecording:
 
 
 def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
-    """Return the outputs that a map compares, in the order of the automaton."""
+    """Return the outputs that a recording map compares, in the order of the automaton."""
     mapped = {column.compare for column in mapping.columns.values() if column.compare}
     return tuple(name for name in automaton.outputs if name in mapped)
 
@@ -72,9 +76,10 @@ def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, 
 def sample_windows(
     recording: Recording, mapping: RecordingMap, automaton: Automaton, output_names: Sequence[str]
 ) -> tuple[SampledRecording, ...]:
-    """Return a recording on its grid, a series for each window that is used of it.
+    """Return one sampled recording for each window of a recording (one if it has no windows).
 
-    Raises ValueError.
+    Inputs that are not recorded take the constant of the map, or else their declared default.
+    Raises ValueError if a window has too few samples.
     """
     constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
     declared = {
@@ -96,9 +101,12 @@ def sample_recording(
     defaults: Mapping[str, float],
     period: Fraction | None = None,
 ) -> SampledRecording:
-    """Return a recording on its grid, or on one of another `period`.
+    """Return a recording on the uniform grid of its fastest channel, or on a grid of `period` [s].
 
-    Raises ValueError where it has too few samples.
+    The grid begins at the first time stamp of the fastest compared channel at which all channels
+    are known, and ends with the shortest channel. `defaults` gives the constant value of each input
+    without a channel. Raises ValueError if a channel has fewer than two values or the grid fewer
+    than two samples.
     """
     input_channels = {
         c.column.to: c for c in recording.channels.values() if c.column.to is not None
@@ -138,7 +146,7 @@ def sample_recording(
 
 
 def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
-    """Tell whether a compared output follows an input at once, with no state in between."""
+    """Return whether a compared output depends on an input algebraically (direct feed-through)."""
     edges: dict[str, set[str]] = {}
     for mode in automaton.all_modes:
         for name, formula in mode.equations.items():
@@ -153,9 +161,11 @@ def resample(
     output_names: Sequence[str],
     is_first_order_hold: bool,
 ) -> tuple[SampledRecording, ...]:
-    """Return recordings whose inputs are held or run straight, thinned where that loses nothing.
+    """Return recordings with the given hold of their inputs, decimated if no output has
+    feed-through.
 
-    Where an output shows an input at once it does: what is shown with a mean was never measured.
+    With direct feed-through the recordings keep their samples, because an output that follows the
+    mean of an input was never measured.
     """
     if has_feedthrough(automaton, output_names):
         return tuple(
@@ -165,7 +175,7 @@ def resample(
 
 
 def require_equal_periods(series: Sequence[SampledRecording]) -> None:
-    """Raise ValueError where recordings have samples at different rates."""
+    """Raise ValueError if the recordings do not all have the same period."""
     rates = {one.period: f"{one.name} ({float(1 / one.period):g} Hz)" for one in series}
     if len(rates) > 1:
         named = ", ".join(rates.values())
@@ -173,10 +183,12 @@ def require_equal_periods(series: Sequence[SampledRecording]) -> None:
 
 
 def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> SampledRecording:
-    """Return a fast recording at a slower pace: inputs are means over it, every n-th value is kept.
+    """Return a recording decimated by an integer factor to a period of about `DECIMATED_PERIOD`.
 
-    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples. A held
-    input is the mean of what it is until the next sample, one that `is_first_order_hold` of what is around.
+    Outputs are every n-th sample. A held input is the mean over the samples until the next one; an
+    input with first-order hold is the mean over a centred window. A recording that is not at least
+    twice as fast keeps its samples. Driveline dynamics are slower than this period, and the cost of
+    a fit is proportional to the number of samples.
     """
     factor = max(1, int(DECIMATED_PERIOD / series.period))
     count = series.count // factor
@@ -198,7 +210,9 @@ def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> Sam
 
 
 def grid_period(times: Reals) -> Fraction:
-    """Return the usual distance [s] of time stamps, of a whole rate where it is near one."""
+    """Return the median difference [s] of time stamps, as the inverse of a whole rate if within 2
+    %.
+    """
     usual = float(np.median(np.diff(times)))
     rate = round(1.0 / usual)
     if rate > 0 and abs(rate * usual - 1.0) < 0.02:
@@ -209,14 +223,20 @@ def grid_period(times: Reals) -> Fraction:
 def _first_common_stamp(
     compared_channels: Sequence[Channel], used_channels: Sequence[Channel]
 ) -> Fraction:
-    """Return the first stamp [s] of the fastest compared channel at which all are known."""
+    """Return the first stamp [s] of the fastest compared channel at which all used channels have
+    begun.
+
+    It is the time at which the last channel begins if the fastest channel has no later stamp.
+    """
     common = max(channel.times[0] for channel in used_channels)
     fastest = min(compared_channels, key=lambda channel: grid_period(channel.seconds))
     return next((time for time in fastest.times if time >= common), common)
 
 
 def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
-    """The sample that each value of a channel belongs to: the nearest one."""
+    """Return the index of the nearest sample of the grid for each value of a channel; may be
+    outside.
+    """
     return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
 
 
@@ -228,6 +248,7 @@ def _sample_input(
     defaults: Mapping[str, float],
     name: str,
 ) -> Reals:
+    """Return an input on the grid (count,): held or interpolated; a constant without a channel."""
     if channel is None:
         return np.full(count, defaults[name])
     if channel.column.hold == "linear":
@@ -239,6 +260,10 @@ def _sample_input(
 
 
 def _sample_output(channel: Channel | None, start: Fraction, step: Fraction, count: int) -> Reals:
+    """Return an output on the grid (count,), NaN at samples without a value.
+
+    All values are NaN without a channel.
+    """
     values = np.full(count, np.nan)
     if channel is not None:
         places = _sample_indices(channel, start, step)

@@ -1,4 +1,4 @@
-"""Spectrum: how the power of a signal is spread over frequencies."""
+"""Spectrum: the power spectral density of a signal."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ Reals = NDArray[np.float64]
 
 
 def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
-    """Return frequencies [Hz] and the one-sided power density there, by Welch's method.
+    """Return frequencies [Hz] and the one-sided power spectral density of a signal (Welch 1967).
 
-    Of `values` (samples,) at `rate` [Hz], in Hann windows of at most `max_window` samples that overlap
-    by half, each without its mean.
+    `values` (samples,) are sampled at `rate` [Hz]. The Hann windows have at most `max_window`
+    samples, overlap by half, and are taken without their mean.
     """
     length = min(len(values), max_window)
     power, frequencies = mlab.psd(values, length, rate, mlab.detrend_mean, noverlap=length // 2)

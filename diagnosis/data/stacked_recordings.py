@@ -1,4 +1,4 @@
-"""Joined: recordings one after the other, as the predictor takes them; made once for each set."""
+"""Stacked experiments: recordings concatenated into the arrays that a predictor reads."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from diagnosis.data.sampled_recording import SampledRecording
 
 Reals = NDArray[np.float64]
 BURN_IN = 0.5
-"""Seconds at the start of a recording that do not count: the states are being found."""
+"""Seconds at the start of a recording that are not scored, while the observer finds the states."""
 CACHE_SIZE = 24
-"""Sets of recordings that are kept joined, the latest ones."""
+"""Number of stacked sets that are cached; the least recently used one is dropped."""
 
 
 @dataclass(frozen=True)
 class StackedExperiments:
-    """A set of recordings in joined arrays, with the values that they start with.
+    """A set of recordings as concatenated arrays, with the first known values of their outputs.
 
-    `first` (recordings, seen) are the first known values of the compared signals.
+    `first_measured` has the shape (recordings, outputs).
     """
 
     series: tuple[SampledRecording, ...]
@@ -35,14 +35,15 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return how many samples at the start of a recording do not count."""
+    """Return the number of samples in the burn-in of a recording, at least 1."""
     return max(1, round(BURN_IN / float(series.period)))
 
 
 def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:
-    """Return recordings joined, as they were kept or joined now.
+    """Return recordings concatenated in their order; the result is cached.
 
-    They are known by their identity: what is kept holds them, so no other one has it meanwhile.
+    The cache key is the identity of the recordings. An entry holds its recordings, so no other
+    object can have the same identity meanwhile.
     """
     key = tuple(id(one) for one in series)
     stacked = _cache.get(key)
@@ -55,6 +56,7 @@ def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:
 
 
 def _stack(series: tuple[SampledRecording, ...]) -> StackedExperiments:
+    """Return recordings concatenated, with the start, burn-in and hold of each of them."""
     counts = [one.count for one in series]
     recorded = StackedRecordings(
         np.concatenate([one.inputs for one in series]),

@@ -1,7 +1,7 @@
-"""Shelf: fits of a diagnosis kept in files, so that one that was ended goes on where it was.
+"""Fit cache: estimates stored in files, so that an interrupted diagnosis continues where it was.
 
-A fit is determined by what it is made from - the code, the model, the recordings, where it starts:
-a hash of these is its name. What was kept has the bits of what would be made.
+The file name is a hash of everything that determines a fit: the code, the model, the recordings and
+the start. A loaded estimate is bit-identical to a computed one.
 """
 
 from __future__ import annotations
@@ -32,9 +32,11 @@ NORMAL_FIELDS = tuple(field.name for field in dataclasses.fields(NormalEquations
 
 @dataclasses.dataclass(frozen=True)
 class FitCache:
-    """Where fits are kept; nowhere without a folder. `key` is the hash of the model.
+    """A cache of fits in `folder`; without a folder nothing is stored.
 
-    `before` is called before a fit is made: it may raise what ends the diagnosis.
+    `model_key` is a hash of the model.
+
+    `before_fit` is called before each computed fit; it may raise to end the diagnosis.
     """
 
     folder: Path | None = None
@@ -49,7 +51,11 @@ class FitCache:
         dependencies: Sequence[object],
         fit: Callable[[], Estimate],
     ) -> Estimate:
-        """Return a fit of a candidate that follows from `dependencies`: as it was kept, else made now."""
+        """Return the stored estimate of a fit, or compute it with `fit` and store it.
+
+        The key is a hash of `label`, the code, the candidate, the recordings and `dependencies`. An
+        unreadable file is computed again, and a failure to write is ignored.
+        """
         if self.folder is None:
             self.before_fit()
             return fit()
@@ -73,7 +79,11 @@ NO_CACHE = FitCache()
 
 
 def hash_of(*values: object) -> str:
-    """Return a hash of values; equal bits have equal hashes."""
+    """Return a hash (32 hex digits) of values; equal bits and types have equal hashes.
+
+    Supported are candidates, arrays, mappings (in sorted order of keys), sequences, dataclasses,
+    numbers, strings and None; other types raise TypeError.
+    """
     digest = hashlib.sha256()
     for value in values:
         _update_digest(digest, value)
@@ -81,6 +91,7 @@ def hash_of(*values: object) -> str:
 
 
 def _update_digest(digest: Any, value: object) -> None:
+    """Add the type and the bits of a value to a digest, recursively."""
     digest.update(f"{type(value).__name__}(".encode())
     if isinstance(value, Candidate):
         _update_digest(
@@ -106,7 +117,7 @@ def _update_digest(digest: Any, value: object) -> None:
 
 
 def _to_arrays(estimate: Estimate) -> Arrays:
-    """Return an estimate as arrays, but for what its outcome follows from."""
+    """Return an estimate as named arrays, without the prediction, which can be computed again."""
     drifts = estimate.noise_levels.process
     arrays: dict[str, Any] = {
         "shared": estimate.point.shared,
@@ -134,7 +145,7 @@ def _to_arrays(estimate: Estimate) -> Arrays:
 def _from_arrays(
     candidate: Candidate, series: Sequence[SampledRecording], arrays: Arrays
 ) -> Estimate:
-    """Return the estimate that arrays were made from."""
+    """Return the estimate stored in arrays; its prediction is computed with the stored gains."""
     drifts = {
         str(name): float(level)
         for name, level in zip(arrays["drift_names"], arrays["drift_levels"], strict=True)

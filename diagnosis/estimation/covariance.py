@@ -1,4 +1,4 @@
-"""Covariance, standard deviations and correlations of estimated parameters."""
+"""Parameter covariance: covariance, standard deviations and correlations of a fit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from diagnosis.estimation.quantity import Quantity
 
 
 def quantities_of(model: Estimate) -> dict[str, Quantity]:
-    """Return all fitted parameters [SI]; those per recording as their mean."""
+    """Return the value [SI] and standard deviation of each free parameter, by name.
+
+    A parameter per recording has the mean of its values.
+    """
     spread = _coordinate_stds(model)
     recordings = len(model.point.per_recording)
     each = [model.values(k) for k in range(recordings)]
@@ -26,7 +29,9 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
 
 
 def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
-    """Return the correlations of the shared parameters of a fit, the strongest first."""
+    """Return the correlations of pairs of shared parameters, in descending order of their
+    magnitude.
+    """
     covariance, names = covariance_of(model)
     sizes = np.sqrt(np.diag(covariance))
     correlations = {}
@@ -37,7 +42,10 @@ def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
 
 
 def covariance_of(model: Estimate) -> tuple[Reals, list[str]]:
-    """The covariance of the shared coordinates: the inverse of the normal equations with priors."""
+    """Return the posterior covariance (n, n) of the shared coordinates, and their names.
+
+    It is the inverse of J'WJ + I, where I comes from the standard normal priors.
+    """
     assert model.normal_equations is not None
     free = ~model.normal_equations.own
     whole = np.sum(model.normal_equations.a, axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
@@ -46,6 +54,10 @@ def covariance_of(model: Estimate) -> tuple[Reals, list[str]]:
 
 
 def _coordinate_stds(model: Estimate) -> Reals:
+    """Return the standard deviations of all coordinates (parameters,).
+
+    A coordinate per recording has the one of an average recording, with shared parameters fixed.
+    """
     assert model.normal_equations is not None
     covariance, _ = covariance_of(model)
     own = model.normal_equations.own

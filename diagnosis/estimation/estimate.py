@@ -1,4 +1,4 @@
-"""Estimate: a candidate at a point, and how it foresees the recordings there."""
+"""Estimate: a candidate at a parameter vector, with its gains and its prediction of recordings."""
 
 from __future__ import annotations
 
@@ -32,8 +32,11 @@ def share_operating_points(
     near_candidate: Candidate,
     near_prediction: PredictionResult,
 ) -> PredictionResult:
-    """Return the `prediction` outcome of a candidate with states and modes of a `near_prediction` one of a model
-    near it, for the same recordings; as it is where their modes or samples are others.
+    """Return a prediction with the modes and the common states of the prediction of a similar
+    model.
+
+    Both are of the same recordings. The prediction is returned unchanged if the modes or the
+    numbers of samples differ, or if a run was incomplete.
     """
     mine, theirs = prediction.runs.stacked, near_prediction.runs.stacked
     is_alike = (
@@ -55,16 +58,16 @@ def share_operating_points(
 
 
 LOG_LEVEL_STEP = 0.05
-"""Change of the logarithm of a level for a difference."""
+"""Step of the logarithm of a noise level for a finite difference."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A candidate at a point: cost [nats] with priors, and how it foresees the recordings.
+    """A candidate at a parameter vector, its cost with priors [nats] and its prediction.
 
-    `normal` are the normal equations of the last round, None before the first, and `columns` what
-    they were made from. `in_vain` are the columns of a model near it with which steps of screening
-    were sought from here, and led nowhere.
+    `normal_equations` and `jacobian` are those of the last iteration, None and empty before the
+    first. `exhausted_jacobian` is the Jacobian of a similar model with which screening found no
+    better point from here.
     """
 
     candidate: Candidate
@@ -83,7 +86,7 @@ class Estimate:
         return self.prediction.negative_log_likelihood()
 
     def values(self, recording: int) -> dict[str, float]:
-        """Return the parameters [SI] of a recording."""
+        """Return the values [SI] of the free parameters for one recording, by name."""
         return values_at(self.candidate, self.point, recording)
 
 
@@ -94,9 +97,10 @@ def evaluate(
     point: ParameterVector,
     nearby: PredictionResult | None = None,
 ) -> Estimate:
-    """Return a candidate at a point, with gains made where its modes were seen.
+    """Return a candidate at a point, with Kalman gains for its operating points.
 
-    `nearby` is where they were seen at a point near it, if that is known.
+    The operating points are those of the prediction `nearby`. Without it, a first prediction with
+    gains for the initial state gives the operating points for the final gains.
     """
     values = values_at(candidate, point, 0)
     gains = kalman_gains(candidate, series, values, noise_levels, nearby)
@@ -115,8 +119,10 @@ def evaluate_near(
     point: ParameterVector,
     nearby: Estimate | None,
 ) -> Estimate:
-    """Return a candidate at a point, with gains made where its modes were seen: where it had them
-    itself, or where a model `nearby` it had them, whichever foresees better.
+    """Return the candidate at a point with the better of two sets of Kalman gains.
+
+    One set is for the candidate's own operating points, the other for those of the similar model
+    `nearby`. The cost is infinite if the candidate diverges; without `nearby` this is `evaluate`.
     """
     if nearby is None:
         return evaluate(candidate, series, noise_levels, point)
@@ -136,9 +142,10 @@ def evaluate_near(
 def with_normal_equations(
     estimate: Estimate, series: Sequence[SampledRecording], jacobian: Jacobian | None = None
 ) -> Estimate:
-    """Return an estimate with the normal equations at its point.
+    """Return an estimate with the Jacobian and the normal equations at its point.
 
-    `jacobian` are columns of a model near it, which are not looked for again.
+    Columns given in `jacobian` (of a similar model) are used; the others are computed by
+    differences.
     """
 
     def run(points: Sequence[ParameterVector]) -> list[Innovations]:
@@ -158,7 +165,10 @@ def with_normal_equations(
 def _noise_parameter_jacobian(
     estimate: Estimate, series: Sequence[SampledRecording], names: Sequence[str]
 ) -> Jacobian:
-    """Return how innovations change with levels: with the gains that are made with these."""
+    """Return the derivatives of the innovations with respect to the named noise levels.
+
+    Each difference uses the Kalman gains that belong to the changed level; unknown values are 0.
+    """
     candidate, jacobian = estimate.candidate, {}
     places = [candidate.names.index(name) for name in names]
     moved = [
@@ -179,7 +189,10 @@ def _noise_parameter_jacobian(
 def gains_at(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> KalmanGains:
-    """Return the gains of an estimate with the levels that its candidate has at a point."""
+    """Return the Kalman gains for the noise levels at a point.
+
+    Without noise parameters these are the gains of the estimate.
+    """
     if not estimate.candidate.noise_parameters:
         return estimate.gains
     noise_levels, values = (
@@ -196,7 +209,7 @@ def predict_at(
     gains: KalmanGains,
     noise_levels: NoiseLevels,
 ) -> PredictionResult:
-    """Return how a candidate foresees recordings at a point with some gains."""
+    """Return the prediction of recordings by a candidate at a point, with given gains."""
     values = all_values_at(candidate, point)[: len(series)]
     return predict(candidate, series, values, gains, noise_levels.huber_limits)
 
@@ -204,14 +217,16 @@ def predict_at(
 def predict_with_gains_of(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> PredictionResult:
-    """Return how a model foresees some recordings at a point, with the gains of the estimate."""
+    """Return the prediction of recordings by the estimate's candidate at a point, with its
+    gains.
+    """
     return predict_at(estimate.candidate, series, point, estimate.gains, estimate.noise_levels)
 
 
 def innovations_at(
     estimate: Estimate, series: Sequence[SampledRecording], points: Sequence[ParameterVector]
 ) -> list[Innovations]:
-    """Return what a model does not foresee at some points, with the gains of the estimate."""
+    """Return the innovations of recordings at each of several points, with the estimate's gains."""
     candidate, gains = estimate.candidate, estimate.gains
     values = [all_values_at(candidate, point)[: len(series)] for point in points]
     return (
@@ -224,7 +239,7 @@ def innovations_at(
 def evaluate_with_gains_of(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> Estimate:
-    """Return an estimate at a point for some recordings, with the gains that it has."""
+    """Return the estimate at another point, or for other recordings, with its own gains."""
     prediction = predict_with_gains_of(estimate, series, point)
     cost = prediction.negative_log_likelihood() + point.prior_cost(estimate.candidate)
     return Estimate(

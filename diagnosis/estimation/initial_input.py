@@ -1,7 +1,8 @@
-"""Starting: the inputs at the first sample of a recording, on which its states start.
+"""Initial inputs: hypotheses for the inputs at the first sample, which set the initial states.
 
-Where a gap is at the start may hang on the sign of a torque that is nothing but noise. Of inputs
-that could have been, those are taken with which the base foresees what follows.
+The initial position in a backlash gap can depend on the sign of a torque that is only noise. Among
+the inputs that are possible within their noise, those with the best prediction by the base are
+chosen.
 """
 
 from __future__ import annotations
@@ -18,15 +19,15 @@ from diagnosis.model.parameter_vector import ParameterVector
 
 Reals = NDArray[np.float64]
 AVERAGING_TIME = 0.1
-"""Seconds at the start over which inputs are taken for constant."""
+"""Time [s] at the start over which inputs are averaged."""
 HYPOTHESIS_STDS = 4.0
-"""Standard deviations of its noise by which a first input may be another one."""
+"""Distance of an alternative first input, in standard deviations of its noise."""
 MIN_GAIN = 3.0
-"""Nats by which another start must foresee better."""
+"""Log-likelihood gain [nat] that an alternative must exceed."""
 
 
 def average_initial_inputs(series: SampledRecording) -> SampledRecording:
-    """Return a recording whose first inputs are the means of its first ones."""
+    """Return a recording whose first input sample is the mean over the first 0.1 s."""
     count = max(1, round(AVERAGING_TIME / float(series.period)))
     inputs = series.inputs.copy()
     inputs[0] = np.mean(inputs[:count], axis=0)
@@ -36,9 +37,10 @@ def average_initial_inputs(series: SampledRecording) -> SampledRecording:
 def choose_initial_inputs(
     model: Estimate, series: Sequence[SampledRecording]
 ) -> tuple[SampledRecording, ...]:
-    """Return recordings with the first inputs with which a base foresees them best.
+    """Return recordings with the first inputs that the base predicts best.
 
-    They need not be those that it was fitted to: a base has no parameters of single recordings.
+    The recorded first inputs stay unless an alternative gains more than `MIN_GAIN`. The recordings
+    may differ from those of the fit, because a base has no parameters per recording.
     """
     variances = model.prediction.variances
     shared_point = ParameterVector(model.point.shared, model.point.shared[np.newaxis])
@@ -58,7 +60,9 @@ def choose_initial_inputs(
 
 
 def _initial_input_hypotheses(series: SampledRecording, noise: Reals) -> list[SampledRecording]:
-    """Return a recording with each of its first inputs more and less by its noise."""
+    """Return copies of a recording in which one of its first inputs is larger or smaller by 4
+    sigma.
+    """
     hypotheses = []
     for column in range(series.inputs.shape[1]):
         for sign in (1.0, -1.0):

@@ -1,7 +1,7 @@
-"""Prediction: how well a candidate foresees recordings, one sample ahead, by its observer.
+"""Innovations: one-step prediction of recordings by a candidate with its own observer.
 
-Innovations form (Ljung 1999, section 7.4): the observer's gain is recomputed from the candidate
-itself, so a wrong model cannot hide behind the gain of another one.
+The model is in innovations form (Ljung 1999, section 7.4). The observer gain is computed from the
+candidate itself, so a wrong model cannot use the gain of another one.
 """
 
 from __future__ import annotations
@@ -29,18 +29,19 @@ PROCESS_NOISE_NAME, OUTPUT_NOISE_NAME, INPUT_NOISE_NAME = (
     "noise of {}",
     "noise of inputs",
 )
-"""Names of levels that a fit moves: of a drift, of a compared signal, of all inputs."""
+"""Names of noise parameters: of a disturbance state, of an output, of all inputs."""
 FOLDS = 5
-"""Parts of the recordings that are left out in turn: every fifth block in time of each."""
+"""Number of folds of the cross-validation: every fifth block in time of each recording."""
 
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI].
+    """Noise standard deviations [SI] of outputs (outputs,), inputs (inputs,) and disturbance
+    states.
 
-    Innovations beyond `limits` (seen,) count in proportion, not as squares: an event that is
-    foreseen a sample late must not outweigh all others. With `is_alone` nothing is corrected once
-    the states have been found: an innovation is then what a simulation misses.
+    Innovations beyond `huber_limits` (outputs,) count linearly instead of quadratically (Huber
+    1964), so that an event predicted one sample late does not dominate. With `is_output_error` the
+    states are not corrected after the burn-in, so innovations are the errors of a simulation.
     """
 
     outputs: Reals
@@ -52,7 +53,10 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class KalmanGains:
-    """The gains of one candidate at one point: `first` (count, states, seen), `steady` by mode."""
+    """Kalman gains at one point: `transient` (samples, states, outputs), `steady_state` by mode.
+
+    `steady_state` has the shape (modes, states, outputs).
+    """
 
     transient: Reals
     steady_state: Reals
@@ -60,7 +64,10 @@ class KalmanGains:
 
 @dataclass(frozen=True)
 class FoldBlock:
-    """A `part` of the joined innovations, of a `recording`; left out with others of its `fold`."""
+    """A block of consecutive innovations of one recording, and the fold to which it belongs.
+
+    `part` is a slice of the stacked innovations.
+    """
 
     recording: int
     fold: int
@@ -69,10 +76,10 @@ class FoldBlock:
 
 @dataclass(frozen=True)
 class PredictionResult:
-    """How recordings were foreseen: their `runs`, of which the samples `skips` do not count.
+    """The prediction of recordings: `runs`, and the number of `burn_in` samples of each recording.
 
-    Innovations beyond `limits` (seen,) count in proportion. `is_whole` where no run left all
-    bounds.
+    Innovations beyond `huber_limits` (outputs,) count linearly. `is_complete` is False if a run
+    diverged.
     """
 
     runs: StackedPrediction = field(repr=False)
@@ -82,61 +89,68 @@ class PredictionResult:
 
     @cached_property
     def predictions(self) -> tuple[Prediction, ...]:
-        """The run of each recording."""
+        """The prediction of each recording."""
         return self.runs.split()
 
     @cached_property
     def stacked(self) -> Reals:
-        """The innovations of all recordings behind their burn-in, one after the other (n, seen)."""
+        """The innovations of all recordings after the burn-in, concatenated (n, outputs)."""
         return _stack_after_burn_in(self.runs.stacked.innovations, self.runs.starts, self.burn_in)
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Where the innovations of each recording are among the joined ones."""
+        """The slice of each recording in the stacked innovations."""
         return [slice(low, high) for low, high in pairwise(self._edges)]
 
     @property
     def innovations(self) -> tuple[Reals, ...]:
-        """The innovations of each recording behind its burn-in, (samples, seen) each."""
+        """The innovations of each recording after its burn-in, (samples, outputs) each."""
         return tuple(self.stacked[part] for part in self.slices)
 
     @cached_property
     def blocks(self) -> list[FoldBlock]:
-        """The recordings, each cut into `FOLDS` blocks."""
+        """The blocks for cross-validation, `FOLDS` for each recording."""
         return _fold_blocks(self._edges)
 
     @property
     def _edges(self) -> tuple[int, ...]:
-        """Where each recording begins among the joined innovations, and where the last one ends."""
+        """The start of each recording in the stacked innovations, and the end of the last one."""
         starts = self.runs.starts
         lengths = np.maximum(starts[1:] - starts[:-1] - self.burn_in, 0)
         return 0, *np.cumsum(lengths).tolist()
 
     def negative_log_likelihood(self) -> float:
-        """Return sum over channels of N/2 log(mean square), the negative log likelihood [nats]."""
+        """Return the concentrated negative log-likelihood [nats], infinite for an incomplete run.
+
+        It is the sum over outputs of N/2 log(mean square innovation).
+        """
         if not self.is_complete:
             return np.inf
         return float((0.5 * self.counts * np.log(self.variances)).sum())
 
     @cached_property
     def robust_squares(self) -> Reals:
-        """The joined squares that count (Huber 1964), (n, seen)."""
+        """The squares of the stacked innovations, linear beyond the limits (Huber 1964), (n,
+        outputs).
+        """
         size = np.abs(self.stacked)
         near = np.minimum(size, self.huber_limits)
         return np.asarray(near * (2.0 * size - near), dtype=np.float64)
 
     def robust_std(self) -> Reals:
-        """Return the standard deviation of the innovations by their median (seen,)."""
+        """Return the standard deviation of the innovations from their median magnitude
+        (outputs,).
+        """
         return MAD_TO_STD * np.nanmedian(np.abs(self.stacked), axis=0)
 
     @cached_property
     def counts(self) -> Reals:
-        """How many innovations each channel has (seen,)."""
+        """The number of known innovations of each output (outputs,)."""
         return np.asarray(self.runs.counts.sum(axis=0), dtype=np.float64)
 
     @cached_property
     def variances(self) -> Reals:
-        """The mean square innovation of each channel (seen,)."""
+        """The mean robust square innovation of each output (outputs,)."""
         squares = self.runs.squared_sums.sum(axis=0)
         found: Reals = np.maximum(squares / np.maximum(self.counts, 1.0), 1e-300)
         return found
@@ -144,8 +158,9 @@ class PredictionResult:
 
 @dataclass(frozen=True)
 class Innovations:
-    """What was not foreseen of recordings at a point: `whole` (samples, seen) by a predictor, which
-    has `done` so many samples of each recording before a value left all bounds.
+    """The innovations of recordings at a point: `values` (samples, outputs), burn-in included.
+
+    `done` (recordings,) is the number of samples of each recording before a run diverged.
     """
 
     values: Reals
@@ -156,33 +171,38 @@ class Innovations:
 
     @cached_property
     def stacked(self) -> Reals:
-        """The innovations behind the burn-in of each recording (n, seen), as in an Outcome."""
+        """The innovations after the burn-in of each recording, concatenated (n, outputs)."""
         return _stack_after_burn_in(self.values, self.recorded.starts, self.recorded.burn_in)
 
     @property
     def by_recording(self) -> tuple[Reals, ...]:
-        """The innovations of each recording behind its burn-in, (samples, seen) each."""
+        """The innovations of each recording after its burn-in, (samples, outputs) each."""
         return tuple(_split_after_burn_in(self.values, self.recorded.starts, self.recorded.burn_in))
 
     @property
     def robust_square_sums(self) -> Reals:
-        """The sums of the squares that count (recordings, seen)."""
+        """The sums of the robust squares (recordings, outputs)."""
         return self._sums[0]
 
     @property
     def counts(self) -> Reals:
-        """How many innovations of each recording each channel has (recordings, seen)."""
+        """The number of known innovations (recordings, outputs)."""
         return self._sums[1]
 
     @cached_property
     def _sums(self) -> tuple[Reals, Reals]:
+        """The sums of the robust squares and the numbers of innovations (recordings, outputs)."""
         return self.predictor.sum_squares(self.values, self.recorded, self.huber_limits)
 
 
 def measured_noise_levels(
     series: Sequence[SampledRecording], process: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return the noise of the signals and inputs of some recordings: the median over them."""
+    """Return the noise levels of outputs and inputs estimated from recordings: their medians.
+
+    The noise of an output is at least a millionth of its magnitude. `process` gives the levels of
+    the disturbance states; the Huber limits are infinite.
+    """
     output_noise, inputs = [np.array([one.noise[k] for one in series]) for k in (0, 1)]
     floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
     outputs = np.maximum(np.median(output_noise, axis=0), np.median(floor))
@@ -192,7 +212,11 @@ def measured_noise_levels(
 def noise_levels_at(
     candidate: Candidate, point: ParameterVector, noise_levels: NoiseLevels
 ) -> NoiseLevels:
-    """Return noises with the levels that a candidate has as coordinates, at a point."""
+    """Return the noise levels with those that are noise parameters of the candidate set from a
+    point.
+
+    The noise of all inputs is scaled by one factor.
+    """
     if not candidate.noise_parameters:
         return noise_levels
     values = values_at(candidate, point, 0)
@@ -220,7 +244,7 @@ def predict(
     gains: KalmanGains,
     huber_limits: Reals,
 ) -> PredictionResult:
-    """Return the innovations of recordings, each with values of its own (per recording)."""
+    """Return the prediction of recordings, each with its own parameter values [SI]."""
     stacked = stack_recordings(series)
     recorded = stacked.recorded
     runs = candidate.predictor.predict_recordings(
@@ -242,9 +266,9 @@ def predict_at_points(
     gains: KalmanGains,
     huber_limits: Reals,
 ) -> list[Innovations]:
-    """Return the innovations of recordings at several points, each with `values` for each of them.
+    """Return the innovations of recordings at several points: `values[point][recording]` [SI].
 
-    All points are followed side by side; nothing is told of states.
+    The points run in parallel SIMD lanes; states are not stored.
     """
     stacked = stack_recordings(series)
     recorded, predictor = stacked.recorded, candidate.predictor
@@ -265,9 +289,9 @@ def predict_with_gains(
     gains: Sequence[KalmanGains],
     huber_limits: Reals,
 ) -> list[Innovations]:
-    """Return the innovations of recordings, each with values of its own, with several gains.
+    """Return the innovations of recordings at one point for each of several Kalman gains.
 
-    Those with as many first ones are followed side by side; nothing is told of states.
+    Gains with equally long transients run in parallel SIMD lanes; states are not stored.
     """
     stacked = stack_recordings(series)
     recorded, predictor = stacked.recorded, candidate.predictor
@@ -291,7 +315,10 @@ def predict_with_gains(
 
 @lru_cache
 def _fold_blocks(edges: tuple[int, ...]) -> list[FoldBlock]:
-    """Return recordings with such edges, each cut into `FOLDS` blocks."""
+    """Return recordings with such edges cut into `FOLDS` blocks each.
+
+    Block k of recording r belongs to the fold (r + k) modulo `FOLDS`.
+    """
     found = []
     for r, (start, stop) in enumerate(pairwise(edges)):
         cuts = np.linspace(0, stop - start, FOLDS + 1).astype(int) + start
@@ -303,12 +330,13 @@ def _fold_blocks(edges: tuple[int, ...]) -> list[FoldBlock]:
 def _stack_after_burn_in(
     innovations: Reals, starts: NDArray[np.int64], burn_in: NDArray[np.int64]
 ) -> Reals:
-    """Return the innovations of all recordings behind their burn-in, one after the other."""
+    """Return the innovations of all recordings after their burn-in, concatenated (n, outputs)."""
     return np.concatenate(_split_after_burn_in(innovations, starts, burn_in))
 
 
 def _split_after_burn_in(
     innovations: Reals, starts: NDArray[np.int64], burn_in: NDArray[np.int64]
 ) -> list[Reals]:
+    """Return the innovations of each recording after its burn-in, (samples, outputs) each."""
     edges = zip((starts[:-1] + burn_in).tolist(), starts[1:].tolist(), strict=True)
     return [innovations[low:high] for low, high in edges]

@@ -1,4 +1,6 @@
-"""Slopes: how innovations change with the coordinates of a fit - looked for, or carried along."""
+"""Jacobian: derivatives of the innovations with respect to coordinates, by differences or
+updates.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +15,24 @@ from diagnosis.model.parameter_vector import ParameterVector, per_recording_mask
 
 Reals = NDArray[np.float64]
 Jacobian = Mapping[str, Reals]
-"""How the joined innovations (n, seen) of all recordings change with the coordinate of a name."""
+"""The derivative of the stacked innovations (n, outputs) with respect to each named coordinate."""
 MAX_CHANGE = 1e100
-"""Bound of a change: a run that leaves all bounds tells no more than its sign, and its coordinate
-stays where it is."""
+"""Bound of a derivative: a diverging run only gives its sign, so the coordinate does not move."""
 InnovationsFunction = Callable[[Sequence[ParameterVector]], Sequence[Innovations]]
-"""What is not foreseen at some points."""
+"""A function from points to their innovations."""
 STEP, MIN_STEP = 2e-3, 1e-7
-"""Change of a coordinate for a difference, in standard deviations of its prior."""
+"""Initial and smallest step of a forward difference, in prior standard deviations."""
 LINEAR_RANGE = 0.05
-"""Change of innovations, in their standard deviations, up to which they follow a coordinate in
-proportion: the phase of a tone runs far with its order."""
+"""Change of innovations, in their standard deviations, up to which a difference counts as linear.
+
+The phase of a driveline order changes quickly with its parameter.
+"""
 MIN_AGREEMENT = 0.5
-"""Correlation of changes from which on those over the wider step are taken."""
+"""Correlation from which the derivative over the wide step is preferred to that over the narrow
+one.
+"""
 MIN_SQUARED_STEP = 1e-12
-"""Square of a step from which on slopes are carried along it: rounding tells nothing."""
+"""Squared length below which a step does not update the Jacobian, because of rounding."""
 
 
 def difference_jacobian(
@@ -37,13 +42,16 @@ def difference_jacobian(
     run: InnovationsFunction,
     names: Iterable[str],
 ) -> Jacobian:
-    """Return how innovations change with some coordinates, by forward differences of `run`.
+    """Return the derivatives of the innovations with respect to the named coordinates.
 
-    Those over the wide step are run together, then the narrower ones of coordinates that need them.
+    They are forward differences with the step `STEP`. A coordinate whose innovations change by more
+    than `LINEAR_RANGE` is repeated with narrower steps; the wide difference is kept if both agree.
+    `run` evaluates all points of one width together.
     """
     scale = np.sqrt(prediction.variances)
 
     def differences(steps: Mapping[int, float]) -> dict[int, tuple[Reals, float]]:
+        """Return the derivative and the rms change (in standard deviations) for each step."""
         ahead = [point.perturb(candidate, k, step) for k, step in steps.items()]
         sizes = [float(p.shared[k] - point.shared[k]) for k, p in zip(steps, ahead, strict=True)]
         changes = (there.stacked - prediction.stacked for there in run(ahead))
@@ -68,23 +76,28 @@ def difference_jacobian(
 
 
 def _exceeds_linear_range(step: float, change: float) -> bool:
+    """Return whether a difference was finite but too large, and its step can be narrowed."""
     return LINEAR_RANGE < change < np.inf and step > MIN_STEP
 
 
 def _narrow_step(step: float, change: float) -> float:
+    """Return the step whose change is half of `LINEAR_RANGE` by proportion, at least `MIN_STEP`."""
     return max(step * LINEAR_RANGE / change / 2.0, MIN_STEP)
 
 
 def _agrees(first: Reals, second: Reals) -> bool:
-    """Tell whether changes over a wide step are those over a narrow one: they even out what sticks
-    and slips.
+    """Return whether two derivatives correlate by at least `MIN_AGREEMENT`.
+
+    Differences over a wide step average over stick-slip transitions.
     """
     both = np.linalg.norm(first) * np.linalg.norm(second)
     return bool(np.sum(first * second) >= MIN_AGREEMENT * both)
 
 
 def _rms_change(changes: Reals) -> float:
-    """Return the root mean square of what is known of changes; without bound where one is."""
+    """Return the root mean square of the known changes; infinite without any or beyond
+    `MAX_CHANGE`.
+    """
     is_known = ~np.isnan(changes)
     known = changes.ravel() if is_known.all() else changes[is_known]
     if known.size == 0 or max(known.max(), -known.min()) > MAX_CHANGE:
@@ -93,7 +106,7 @@ def _rms_change(changes: Reals) -> float:
 
 
 def _bounded_changes(changes: Reals) -> Reals:
-    """Return changes, 0 where there is none: nothing was seen, or the run left all bounds."""
+    """Return changes clipped to `MAX_CHANGE`, with 0 where they are not finite."""
     is_known = np.isfinite(changes)
     known = changes if is_known.all() else np.where(is_known, changes, 0.0)
     return np.clip(known, -MAX_CHANGE, MAX_CHANGE)
@@ -106,10 +119,12 @@ def broyden_update(
     after: PredictionResult,
     step: ParameterVector,
 ) -> Jacobian:
-    """Return slopes at the end of a step from those at its beginning (Broyden 1965, equation 4.5).
+    """Return the Jacobian at the end of a step from the one at its start (Broyden 1965, equation
+    4.5).
 
-    They change as little as shows what the innovations of each recording did. `step` is how far
-    each coordinate went.
+    It is the rank-one update of least norm that reproduces the change of the innovations. With
+    coordinates per recording each recording is updated by itself. `step` is the change of each
+    coordinate.
     """
     own, names = per_recording_mask(candidate), candidate.names
     updated = {name: jacobian[name].copy() for name in names}

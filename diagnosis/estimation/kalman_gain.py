@@ -1,4 +1,4 @@
-"""Gains: of an observer, made from a candidate near where each of its modes was seen."""
+"""Kalman gains: gains of an observer from the linearised candidate at its operating points."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from diagnosis.model.candidate import Candidate
 
 Reals = NDArray[np.float64]
 INITIAL_STD_FRACTION = 0.01
-"""Standard deviation of a state at the start, as a part of its range."""
+"""Initial standard deviation of a state, as a fraction of its range."""
 MIN_INTEGRATOR_EIGENVALUE = 0.999
-"""Part of itself that an integral keeps over a sample, and what decays does not."""
+"""Diagonal element of the transition matrix above which a state counts as an integrator."""
 MODEL_NOISE_FRACTION = 1e-7
-"""Process noise of every state per sample, as a part of its range: no gain is ever quite 0."""
+"""Process noise of every state per sample, as a fraction of its range; it keeps gains above 0."""
 
 
 @dataclass(frozen=True)
 class LocalModel:
-    """A candidate in one mode near where that was seen: `linear` over one sample with its process
-    noise `q` (states, states), the standard deviations `start` (states,) that its states begin
-    with, and the usual `stay` in it [samples].
+    """A candidate in one mode near its operating point, linearised over one sample.
+
+    `q` (states, states) is the process noise per sample, `initial_std` (states,) are the standard
+    deviations of the states at the start, and `dwell_samples` is the median dwell time in the mode.
     """
 
     linear: LinearModel
@@ -44,10 +45,13 @@ def kalman_gains(
     noise_levels: NoiseLevels,
     prediction: PredictionResult | None = None,
 ) -> KalmanGains:
-    """Return the gains of a candidate at `values`, near where `prediction` saw each mode.
+    """Return the Kalman gains of a candidate at `values` for the operating points of `prediction`.
 
-    In another mode than the one that lasts longest the gain is that at the usual length of a stay,
-    which began with what was known before: in a gap it would never be steady.
+    The mode with the longest dwell time has the steady-state gain, and its transient is used during
+    the burn-in. The gain of another mode is the one after its median dwell time, starting from the
+    steady covariance: a short stay, as in a gap, does not reach a steady state. Modes without an
+    operating point have the gain of the first mode. With the output-error criterion the steady
+    gains are 0.
     """
     count = burn_in_samples(series[0])
     steady_by_mode: dict[int, Reals] = {}
@@ -85,10 +89,11 @@ def local_models(
     noise_levels: NoiseLevels,
     prediction: PredictionResult | None = None,
 ) -> dict[int, LocalModel]:
-    """Return a candidate at `values` near where `prediction` saw each mode, the longest stay first.
+    """Return the linearised candidate in each mode of `prediction`, the longest dwell time first.
 
-    Its process noise is that of the inputs, of the drifts, and next to none of what is unsure.
-    Delays are left out of it: what is shown late would seem to know nothing of the states.
+    The process noise has parts from the inputs, the disturbance states and, very small, every
+    state. Delays are set to 0, because a delayed output would seem to contain no information on the
+    states.
     """
     zero_delays = dict.fromkeys(candidate.compiled.delays, 0.0)
     page = candidate.calibration_page({**values, **zero_delays}, series[0])
@@ -108,9 +113,9 @@ def local_models(
 
 
 def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[np.bool_]:
-    """Tell which states (states,) are an effect's integrals, such as an angle.
+    """Return the mask (states,) of integrators that effects add, such as an angle.
 
-    What such a one shows changes its sign as it turns: a gain made at one angle would be wrong.
+    Their influence on an output changes sign with the angle, so a gain at one angle would be wrong.
     """
     keeps = linear.phi.diagonal() > MIN_INTEGRATOR_EIGENVALUE
     return np.asarray(keeps & candidate.is_effect_state, dtype=np.bool_)
@@ -119,7 +124,10 @@ def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[
 def _disturbance_variances(
     candidate: Candidate, noise_levels: NoiseLevels, period: float
 ) -> dict[int, float]:
-    """Return the process noise of each state that drifts, by its place."""
+    """Return the process-noise variance per sample of each disturbance state, by its index.
+
+    For an Ornstein-Uhlenbeck process with standard deviation s it is s^2 (1 - exp(-2 T / memory)).
+    """
     variances = {}
     for name, memory in zip(candidate.disturbance_states, candidate.compiled.memories, strict=True):
         decay = np.exp(-period / memory)

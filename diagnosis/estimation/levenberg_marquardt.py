@@ -1,7 +1,7 @@
-"""Estimation: the parameters of a candidate by prediction errors, with priors, within their ranges.
+"""Levenberg-Marquardt: parameters of a candidate by prediction errors, with priors and bounds.
 
-Levenberg-Marquardt on the concentrated likelihood: N/2 log(mean square innovation) per channel
-plus half the squares of the coordinates. The gains are held while a step is sought, and made anew
+The cost is the concentrated negative log-likelihood, N/2 log(mean square innovation) per output,
+plus half the sum of squared coordinates. The Kalman gains are fixed during a step and recomputed
 from the model at its end.
 """
 
@@ -30,26 +30,28 @@ from diagnosis.model.parameter_vector import ParameterVector, vector_of
 
 MAX_ITERATIONS = 15
 MIN_GAIN = 0.3
-"""A round that gains less than this [nats] is the last."""
+"""An iteration that gains less than this [nats] is the last one."""
 MIN_GAIN_BROYDEN = 2.0
-"""The same where slopes were carried along steps from where they were looked for."""
+"""The same limit for iterations with Broyden updates of the Jacobian."""
 MIN_GAIN_NEW_JACOBIAN = 1.0
-"""Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
+"""A refinement with a new Jacobian that gains at least this [nats] is followed by another one."""
 MAX_REFINEMENTS = 12
-"""How often they are at most: a tyre's mode had not come to rest after three."""
+"""Maximum number of refinements; a tyre model had not converged after three."""
 MIN_PREDICTED_GAIN = 0.05
-"""A step that is foreseen to gain less than this [nats] is not tried."""
+"""A step with a smaller predicted gain [nats] is not evaluated."""
 MIN_PREDICTED_SCREENING_GAIN = 1.0
-"""The same while candidates are screened."""
+"""The same limit during screening."""
 INITIAL_DAMPING = 1e-3
 MAX_DAMPING = 1e5
 SCREENING_ITERATIONS, SINGLE_RECORDING_ITERATIONS = 8, 4
-"""Most rounds while candidates are screened, and those after which, on a single recording, which
-cannot tell chance from physics, a further one has to gain much."""
+"""Iterations of screening after which a further one must gain a fraction of the total gain.
+
+The second number applies to a single recording, which cannot separate chance from physics.
+"""
 LATE_GAIN_FRACTION = 0.1
-"""What is much: part of all that was gained."""
+"""This fraction."""
 MIN_ITERATION_GAIN = 3.0
-"""A round of screening that gains less [nats] is the last."""
+"""A screening iteration that gains less [nats] is the last one."""
 
 
 def estimate_parameters(
@@ -60,9 +62,11 @@ def estimate_parameters(
     max_iterations: int = MAX_ITERATIONS,
     jacobian: Jacobian | None = None,
 ) -> Estimate:
-    """Return the point that foresees the recordings best, from `start` [SI].
+    """Return the candidate at the point of least cost, found from `start` (values [SI] or a
+    vector).
 
-    `jacobian` are slopes of the candidate near the start, if there are such.
+    The result has normal equations at its point if it converged. `jacobian` is an approximate
+    Jacobian near the start.
     """
     return refine(
         iterate(candidate, series, noise_levels, start, max_iterations, jacobian),
@@ -80,9 +84,10 @@ def iterate_broyden(
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return where steps lead with slopes that are looked for once, and carried along them.
+    """Return the result of damped steps with one difference Jacobian and Broyden updates.
 
-    A model `nearby` it may tell where the modes are at the start.
+    The result has the updated Jacobian at its point. `nearby` is an estimate of a similar model
+    whose operating points are tried at the start.
     """
     return _iterate_from(
         candidate, series, noise_levels, start, max_iterations, jacobian, nearby
@@ -98,7 +103,7 @@ def iterate(
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return what `followed` does, without slopes at its end: those are looked for anew."""
+    """Return the same point as `iterate_broyden`, without an updated Jacobian at the end."""
     return _iterate_from(
         candidate, series, noise_levels, start, max_iterations, jacobian, nearby
     ).estimate
@@ -113,6 +118,7 @@ def _iterate_from(
     jacobian: Jacobian | None,
     nearby: Estimate | None,
 ) -> _IterationResult:
+    """Return the steps from `start`; the start itself if its cost is infinite."""
     point = (
         start if isinstance(start, ParameterVector) else vector_of(candidate, len(series), start)
     )
@@ -125,7 +131,11 @@ def _iterate_from(
 def refine(
     estimate: Estimate, series: Sequence[SampledRecording], max_iterations: int = MAX_ITERATIONS
 ) -> Estimate:
-    """Return a fit that is done: slopes are looked for at its end, and steps sought with these."""
+    """Return a converged fit: new difference Jacobians alternate with damped steps.
+
+    It ends when the steps after a new Jacobian gain less than `MIN_GAIN_NEW_JACOBIAN`. An estimate
+    with infinite cost is returned unchanged.
+    """
     if not _is_finite(estimate):
         return estimate
     for _ in range(MAX_REFINEMENTS):
@@ -138,20 +148,23 @@ def refine(
 
 
 def _is_finite(estimate: Estimate) -> bool:
+    """Return whether the cost is finite."""
     return bool(np.isfinite(estimate.cost))
 
 
 @dataclass(frozen=True)
 class _IterationResult:
-    """Where steps led: `there`, and the ends of the last one, along which slopes are to be carried
-    to it; None where it has them.
+    """The estimate after damped steps, and the two ends of the last step.
+
+    The Jacobian of the estimate has to be updated along the last step; it is current if that is
+    None.
     """
 
     estimate: Estimate
     last_step: tuple[Estimate, Estimate] | None = None
 
     def with_jacobian(self, series: Sequence[SampledRecording]) -> Estimate:
-        """Return where the steps led, with its slopes."""
+        """Return the estimate with its Jacobian and normal equations."""
         return (
             _update_jacobian(*self.last_step, self.estimate, series)
             if self.last_step
@@ -165,7 +178,11 @@ def _iterate_steps(
     max_iterations: int,
     min_gain: float = MIN_GAIN_BROYDEN,
 ) -> _IterationResult:
-    """Return where steps lead until one gains less than the `min_gain` [nats]."""
+    """Return the result of damped steps until one gains less than `min_gain` [nats].
+
+    After each step the Kalman gains are recomputed; the old gains stay if the new ones cost more by
+    at least `MIN_GAIN`.
+    """
     damping, result = INITIAL_DAMPING, _IterationResult(estimate)
     for _ in range(max_iterations):
         estimate = result.with_jacobian(series)
@@ -185,8 +202,9 @@ def _iterate_steps(
 def _update_jacobian(
     before: Estimate, after: Estimate, estimate: Estimate, series: Sequence[SampledRecording]
 ) -> Estimate:
-    """Return an estimate `estimate` with the slopes of the one `before`, carried along the step after
-    which it is. The gains there may be others than those of the step.
+    """Return `estimate` with the Jacobian of `before`, updated along the step to `after`.
+
+    The gains of `estimate` may differ from those of the step.
     """
     first, last = before.point, after.point
     step = ParameterVector(last.shared - first.shared, last.per_recording - first.per_recording)
@@ -199,10 +217,13 @@ def _update_jacobian(
 def iterate_with_jacobian(
     estimate: Estimate, series: Sequence[SampledRecording], jacobian: Jacobian, max_iterations: int
 ) -> Estimate:
-    """Return where some steps lead for which `jacobian` columns of a model near it are good enough.
+    """Return the result of screening steps that reuse the columns of a similar model's Jacobian.
 
-    Slopes of what the other model has not are looked for at each step: carried ones did not find
-    unequal shafts, which begin far from where they fit.
+    Columns that the similar model lacks are computed by differences at each step; Broyden updates
+    of these failed for shafts of unequal stiffness, which start far from their optimum. The steps
+    end when one gains less than `MIN_ITERATION_GAIN`, or after some iterations less than a tenth of
+    the total. If no step is found at the initial damping, the estimate records the Jacobian as
+    exhausted.
     """
     if not _is_finite(estimate) or estimate.exhausted_jacobian is jacobian:
         return estimate
@@ -227,7 +248,7 @@ def iterate_with_jacobian(
 
 
 def refresh_gains(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return an estimate with gains made where it is, if they are better than those it has."""
+    """Return the estimate with Kalman gains for its own operating points, if these cost less."""
     refreshed = evaluate(
         estimate.candidate, series, estimate.noise_levels, estimate.point, estimate.prediction
     )
@@ -241,9 +262,11 @@ def search_damping(
     own_only: bool = False,
     min_gain: float = MIN_PREDICTED_GAIN,
 ) -> tuple[Estimate | None, float]:
-    """Return a better point and the damping that led there; None where there is none.
+    """Return an estimate of lower cost after one damped step, and the next damping.
 
-    A step that is foreseen to gain less than the `min_gain` [nats] is not tried.
+    The damping grows by 10 until a step lowers the cost, and is divided by 10 after success. Steps
+    with a predicted gain below `min_gain` [nats] are not evaluated. The estimate is None if the
+    damping reaches `MAX_DAMPING`. With `own_only` only coordinates per recording move.
     """
     assert estimate.normal_equations is not None
     while damping < MAX_DAMPING:

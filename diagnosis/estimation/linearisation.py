@@ -1,4 +1,4 @@
-"""Linear: a model near a point, by differences of its compiled self: what its gain is made from."""
+"""Linearisation: a discrete linear model near a point, by differences of the compiled model."""
 
 from __future__ import annotations
 
@@ -11,19 +11,22 @@ from codegen.predictor.predictor import Predictor
 
 Reals = NDArray[np.float64]
 MAX_QUOTIENT = 1e12
-"""A difference quotient beyond this is no model any more."""
+"""A larger difference quotient makes the linearisation invalid."""
 MIN_STATE_STEP = 1e-9
-"""Differences are at least this large: 1e7 times the rounding of a state near 1."""
+"""Smallest step of a state, 1e7 times the rounding error of a state near 1."""
 INPUT_STEP = 1e-4
-"""Change of an input for a difference, as a part of it; at least this many units."""
+"""Step of an input as a fraction of its magnitude, and its smallest value in SI units."""
 
 RCOND = 1e-15
-"""A singular value that is a smaller part of the largest one is none."""
+"""Relative size below which a singular value counts as 0."""
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """A model near a point: `phi` (states, states), `c` (seen, states), `b` (states, inputs)."""
+    """A linear model over one sample:
+
+    `phi` (states, states), `c` (outputs, states), `b` (states, inputs).
+    """
 
     phi: Reals
     c: Reals
@@ -39,9 +42,11 @@ def linearise(
     inputs: Reals,
     state_steps: Reals,
 ) -> LinearModel | None:
-    """Return the model over one sample near `states` (states,) in a mode under `inputs`.
+    """Return the linear model over one sample near `states` (states,) in a mode under `inputs`.
 
-    By central differences of `state_steps` (states,). None where they leave all bounds in the sample.
+    The derivatives are central differences with the steps `state_steps` (states,). `c` refers to
+    the states at the end of the sample: the outputs' derivatives times the pseudoinverse of `phi`.
+    The result is None if a derivative exceeds `MAX_QUOTIENT`.
     """
     steps, pushes = (
         np.maximum(state_steps, MIN_STATE_STEP),
@@ -56,7 +61,9 @@ def linearise(
 
 
 def _pseudoinverse(matrix: Reals) -> Reals:
-    """Return the pseudoinverse, bit by bit as `numpy.linalg.pinv` finds it, in half of its time."""
+    """Return the Moore-Penrose pseudoinverse, bit-identical to `numpy.linalg.pinv` in half its
+    time.
+    """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     large = sizes > RCOND * sizes[0]
     inverse = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=large)

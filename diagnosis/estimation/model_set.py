@@ -1,4 +1,4 @@
-"""Bench: the base, the recordings and the effects at hand, from which candidates are made."""
+"""Model set: the base, the recordings and the effects from which candidates are compiled."""
 
 from __future__ import annotations
 
@@ -23,14 +23,17 @@ from language.text.document import Document, MappingNode
 
 FitFunction = Callable[[], Estimate]
 FORCE_DIMENSIONS = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)
-"""What a balance of forces or torques is in: drifts act there, a sensor's filter is none."""
+"""Dimensions of the balances that get a disturbance; the filter of a sensor has another one."""
 EXCLUDED_EFFECTS = ("unknown_input", "sensor_quantisation")
-"""Effects that no parameter is fitted of: one is found as a drift, one only adds noise."""
+"""Effects that are no candidates: one is detected as a disturbance, one only adds noise."""
 
 
 @dataclass(frozen=True)
 class ModelSet:
-    """A base automaton, with recordings of the same period, and effects to lay over it."""
+    """A base automaton, recordings with a common period, and the effects that may be placed on it.
+
+    `disturbances` are the disturbances that every candidate has by default.
+    """
 
     document: Document
     project: Project
@@ -45,7 +48,10 @@ class ModelSet:
     def load_or_fit(
         self, label: str, candidate: Candidate, dependencies: Sequence[object], fit: FitFunction
     ) -> Estimate:
-        """Return a fit to the recordings, as it was kept or made now; it follows from `dependencies`."""
+        """Return a fit to the recordings, from the fit cache or computed by `fit`.
+
+        `label`, the candidate, the recordings and `dependencies` determine the key.
+        """
         return self.fit_cache.load_or_fit(label, candidate, self.series, dependencies, fit)
 
     @property
@@ -58,7 +64,12 @@ class ModelSet:
         placed_effects: Sequence[PlacedEffect],
         disturbances: Sequence[PlacedEffect] | None = None,
     ) -> Candidate:
-        """Return the base with layers, compiled; made once. Raises SpecError."""
+        """Return the base with effects and disturbances, compiled once per combination.
+
+        Raises SpecError.
+
+        Without `disturbances` those of the model set are used.
+        """
         disturbances = self.disturbances if disturbances is None else disturbances
         key = (
             *(placed_effect.id for placed_effect in placed_effects),
@@ -76,7 +87,7 @@ class ModelSet:
         return self._compiled[key]
 
     def applicable_effects(self) -> Iterator[PlacedEffect]:
-        """Yield every effect at every place where these recordings could tell it."""
+        """Yield every effect at every place where the recordings could show it."""
         candidates = (one for one in self.effects if one.name not in EXCLUDED_EFFECTS)
         for effect in candidates:
             for placed_effect in find_placements(self.document, effect):
@@ -84,7 +95,7 @@ class ModelSet:
                     yield placed_effect
 
     def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:
-        """Return the base with layers, None where they do not go together."""
+        """Return the base with effects, compiled, or None if they cannot be combined."""
         try:
             return self.compile_candidate(placed_effects)
         except SpecError:
@@ -93,12 +104,16 @@ class ModelSet:
     def try_compile_all(
         self, combinations: Sequence[Sequence[PlacedEffect]]
     ) -> list[Candidate | None]:
-        """Return `possible` for each; those that are new are compiled side by side."""
+        """Return `try_compile` of each combination, compiled in parallel threads."""
         with ThreadPoolExecutor(os.cpu_count()) as compilers:
             return list(compilers.map(self.try_compile, combinations))
 
     def _is_applicable(self, placed_effect: PlacedEffect) -> bool:
-        """An input must move, an output be compared, a balance be one of forces."""
+        """Return whether recordings can show an effect at its place.
+
+        An input must vary in a recording, an output must be compared, and a balance must be one of
+        forces or torques.
+        """
         name = placed_effect.place
         if name in self.automaton.inputs:
             column = list(self.automaton.inputs).index(name)
@@ -114,7 +129,7 @@ class ModelSet:
 
 
 def balance_disturbances(document: Document, automaton: Automaton) -> tuple[PlacedEffect, ...]:
-    """Return a drift for each balance of forces or torques."""
+    """Return a disturbance for each balance of forces or torques, in the order of the states."""
     return tuple(
         disturbance_effect("balance", name)
         for name in automaton.states
@@ -123,6 +138,7 @@ def balance_disturbances(document: Document, automaton: Automaton) -> tuple[Plac
 
 
 def _is_force_balance(document: Document, automaton: Automaton, name: str) -> bool:
+    """Return whether the state `name` has a flow balance in units of force or torque."""
     place = find_effect_place(document.root, disturbance_effect("balance", name).effect, name)
     flow = document.root.get("flow")
     if isinstance(place, PlaceMismatch) or not isinstance(flow, MappingNode):

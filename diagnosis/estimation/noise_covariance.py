@@ -1,7 +1,7 @@
-"""Tuning: levels of drifts and noises found together with the parameters, in one least squares.
+"""Noise covariance: joint maximum-likelihood estimation of noise levels and parameters.
 
-What an observer trusts in and what a model says hang together: found in turns they end where
-neither gains without the other, hundreds of nats from where both are better.
+Parameters and noise levels depend on each other. Estimated in turns they stop at points hundreds of
+nats above the joint optimum.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_vector import ParameterVector
 
 MIN_LEVEL, MAX_LEVEL = 0.03, 3.0
-"""Standard deviations that a drift may have, in its unit, while effects are named."""
+"""Range of a disturbance's standard deviation, in its unit, while effects are selected."""
 NO_LEVEL_BOUNDS: Mapping[str, float] = {}
 MAX_NOISE_RATIO = 2.5
-"""Factor by which a noise may be another one than was measured."""
+"""Largest factor between an estimated noise level and the measured one."""
 PROCESS_NOISE_PRIOR, MEASURED_NOISE_PRIOR = 2.0, 0.5
-"""Standard deviations of their logarithms: of drifts next to nothing is known."""
+"""Prior standard deviations of the logarithms: wide for disturbances, narrow for measured noise."""
 
 
 def fit_noise_covariance(
@@ -41,10 +41,11 @@ def fit_noise_covariance(
     units: Mapping[str, float],
     max_levels: Mapping[str, float] = NO_LEVEL_BOUNDS,
 ) -> Estimate:
-    """Return a fit with its parameters and the levels of its noises where both foresee best.
+    """Return a fit with parameters and noise levels at their joint optimum.
 
-    Only drifts that have a unit are moved, to three of these or to the `max_levels` that is given. What
-    feeds nothing back has no gain: its noises stay.
+    Only disturbances in `units` [SI] are estimated, up to `max_levels` (in units, 3 by default).
+    With the output-error criterion, or if the joint fit is not better, only the parameters are
+    refined.
     """
     if estimate.noise_levels.is_output_error or not np.isfinite(estimate.cost):
         return refine(estimate, series)
@@ -66,7 +67,11 @@ def _noise_parameters(
     units: Mapping[str, float],
     max_levels: Mapping[str, float],
 ) -> Iterator[FreeParameter]:
-    """Yield the levels of a candidate that a fit may move, near what is known of them."""
+    """Yield the noise levels to estimate: disturbances in `units`, outputs, and one factor for
+    inputs.
+
+    Levels of outputs and inputs are near `reference`; those that are 0 there are left out.
+    """
     for name, unit in units.items():
         geometric_mean = unit * np.sqrt(MIN_LEVEL * MAX_LEVEL)
         high = max_levels.get(name, MAX_LEVEL) * unit
@@ -92,11 +97,12 @@ def _noise_parameters(
 def _noise_parameter(
     name: str, value: float, low: float, high: float, prior_std: float
 ) -> FreeParameter:
+    """Return a noise level as a free parameter with a logarithmic coordinate."""
     return FreeParameter(name, float(value), float(low), float(high), prior_std, True)
 
 
 def _append_noise_parameters(extended: Candidate, estimate: Estimate) -> ParameterVector:
-    """Return the point of an estimate with its levels behind its parameters."""
+    """Return the point of an estimate with its noise levels appended, clipped to their ranges."""
     noise_levels = estimate.noise_levels
     values = {
         PROCESS_NOISE_NAME.format(name): level for name, level in noise_levels.process.items()
@@ -115,7 +121,9 @@ def _append_noise_parameters(extended: Candidate, estimate: Estimate) -> Paramet
 
 
 def _drop_noise_parameters(candidate: Candidate, extended: Estimate) -> Estimate:
-    """Return an estimate in which levels are no coordinates any more."""
+    """Return an estimate without its noise parameters as coordinates; their values stay in its
+    levels.
+    """
     count = len(candidate.free_parameters)
     point = ParameterVector(
         extended.point.shared[:count].copy(), extended.point.per_recording[:, :count].copy()

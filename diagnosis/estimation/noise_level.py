@@ -1,7 +1,8 @@
-"""Level: how much an unknown disturbance may drift at each place, chosen by likelihood.
+"""Noise levels: the standard deviations of disturbances at each place, chosen by likelihood.
 
-A drift of one unit moves a compared signal by its own noise within `REACH` seconds. While effects
-are named it is held small: a free one would swallow the physics that is sought.
+A disturbance of one unit changes a compared output by its own noise within `UNIT_RESPONSE_TIME`.
+While effects are selected the levels are small, because a free disturbance would absorb the physics
+that is sought.
 """
 
 from __future__ import annotations
@@ -22,25 +23,29 @@ from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector
 
 UNIT_RESPONSE_TIME = 0.2
-"""Seconds in which a drift of one unit shows."""
+"""Time [s] in which a disturbance of one unit changes an output by its noise."""
 LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
-"""Standard deviations that a drift may have, in its unit; the last is the most while naming."""
+"""Grid of disturbance levels, in units; the last one is the largest during selection."""
 INITIAL_LEVELS = (0.1, 0.3, 1.0)
-"""Those from which a base is fitted: a fit with much drift does not find its way to less."""
+"""Levels from which a base is fitted: a fit with a large level does not find a small one."""
 SMALL_LEVEL = INITIAL_LEVELS[0]
-"""That from which a candidate is fitted as well."""
+"""The level from which a candidate is fitted first."""
 HUBER_STDS = 4.0
-"""Standard deviations beyond which an innovation counts as that far."""
+"""Huber limit of innovations, in their robust standard deviations."""
 NOISE_FACTOR = 1.5
-"""Factor by which the noise of inputs or of a signal is changed at a time."""
+"""Factor of one step of the noise of inputs or of an output."""
 MIN_GAIN = 2.0
-"""Another level is taken where it gains this much [nats]."""
+"""Smallest gain [nats] of a changed level."""
 
 
 def disturbance_units(
     candidate: Candidate, series: Sequence[SampledRecording], start: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the unit [SI] of each drift of a candidate, for the noise that was measured."""
+    """Return the unit [SI] of each disturbance state, by name.
+
+    One unit changes some output by its measured noise after `UNIT_RESPONSE_TIME`, by the model
+    linearised at the start of the first recording. Raises ValueError if that cannot be linearised.
+    """
     output_noise = measured_noise_levels(series, {}).outputs
     mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
     page = candidate.calibration_page(start, series[0])
@@ -61,10 +66,10 @@ def line_search_noise(
     series: Sequence[SampledRecording],
     units: Mapping[str, float],
 ) -> Estimate:
-    """Return an estimate with the drifts that the recordings ask for, its parameters held.
+    """Return an estimate with noise levels improved one at a time, its parameters fixed.
 
-    Only drifts that have a unit are moved. What is known of the noise of inputs and signals is
-    known to a factor only: with a gain that is not the best, anything would seem to gain.
+    The levels of disturbances in `units` move along `LEVELS`, then the noise of inputs and of each
+    output changes by factors. A change is accepted if it gains more than `MIN_GAIN`.
     """
     for name in units:
         level_index = _nearest_level(estimate.noise_levels.process.get(name, 0.0), units[name])
@@ -85,9 +90,11 @@ def line_search_noise(
 
 
 def _line_search_signal_noise(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return an estimate with the noise of its inputs, then of each signal, scaled.
+    """Return an estimate with the noise of its inputs, then of each output, scaled by a line
+    search.
 
-    Not far from what was measured: a model that lacks something would trust in its signals alone.
+    The noise stays within `MAX_NOISE_RATIO` of the measured one: a model that lacks physics would
+    otherwise rely on the measurements alone.
     """
     measured = measured_noise_levels(series, {})
     for place in range(-1, len(estimate.noise_levels.outputs)):
@@ -104,7 +111,10 @@ def _line_search_signal_noise(estimate: Estimate, series: Sequence[SampledRecord
 
 
 def _is_near_measured(noise_levels: NoiseLevels, reference: NoiseLevels, channel: int) -> bool:
-    """Tell whether the noise of the inputs (-1) or of a signal is near what was measured."""
+    """Return whether a noise level is within `MAX_NOISE_RATIO` of the measured one.
+
+    `channel` is the index of an output, or -1 for all inputs.
+    """
     now, measured = (
         (noise_levels.inputs, reference.inputs)
         if channel < 0
@@ -115,7 +125,7 @@ def _is_near_measured(noise_levels: NoiseLevels, reference: NoiseLevels, channel
 
 
 def _scale_noise(noise_levels: NoiseLevels, channel: int, factor: float) -> NoiseLevels:
-    """Return noises with that of the inputs (-1) or of a signal by its place scaled."""
+    """Return noise levels with one output scaled, or all inputs for `channel` -1."""
     if channel < 0:
         return dataclasses.replace(noise_levels, inputs=factor * noise_levels.inputs)
     seen = noise_levels.outputs.copy()
@@ -132,9 +142,10 @@ def fit_with_noise(
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return parameters and levels found together, from levels that fit where parameters lead.
+    """Return parameters and noise levels estimated together from one start.
 
-    `jacobian` are slopes of the candidate near the start, `nearby` a model near it, if there are such.
+    The steps are: parameters with fixed levels, a line search of levels, and a joint fit.
+    `jacobian` is an approximate Jacobian near the start, `nearby` an estimate of a similar model.
     """
     now = iterate(candidate, series, noise_levels, start, jacobian=jacobian, nearby=nearby)
     return fit_noise_covariance(line_search_noise(now, series, units), series, units)
@@ -150,10 +161,11 @@ def fit_candidate(
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return a fit with next to no drift at first, or a better one with those that `noise_levels` has.
+    """Return the better of fits that start with a small and with the given disturbance level.
 
-    What a model explains it has to explain without drifts; a fit with much does not find there.
-    The other one is tried where the first does not come below a `known_cost` cost [nats].
+    A model must explain data without disturbances; a fit that starts with a large level does not
+    get there. The second fit is skipped if the given levels are small, or if the first cost is
+    below `known_cost` [nats].
     """
     small_process = {
         **noise_levels.process,
@@ -173,9 +185,9 @@ def fit_candidate(
 def fit_base(
     candidate: Candidate, series: Sequence[SampledRecording], units: Mapping[str, float]
 ) -> Estimate:
-    """Return the base fitted once to recordings from where it is declared.
+    """Return the base fitted once to recordings from its declared values, with Huber limits.
 
-    How far innovations usually are out, beyond which they count no more, is known after it.
+    The limits are `HUBER_STDS` times the robust standard deviation of its innovations.
     """
     first = fit_with_noise(candidate, series, measured_noise_levels(series, units), {}, units)
     limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
@@ -187,8 +199,9 @@ def fit_base(
 def recalibrate(
     first: Estimate, series: Sequence[SampledRecording], units: Mapping[str, float]
 ) -> Estimate:
-    """Return the base fitted to recordings from a first fit, with drifts from little to much, until
-    two come to rest alike.
+    """Return the best of fits of the base from increasing disturbance levels.
+
+    The fits start from the best point so far and end when two in a row have the same cost.
     """
     fits: list[Estimate] = []
     for level in INITIAL_LEVELS:
@@ -203,4 +216,5 @@ def recalibrate(
 
 
 def _nearest_level(value: float, unit: float) -> int:
+    """Return the index in `LEVELS` of the level nearest to a value."""
     return int(np.argmin([abs(level - value / unit) for level in LEVELS]))

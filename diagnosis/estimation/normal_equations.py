@@ -1,4 +1,4 @@
-"""Normal: the normal equations of a fit, block by block of its recordings, and their solution."""
+"""Normal equations: J'J and J'e of a fit by blocks of recordings, and damped steps from them."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from diagnosis.model.parameter_vector import ParameterVector, bounds_of, per_rec
 
 Reals = NDArray[np.float64]
 Sums = tuple[Reals, Reals]
-"""J'J (n, n) and J'e (n,) of some blocks."""
+"""J'J (n, n) and J'e (n,), summed over some blocks."""
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """`a` (blocks, n, n) and `g` (blocks, n): J'J and J'e over the mean squares, without priors.
+    """Weighted normal equations by blocks: `a` (blocks, n, n) = J'WJ and `g` (blocks, n) = J'We.
 
-    `own` (n,) tells which coordinates each recording has of its own; `of` (blocks,) is the
-    recording of a block, `fold` (blocks,) what it is left out with.
+    Priors are not included. `own` (n,) marks coordinates per recording, `of` (blocks,) is the
+    recording of each block and `fold` (blocks,) its fold in the cross-validation.
     """
 
     a: Reals
@@ -33,7 +33,7 @@ class NormalEquations:
     fold: NDArray[np.int64]
 
     def without_fold(self, fold: int) -> NormalEquations:
-        """Return the equations of the other folds."""
+        """Return the equations of all blocks outside a fold."""
         kept = self.fold != fold
         return NormalEquations(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
 
@@ -44,7 +44,7 @@ class NormalEquations:
 
     @cached_property
     def by_recording(self) -> dict[int, Sums]:
-        """The sums over the blocks of each recording; none without coordinates of its own."""
+        """The sums over the blocks of each recording; empty without coordinates per recording."""
         if not self.own.any():
             return {}
         here = {int(r): self.of == r for r in np.unique(self.of)}
@@ -54,7 +54,11 @@ class NormalEquations:
 def normal_equations_of(
     candidate: Candidate, prediction: PredictionResult, jacobian: Jacobian
 ) -> NormalEquations:
-    """Return the normal equations of an outcome, of all coordinates of a candidate."""
+    """Return the normal equations of a prediction for all coordinates of a candidate.
+
+    The weights are the inverse mean squares of outputs, divided by |e| / limit beyond the Huber
+    limit. Unknown innovations have the weight 0.
+    """
     blocks, innovation = prediction.blocks, prediction.stacked
     known = np.isfinite(innovation)
     far = np.maximum(np.abs(innovation) / prediction.huber_limits, 1.0)
@@ -82,10 +86,11 @@ def damped_step(
     damping: float,
     own_only: bool = False,
 ) -> ParameterVector:
-    """Return the point one damped step further, within the ranges.
+    """Return the point after one Levenberg-Marquardt step, clipped to the bounds.
 
-    A coordinate at its bound that the step would lead out of its range is held (active set).
-    `normal` may lack all blocks of a recording: its own coordinates stay.
+    A shared coordinate at its bound that the step would push further is fixed, and the step is
+    solved again (active set). With `own_only` all shared coordinates are fixed. If `normal` has no
+    block of a recording, the coordinates of that recording do not move.
     """
     bounds = bounds_of(candidate)
     held = np.full(len(point.shared), own_only)
@@ -107,7 +112,9 @@ def damped_step(
 def predicted_gain(
     candidate: Candidate, start: ParameterVector, normal: NormalEquations, end: ParameterVector
 ) -> float:
-    """Return what the normal equations say that a step gains [nats], priors counted."""
+    """Return the decrease of the cost [nats] from `start` to `end` by the quadratic model, with
+    priors.
+    """
     step = np.where(
         normal.own, (end.per_recording - start.per_recording)[normal.of], end.shared - start.shared
     )
@@ -118,7 +125,11 @@ def predicted_gain(
 def _solve_step(
     point: ParameterVector, normal: NormalEquations, damping: float, is_fixed: NDArray[np.bool_]
 ) -> ParameterVector:
-    """Solve for a step: coordinates of one recording are eliminated before the shared ones."""
+    """Return the damped step; coordinates per recording are eliminated by Schur complements.
+
+    The shared coordinates in `is_fixed` do not move. The damping scales the diagonal (Marquardt
+    1963).
+    """
     own, free = np.flatnonzero(normal.own), np.flatnonzero(~normal.own & ~is_fixed)
     among = free[:, None], free
     matrix = np.eye(len(free)) + normal.total[0][among]
@@ -142,7 +153,9 @@ def _solve_step(
 
 
 def solve(matrix: Reals, right: Reals) -> Reals:
-    """Solve; the smallest solution where changes without bound drown the priors."""
+    """Return the solution of a linear system, or its minimum-norm solution if the matrix is
+    singular.
+    """
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     except np.linalg.LinAlgError:

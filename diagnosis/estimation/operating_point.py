@@ -1,4 +1,6 @@
-"""Modes: where each mode of a candidate was seen, and what the candidate is near there."""
+"""Operating points: where each mode was active in a prediction, and the linearised
+candidate there.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,13 @@ from diagnosis.model.candidate import Candidate
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 ModeModels = dict[int, tuple[LinearModel, int]]
-"""By mode, a candidate over one sample near where it was seen, and the usual stay [samples]."""
+"""For each mode the linearised candidate and the median dwell time [samples]."""
 MIN_DWELL_SAMPLES = 5
-"""Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
+"""Modes with only shorter stays [samples] have the gain of the mode with the longest stay."""
 STATE_STEP_FRACTION = 1e-5
-"""Change of a state for a difference, as a part of its range."""
+"""Step of a state for a finite difference, as a fraction of its range."""
 CACHE_SIZE = 4
-"""Models of candidates that are kept, the latest ones: levels of noise move, and they stay."""
+"""Number of cached sets of models; fits with other noise levels use the same ones."""
 
 _cache: OrderedDict[tuple[object, ...], tuple[ModeModels, object]] = OrderedDict()
 
@@ -36,10 +38,10 @@ def linearise_modes(
     calibration_page: Reals,
     prediction: PredictionResult | None,
 ) -> ModeModels:
-    """Return the models of a candidate with a page near where `prediction` saw its modes, the longest
-    stay first; as they were kept or made now. None of a mode in which it is unstable.
+    """Return the linearised candidate in each mode at its operating point, the longest stay first.
 
-    What they are made of is known by its identity: what is kept holds it.
+    Modes in which the linearisation is invalid are left out. The result is cached by the page and
+    the identity of the other arguments, which the entry holds.
     """
     held = candidate.predictor, candidate.compiled, prediction, *series
     key = calibration_page.tobytes(), *map(id, held)
@@ -59,6 +61,7 @@ def _compute_linearised_modes(
     calibration_page: Reals,
     prediction: PredictionResult | None,
 ) -> ModeModels:
+    """Return the linearised candidate in each mode without the cache."""
     found = {}
     for mode, point in operating_points(candidate, series, prediction).items():
         linear = linearise_near(candidate, calibration_page, mode, point.states, point.inputs)
@@ -70,14 +73,16 @@ def _compute_linearised_modes(
 def linearise_near(
     candidate: Candidate, calibration_page: Reals, mode: int, states: Reals, inputs: Reals
 ) -> LinearModel | None:
-    """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
+    """Return the candidate linearised over one sample in a mode near a point, or None if
+    invalid.
+    """
     substeps, sizes = candidate.compiled.substeps, STATE_STEP_FRACTION * candidate.state_ranges
     return linearise(candidate.predictor, calibration_page, mode, substeps, states, inputs, sizes)
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Where a mode was seen: `states` and `inputs` there, and the usual `stay` in it [samples]."""
+    """A point where a mode is active: `states`, `inputs` and the median dwell time [samples]."""
 
     states: Reals
     inputs: Reals
@@ -87,9 +92,11 @@ class OperatingPoint:
 def operating_points(
     candidate: Candidate, series: Sequence[SampledRecording], prediction: PredictionResult | None
 ) -> dict[int, OperatingPoint]:
-    """Return where each mode was seen, in its longest stay; the mode with the longest first.
+    """Return an operating point of each mode in a prediction, the mode with the longest stay first.
 
-    Where the first compared signal is largest: friction is steep near rest alone.
+    It lies in the longest stay of the mode, where the first output is largest, because friction is
+    steep near standstill. Modes with only short stays are left out. Without a prediction the result
+    is the start of the first recording.
     """
     if prediction is None:
         return _initial_operating_point(candidate, series[0])
@@ -116,7 +123,10 @@ def operating_points(
 
 
 def _dwell_intervals(runs: StackedPrediction) -> tuple[Integers, Integers, Integers, Integers]:
-    """Return the first sample of each stay in a mode, the one behind it, its mode and recording."""
+    """Return the first sample of each stay in a mode, the end sample, the mode and the recording.
+
+    Samples count from the start of the recording; samples after a run diverged are left out.
+    """
     modes, starts = runs.stacked.modes, runs.starts
     begins = np.ones(len(modes), dtype=np.bool_)
     begins[1:] = modes[1:] != modes[:-1]
@@ -133,7 +143,7 @@ def _dwell_intervals(runs: StackedPrediction) -> tuple[Integers, Integers, Integ
 def _initial_operating_point(
     candidate: Candidate, series: SampledRecording
 ) -> dict[int, OperatingPoint]:
-    """Return where a recording starts."""
+    """Return the operating point at the first sample of a recording, by its mode."""
     predictor = candidate.predictor
     page = candidate.calibration_page({}, series)
     none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.outputs)))
@@ -145,7 +155,10 @@ def _initial_operating_point(
 
 
 def _largest_output_sample(measured: Reals, low: int, high: int) -> int:
-    """Return the sample of a stay, not near its ends, at which the first signal is largest."""
+    """Return the sample at which the first output has its largest magnitude in a stay.
+
+    The first and last fifth of the stay are left out. In a very short stay it is the middle.
+    """
     margin = (high - low) // 5
     inner = np.abs(measured[low + margin : high - margin, 0])
     known = np.where(np.isfinite(inner), inner, -1.0)

@@ -1,4 +1,4 @@
-"""An estimated quantity with its uncertainty."""
+"""Quantity: an estimated value with its unit and standard deviation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Candidate: a model with layers, compiled, with the parameters that a fit may move."""
+"""Candidate: a compiled model with placed effects, and the parameters that a fit may change."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from language.text.document import Document
 
 Reals = NDArray[np.float64]
 INITIAL_VALUE_NAME = "start_of_{}"
-"""The tunable that the start value of a compared state becomes."""
+"""Name of the tunable parameter that replaces the initial value of a compared state."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A compiled model: `layers` over the base, its recipe, and its library.
+    """A compiled model: the effects placed on the base, its metadata and its predictor.
 
-    `levels` are those of its noises, where a fit may move these beside its parameters.
+    `noise_parameters` are the noise levels that a fit estimates together with the parameters.
     """
 
     placed_effects: tuple[PlacedEffect, ...]
@@ -49,42 +49,46 @@ class Candidate:
 
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """What a fit may move: parameters, behind them levels."""
+        """The free parameters of a fit: the parameters of the model, then the noise parameters."""
         return self.compiled.uncertain + self.noise_parameters
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names of the uncertain parameters."""
+        """The names of the free parameters, in their order."""
         return tuple(one.name for one in self.free_parameters)
 
     @property
     def disturbance_states(self) -> tuple[str, ...]:
-        """The states that drift."""
+        """The names of the disturbance states."""
         return self.compiled.drifts
 
     @cached_property
     def state_ranges(self) -> Reals:
-        """The width of the range of each state (states,), 1 where it has none."""
+        """The width of the declared range of each state (states,), 1 if it has no range."""
         return np.array(self.compiled.spans)
 
     @cached_property
     def is_effect_state(self) -> NDArray[np.bool_]:
-        """Which states effects have brought (states,)."""
+        """The mask (states,) of states that placed effects add."""
         return np.array(self.compiled.brought, dtype=np.bool_)
 
     @cached_property
     def is_per_recording(self) -> NDArray[np.bool_]:
-        """Which parameters each recording has of its own (parameters,)."""
+        """The mask (parameters,) of free parameters with a separate value for each recording."""
         return np.array([one.per_recording for one in self.free_parameters], dtype=np.bool_)
 
     @cached_property
     def bounds(self) -> Reals:
-        """The ranges as coordinates (parameters, 2)."""
+        """The bounds of the free parameters as coordinates (parameters, 2): lower, upper."""
         ranges = [one.bounds for one in self.free_parameters]
         return np.array(ranges, dtype=np.float64).reshape(-1, 2)
 
     def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
-        """Return the calibration for one recording: values, and where its states start."""
+        """Return the calibration page (tunables,) for one recording.
+
+        It holds `values` [SI] by name, the defaults of other tunables, and the initial values of
+        compared states from the first measurements of the recording.
+        """
         return np.asarray(
             self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
         )
@@ -92,9 +96,12 @@ class Candidate:
     def calibration_pages(
         self, values: Sequence[Mapping[str, float]], first_measured: Reals
     ) -> Reals:
-        """Return the calibration for each recording (recordings, tunables) from its values.
+        """Return the calibration page for each recording (recordings, tunables) from its values
+        [SI].
 
-        `first_measured` (recordings, seen) are the values that its signals start with, NaN if unknown.
+        `first_measured` (recordings, outputs) gives the initial values of compared states; a NaN
+        keeps the value of the page. Values that are the same object for all recordings are
+        converted once.
         """
         is_shared = all(own is values[0] for own in values)
         rows = [
@@ -114,11 +121,12 @@ class Candidate:
 
     @cached_property
     def _default_page(self) -> dict[str, float]:
+        """The default value of each tunable by name, in the order of the page."""
         return dict(self.predictor.page)
 
     @cached_property
     def _initial_value_columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """The columns of compared signals, and of the page where each one's state starts."""
+        """The indices of outputs that are states, and of their initial values in the page."""
         places = {name: place for place, name in enumerate(self.predictor.page)}
         fresh = [
             (k, INITIAL_VALUE_NAME.format(name)) for k, name in enumerate(self.predictor.outputs)
@@ -136,9 +144,11 @@ def compile_candidate(
     output_names: Sequence[str],
     period: Fraction,
 ) -> Candidate:
-    """Return the base with layers and drifts, compiled for a period [s] between samples.
+    """Return the base with placed effects and disturbances, compiled for a sample period [s].
 
-    Raises SpecError, ToolMissing.
+    A compiled model with the same sources is read from the cache. Only the parameters of
+    `placed_effects` become free parameters of effects; `disturbances` add disturbance states.
+    Raises SpecError, and an error of the tool chain if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [
@@ -162,6 +172,7 @@ def _compile(
     output_names: Sequence[str],
     period: Fraction,
 ) -> tuple[CompiledModel, bytes]:
+    """Return the metadata and the shared library of an automaton with its effects, built now."""
     effect_parameters = [
         placed_effect.qualified_name(name)
         for placed_effect in placed_effects
@@ -197,16 +208,16 @@ def _compile(
 
 
 def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:
-    """Return the uncertain parameters that are the time of a `delay`."""
+    """Return the parameters that occur in the time of a `delay`, in the automaton's order."""
     times = [tree.arguments[1] for tree in memory_calls_by_key(automaton, ("delay",)).values()]
     read = {part.path for time in times for part in names(time)}
     return tuple(name for name in automaton.parameters if name in read)
 
 
 def _with_tunable_initial_values(automaton: Automaton, output_names: Sequence[str]) -> Automaton:
-    """Return an automaton in which each compared state starts at a tunable of its own.
+    """Return an automaton in which the initial value of each compared state is a new parameter.
 
-    Also where an effect shows something else in its place: it starts near it.
+    This includes outputs that an effect alters: the state still starts near the measured value.
     """
     parameters, states = dict(automaton.parameters), dict(automaton.states)
     for output in output_names:

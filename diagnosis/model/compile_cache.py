@@ -1,7 +1,7 @@
-"""Recipe: what is known of a compiled candidate, kept beside its library for the next run.
+"""Compile cache: metadata and shared libraries of compiled candidates, kept between runs.
 
-Laying effects, checking, lowering and printing take a second, a fit takes less: in a study the same
-candidates come again with each case.
+Placing effects, checking, lowering and compiling takes about a second, longer than a fit; studies
+use the same candidates for many cases.
 """
 
 from __future__ import annotations
@@ -34,14 +34,17 @@ COMPILATION_MODULES = (
     "placed_effect",
     "sampled_recording",
 )
-"""The files of diagnosis that candidates are made by."""
+"""Modules of `diagnosis` on which a compiled candidate depends (part of the cache key)."""
 
 
 @dataclass(frozen=True)
 class CompiledModel:
-    """A candidate but for its library: `columns` of its arrays, `substeps` of a sample, `spans` of
-    its states, `uncertain` parameters, `drifts` (states) and their `memories` [s]; `delays` are
-    parameters that are one, and `brought` tells which states the effects have.
+    """Metadata of a compiled candidate without its library; it is stored as JSON.
+
+    `columns` describes the arrays of the predictor, `substeps` is the number of major steps in a
+    sample, and `spans` (states,) are the widths of the ranges of states. `uncertain` are the free
+    parameters, `drifts` the disturbance states with their correlation times `memories` [s], and
+    `delays` the parameters that are delay times. `brought` (states,) marks states that effects add.
     """
 
     columns: PredictorColumns
@@ -55,7 +58,7 @@ class CompiledModel:
 
 
 def cache_key(*parts: str) -> str:
-    """Return the key of what candidates of this code are made from."""
+    """Return the SHA-256 key (hex) of texts together with the code that compiles candidates."""
     digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
     for part in parts:
         digest.update(part.encode() + b"\\0")
@@ -63,7 +66,7 @@ def cache_key(*parts: str) -> str:
 
 
 def node_text(node: YamlNode | None) -> str:
-    """Return a tree of a document as one text, without places."""
+    """Return a document tree as one line of text without positions; empty for None."""
     if isinstance(node, ScalarNode):
         return json.dumps(node.text)
     if isinstance(node, SequenceNode):
@@ -76,7 +79,11 @@ def node_text(node: YamlNode | None) -> str:
 def load_or_compile(
     key: str, compile_model: Callable[[], tuple[CompiledModel, bytes]]
 ) -> tuple[CompiledModel, Path]:
-    """Return the recipe and the library of a key; both are made and kept where they are not."""
+    """Return the metadata and the library path of a key, from the cache or compiled and stored now.
+
+    An entry whose files are unreadable or whose library does not match its digest is compiled
+    again.
+    """
     folder = _cache_folder()
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
     with suppress(OSError, ValueError, TypeError, KeyError):
@@ -93,13 +100,17 @@ def load_or_compile(
 
 @cache
 def _cache_folder() -> Path:
-    """The user's own folder of candidates; one for this process alone where there is none."""
+    """Return the user's cache folder of candidates, or a temporary folder if there is none."""
     return cache_subfolder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
 
 
 @cache
 def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
-    """Return the hash of the code that fits follow from: of `patterns` files of diagnosis (patterns)."""
+    """Return the SHA-256 digest (hex) of the source files on which compiled models and fits depend.
+
+    It covers all files of `language` and `codegen`, and the files of `diagnosis` whose stem matches
+    one of `patterns`.
+    """
     digest = hashlib.sha256()
     files = [
         file for package in (language, codegen) for file in _source_files(_package_folder(package))
@@ -111,15 +122,20 @@ def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
 
 
 def _package_folder(package: ModuleType) -> Path:
+    """Return the folder of a package."""
     return Path(str(package.__file__)).parent
 
 
 def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
+    """Yield the source files below a folder (Python, templates, YAML, grammars) with a stem like
+    `name`.
+    """
     for ending in ("py", "jinja", "yaml", "lark"):
         yield from folder.glob(f"**/{name}.{ending}")
 
 
 def _from_json(data: dict[str, Any]) -> CompiledModel:
+    """Return the metadata that a JSON object of the cache holds."""
     given: dict[str, Any] = data["columns"]
     columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
     uncertain = tuple(
@@ -138,7 +154,10 @@ def _from_json(data: dict[str, Any]) -> CompiledModel:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file of the cache: all of it or nothing."""
+    """Write a file through a temporary file in its folder, so that no reader sees a part of it.
+
+    Raises OSError; the temporary file is then removed.
+    """
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:

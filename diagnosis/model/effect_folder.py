@@ -1,4 +1,4 @@
-"""Own effects: those of a folder that a diagnosis tries in place of those shipped."""
+"""Effect folders: effects that a user supplies in place of the shipped library."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ from language.text.document import Document
 
 
 def load_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects of a folder, each of a name of its own. Raises SpecError, ValueError."""
+    """Return the effects of a folder, sorted by file name.
+
+    Raises ValueError if there is none, and SpecError if a file is invalid or a name repeats.
+    """
     effects = read_effects(folder)
     if not effects:
         raise ValueError(f"there is no effect in {folder}")
@@ -35,20 +38,23 @@ def load_effects(folder: Path) -> tuple[Effect, ...]:
 def explain_unplaceable(
     effects: Sequence[Effect], document: Document, project: Project
 ) -> Iterator[str]:
-    """Yield, for each effect that no place of an expanded automaton takes, why it is not tried."""
+    """Yield a message for each effect that cannot be placed anywhere on an expanded automaton.
+
+    The message gives the error at the first place, or says that no place matches.
+    """
     for effect in effects:
-        layers = find_placements(document, effect)
-        refusals = [_placement_error(layer, document, project) for layer in layers]
-        if all(refusals):
-            why = next(iter(refusals), f"it fits no place of `{document.name}`")
+        placed_effects = find_placements(document, effect)
+        errors = [_placement_error(one, document, project) for one in placed_effects]
+        if all(errors):
+            why = next(iter(errors), f"it fits no place of `{document.name}`")
             yield f"effect `{effect.name}` is not tried: {why}"
 
 
-def _placement_error(layer: PlacedEffect, document: Document, project: Project) -> str:
-    """Return why an effect cannot be laid at a place that it fits; nothing where it can."""
+def _placement_error(placed_effect: PlacedEffect, document: Document, project: Project) -> str:
+    """Return why an effect at a matching place makes the automaton invalid; "" if it is valid."""
     try:
-        automaton_with_effects(document, project, [layer])
+        automaton_with_effects(document, project, [placed_effect])
     except SpecError as error:
         first = error.problems[0]
-        return f"at `{layer.place}`: {first.span}: {first.label}"
+        return f"at `{placed_effect.place}`: {first.span}: {first.label}"
     return ""

@@ -1,4 +1,4 @@
-"""Library: effects as a reader sees them - what they are, where they fit, how they look."""
+"""Effect library: descriptions of effects, their places in a spec and the changed lines."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, MappingNode
 
 HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
-"""Keys of an effect's file that are told in words."""
+"""Keys of an effect file that describe it; the other keys define its equations."""
 
 
 @dataclass(frozen=True)
 class EffectDescription:
-    """An effect with its lines of equations, and the places of a spec that it fits.
+    """An effect with its defining lines and the places of a spec where it can be applied.
 
-    `changes` are the lines of the spec that it alters at each place, by the place's name.
+    `changes` gives, by the name of each place, the lines of the spec that the effect changes there.
     """
 
     effect: Effect
@@ -31,12 +31,12 @@ class EffectDescription:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """The names of the places that it fits."""
+        """The names of the places where the effect can be applied."""
         return tuple(placed_effect.place for placed_effect in self.placements)
 
 
 def library_effects(project: Project) -> tuple[Effect, ...]:
-    """Return the effects of a project and those shipped, by name. Raises SpecError."""
+    """Return the effects of a project and the shipped ones, sorted by name. Raises SpecError."""
     span = Span(Source("effects"), 1, 1)
     problems = Problems()
     found = [
@@ -50,7 +50,10 @@ def library_effects(project: Project) -> tuple[Effect, ...]:
 def describe_effect(
     effect: Effect, document: Document | None = None, project: Project | None = None
 ) -> EffectDescription:
-    """Return an effect as it is told, with its places in an expanded document of a project."""
+    """Return the description of an effect, with its places if an expanded document is given.
+
+    Places at which the resulting automaton would be invalid are left out.
+    """
     if document is None or project is None:
         return EffectDescription(effect, _defining_lines(effect.body))
     fits = find_placements(document, effect)
@@ -65,7 +68,10 @@ def describe_effect(
 
 
 def _is_placeable(document: Document, project: Project, placed_effect: PlacedEffect) -> bool:
-    """Tell whether what comes out is sound: a filter's balance looks like one of a speed."""
+    """Return whether the automaton with the effect at this place is valid.
+
+    A place can match by structure only: the balance of a sensor filter looks like one of a speed.
+    """
     try:
         automaton_with_effects(document, project, (placed_effect,))
     except SpecError:
@@ -74,7 +80,7 @@ def _is_placeable(document: Document, project: Project, placed_effect: PlacedEff
 
 
 def _defining_lines(body: MappingNode) -> tuple[str, ...]:
-    """Return the lines of an effect's file that say what it does."""
+    """Return the lines of an effect file under keys other than `HEADER_KEYS`, in file order."""
     source = body.span.source
     starts = sorted((entry.span.line, entry.key) for entry in body)
     ends = [line for line, _ in starts[1:]] + [len(source.lines) + 1]
@@ -86,11 +92,12 @@ def _defining_lines(body: MappingNode) -> tuple[str, ...]:
 
 
 def format_place_kinds(effect: Effect) -> str:
-    """Return in words what an effect is laid on."""
+    """Return in words the kinds of place to which an effect applies, joined by ", or "."""
     return ", or ".join(_format_place_kind(fit) for fit in effect.place_patterns)
 
 
 def _format_place_kind(fit: PlacePattern) -> str:
+    """Return in words one kind of place, with its unit and required keys."""
     if fit.kind == "balance":
         words = "the balance of a speed" if fit.of == "rate" else "a balance"
     elif fit.kind == "element":

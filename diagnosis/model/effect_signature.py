@@ -1,4 +1,4 @@
-"""Signature: how an effect shows - a base and the same with the effect, under steps of an input."""
+"""Effect signature: a simulation of a base with and without an effect, under steps of one input."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from diagnosis.model.parameter import free_parameters_of
 from diagnosis.model.placed_effect import (
     PlacedEffect,
-    automaton_with_effects as laid_automaton,
+    automaton_with_effects,
     effect_names,
 )
 from engine.results.mode_band import PALETTE
@@ -30,16 +30,20 @@ from language.text.document import Document
 from language.text.project_files import parse_document
 
 HORIZON = 4
-"""Time of the manoeuvre [s]: forwards, from 1 s backwards, from 2.5 s forwards again."""
+"""Duration [s] of the manoeuvre: a positive step, from 1 s a negative one, from 2.5 s positive."""
 DEFAULT_STEP_HEIGHTS = {"N*m": "40", "N": "100"}
-"""Height of the steps by the unit of the input, 1 for others."""
+"""Step height by the SI unit of the input; 1 for other units."""
 MAX_OUTPUTS = 4
 BLUE, RED, *_ = PALETTE
 
 
 @dataclass(frozen=True)
 class Signature:
-    """Runs of a base without and with an effect; `values` are its parameters, with units."""
+    """Simulations of a base without and with an effect.
+
+    `step` is the stepped input with its height, and `values` are the parameters of the effect as
+    text with units, by their names in the effect.
+    """
 
     placed_effect: PlacedEffect
     step: str
@@ -54,16 +58,17 @@ def simulate_signature(
     placed_effect: PlacedEffect,
     step: tuple[str, str] | None = None,
 ) -> Signature:
-    """Return an effect's signature over an expanded base; `step` is an input and its height.
+    """Return the simulations of an expanded base with and without an effect.
 
-    Raises SpecError, ValueError.
+    `step` is an input and its height with unit; by default the input of the effect's place, or the
+    first input without a default. Raises SpecError, and ValueError if the base has no such input.
     """
-    base = laid_automaton(document, project, ())
+    base = automaton_with_effects(document, project, ())
     name, height = step or _default_step(base, placed_effect)
     if name not in base.inputs:
         raise ValueError(f"`{base.name}` has no input `{name}`: {', '.join(base.inputs)}")
     whole, values = _with_visible_effect(
-        laid_automaton(document, project, (placed_effect,)), placed_effect
+        automaton_with_effects(document, project, (placed_effect,)), placed_effect
     )
     text = _scenario_text(base, name, height)
     runs = [_simulate(one, project, text) for one in (base, whole)]
@@ -71,7 +76,9 @@ def simulate_signature(
 
 
 def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, str]:
-    """Return the input that the effect is laid on, else the first one that has no default."""
+    """Return the input to step and its height: the place of the effect if that is an input, else
+    the first input without a default, else the first input. Raises ValueError without inputs.
+    """
     if not base.inputs:
         raise ValueError(f"`{base.name}` has no input to step")
     free = [name for name, one in base.inputs.items() if one.default is None]
@@ -87,7 +94,11 @@ def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, st
 def _with_visible_effect(
     whole: Automaton, placed_effect: PlacedEffect
 ) -> tuple[Automaton, dict[str, str]]:
-    """Return an automaton in which the effect's parameters are away from where it vanishes."""
+    """Return the automaton with the effect's parameters away from their neutral values, and these
+    values.
+
+    A parameter whose declared value is neutral takes the last start value of a fit.
+    """
     brought = effect_names(placed_effect)
     parameters, values = dict(whole.parameters), dict[str, str]()
     for one in free_parameters_of(whole, list(brought)):
@@ -103,6 +114,7 @@ def _with_visible_effect(
 
 
 def _scenario_text(base: Automaton, input_name: str, height: str) -> str:
+    """Return the YAML scenario that steps one input and holds inputs without a default at 0."""
     back = height.removeprefix("-") if height.startswith("-") else f"-{height}"
     lines = ["language: 1", "scenario: signature", f"of: {base.name}", f"horizon: {HORIZON} s"]
     lines.append("inputs:")
@@ -115,13 +127,14 @@ def _scenario_text(base: Automaton, input_name: str, height: str) -> str:
 
 
 def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
+    """Return the trajectory of a single automaton under a scenario given as text."""
     system = single_instance_system(automaton)
     document = parse_document(Source("signature", tuple(text.splitlines())), text)
     return simulate(system, read_scenario(document, project, system))
 
 
 def draw_signature(signature: Signature) -> Picture:
-    """Return both runs, output by output, and beneath each what the effect changes."""
+    """Draw both simulations for up to `MAX_OUTPUTS` outputs, and below each the difference."""
     names = [
         name
         for name in signature.without_effect.signals

@@ -1,4 +1,4 @@
-"""Change: which equations of the model an effect alters, before and after."""
+"""Equation changes: the lines of a spec that placed effects change, before and after."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ EQUATION_SECTIONS = (
     "regions",
     "outputs",
 )
-"""What is told; parameters have a table of their own."""
+"""Sections of a spec that are compared; parameters have a table of their own."""
 
 
 @dataclass(frozen=True)
 class EquationChange:
-    """A line of the spec, by its key path, without and with the effects; empty where absent."""
+    """A line of the spec by its key path, before and after; empty text if the line is absent."""
 
     path: str
     before: str
@@ -34,7 +34,10 @@ class EquationChange:
 def equation_changes(
     document: Document, placed_effects: Sequence[PlacedEffect]
 ) -> list[EquationChange]:
-    """Return the lines of equations that layers alter in an expanded document. Raises SpecError."""
+    """Return the equations of an expanded document that placed effects change. Raises SpecError.
+
+    Units, descriptions, ranges and initial values are left out.
+    """
     found = diff_specs(document.root, overlay_effects(document, placed_effects).root)
     return [
         EquationChange(one.path, one.old.value if one.old else "", one.new.value if one.new else "")
@@ -44,4 +47,5 @@ def equation_changes(
 
 
 def _is_metadata(path: str) -> bool:
+    """Return whether a key path ends with a unit, a description, a range or an initial value."""
     return path.endswith((".unit", ".about", ".range", ".initial"))

@@ -1,7 +1,7 @@
-"""Uncertain: the parameters that recordings may move, in coordinates with a prior of one.
+"""Free parameters: parameters with a range, as coordinates with a standard normal prior.
 
-A parameter with a `range` is uncertain. z = 0 is its value, z = 1 one standard deviation of its
-prior away: a part of the value where that is positive, else a part of the range.
+A parameter with a `range` is free. z = 0 is its declared value, and z = 1 is one standard deviation
+of its prior away: a fraction of a positive value (in its logarithm), else a fraction of the range.
 """
 
 from __future__ import annotations
@@ -19,18 +19,21 @@ from language.overlays.tree_types import format_si_unit
 
 Reals = NDArray[np.float64]
 PRIOR_STD = 0.15
-"""Standard deviation of a base parameter, as a part of its value (in its logarithm)."""
+"""Prior standard deviation of a base parameter: of its logarithm, or as a fraction of its range."""
 NEUTRAL_OFFSET = 0.02
-"""A start near the neutral value: this part of the way to the next one."""
+"""The first start of an effect parameter lies at this fraction of the way from neutral to the next.
+"""
 EFFECT_PRIOR_STD = 0.5
-"""Standard deviation of an effect's parameter, as a part of its range."""
+"""Prior standard deviation of an effect parameter, as a fraction of its range."""
 
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter [SI] in its coordinate: value = start exp(sd z), or start + sd z.
+    """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    At `plain` the effect that brought it is a plainer one.
+    `low` and `high` are its range, `starts` the values from which fits begin. At the value `plain`
+    the effect reduces to a simpler one, and the models are nested. With `per_recording` each
+    recording has a value of its own.
     """
 
     name: str
@@ -45,27 +48,31 @@ class FreeParameter:
     plain: float | None = None
 
     def value(self, z: float) -> float:
-        """Return the value of a coordinate."""
+        """Return the value [SI] at a coordinate."""
         if self.is_log:
             return self.start * math.exp(self.sd * z)
         return self.start + self.sd * z
 
     def coordinate(self, value: float) -> float:
-        """Return the coordinate of a value."""
+        """Return the coordinate of a value [SI]."""
         if self.is_log:
             return math.log(value / self.start) / self.sd
         return (value - self.start) / self.sd
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The coordinates of the ends of the range."""
+        """The coordinates of the lower and upper bound of the range."""
         return self.coordinate(self.low), self.coordinate(self.high)
 
 
 def free_parameters_of(
     automaton: Automaton, effects: Sequence[str] = ()
 ) -> tuple[FreeParameter, ...]:
-    """Return the uncertain parameters; `effects` are the names that effects have brought."""
+    """Return the free parameters of an automaton: real scalars with a range and a value, in its
+    order.
+
+    `effects` names the parameters that effects add; these get the wider prior of effects.
+    """
     found = []
     for name, parameter in automaton.parameters.items():
         is_number = parameter.type == "real" and parameter.table is None
@@ -77,6 +84,10 @@ def free_parameters_of(
 
 
 def _base_parameter(parameter: Parameter) -> FreeParameter:
+    """Return a base parameter as a free one: logarithmic if its range and value are positive.
+
+    A lower bound of 0 of a positive parameter becomes 0.1 % of its value.
+    """
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     value, unit = float(parameter.value), si_unit(parameter)
@@ -89,6 +100,7 @@ def _base_parameter(parameter: Parameter) -> FreeParameter:
 
 
 def _effect_parameter(parameter: Parameter) -> FreeParameter:
+    """Return an effect parameter as a free one: logarithmic if its range and value are positive."""
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     fitting = parameter.fitting
@@ -105,8 +117,10 @@ def _effect_parameter(parameter: Parameter) -> FreeParameter:
 
 
 def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
-    """Return where fits start: at the declared starts, or near the neutral value and away from it,
-    or at the value.
+    """Return the values from which fits of an effect parameter start.
+
+    These are the declared starts; else, with a neutral value, one point near it and one at a tenth
+    of the way to the upper bound; else the declared value.
     """
     fitting = parameter.fitting
     if fitting.starts:
@@ -119,7 +133,7 @@ def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
 
 
 def si_unit(parameter: Parameter) -> str:
-    """Return the unit of a parameter's value: as it is written where that is SI."""
+    """Return the SI unit of a parameter's value: its own text if that is SI, else the SI form."""
     unit = parameter.unit
     is_si = unit.factor == 1 and unit.offset == 0
     return unit.text if is_si else format_si_unit(unit.dimension)

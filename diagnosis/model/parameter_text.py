@@ -1,4 +1,4 @@
-"""Values of parameters as text."""
+"""Parameter text: values of parameters with units, for files and tables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from language.model.declaration import Parameter
 
 
 def format_value(value: float, parameter: Parameter) -> str:
-    """Return a value in SI with its unit, rounded, but not out of its range."""
+    """Return a value [SI] with six digits and its unit; a rounded value outside the range is
+    clipped.
+    """
     text = f"{value:.6g}"
     if parameter.range:
         low, high = parameter.range

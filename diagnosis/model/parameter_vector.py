@@ -1,4 +1,4 @@
-"""Point: where the parameters of a candidate are, in coordinates, for some recordings."""
+"""Parameter vectors: coordinates of a candidate's free parameters, shared and per recording."""
 
 from __future__ import annotations
 
@@ -15,16 +15,20 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ParameterVector:
-    """Coordinates: `shared` (parameters,), and `own` (recordings, parameters) of those per one.
+    """Coordinates: `shared` (parameters,) and `per_recording` (recordings, parameters).
 
-    A parameter has its place in both; only one of them counts.
+    Each free parameter has a column in both arrays; only the one that applies to it counts.
     """
 
     shared: Reals
     per_recording: Reals
 
     def perturb(self, candidate: Candidate, index: int, size: float) -> ParameterVector:
-        """Return a point with one coordinate moved, down where up is out of its range."""
+        """Return a vector with coordinate `index` increased by `size`, or decreased if that exceeds
+        its bound.
+
+        The coordinate changes in the shared array and for every recording.
+        """
         high = bounds_of(candidate)[index, 1]
         size = size if self.shared[index] + size <= high else -size
         shared, own = self.shared.copy(), self.per_recording.copy()
@@ -33,13 +37,21 @@ class ParameterVector:
         return ParameterVector(shared, own)
 
     def prior_cost(self, candidate: Candidate) -> float:
-        """Return half the squares of the coordinates that count [nats]."""
+        """Return the negative log density of the standard normal prior [nats], without its
+        constant.
+
+        This is half the sum of squares of the coordinates that count.
+        """
         own = per_recording_mask(candidate)
         return 0.5 * float((self.shared[~own] ** 2).sum() + (self.per_recording[:, own] ** 2).sum())
 
 
 def vector_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) -> ParameterVector:
-    """Return the point of some values [SI]; the others start where they are declared."""
+    """Return the vector of given values [SI], clipped to the bounds.
+
+    Other parameters take their first start value, or their declared value. Every recording has the
+    same coordinates.
+    """
     shared = []
     for one in candidate.free_parameters:
         value = start.get(one.name, one.starts[0] if one.starts else one.start)
@@ -55,9 +67,11 @@ def extend_vector(
     base_point: ParameterVector,
     start: Mapping[str, float] | ParameterVector,
 ) -> ParameterVector:
-    """Return the point of a candidate that stands where a base does `base_point` a point of its own.
+    """Return the vector of a candidate that takes the coordinates of `base_point` where names
+    agree.
 
-    What the base does not have is at `start`: values [SI], or a point of the candidate.
+    Parameters that the base does not have are at `start`: values [SI], or a vector of the
+    candidate.
     """
     point = (
         start
@@ -74,7 +88,7 @@ def extend_vector(
 
 
 def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> dict[str, float]:
-    """Return the parameters [SI] of a recording."""
+    """Return the values [SI] of the free parameters for one recording, by name."""
     return {
         one.name: one.value(
             float(point.per_recording[recording, k] if one.per_recording else point.shared[k])
@@ -84,7 +98,9 @@ def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> d
 
 
 def all_values_at(candidate: Candidate, point: ParameterVector) -> list[dict[str, float]]:
-    """Return the parameters [SI] of every recording; one that all share is made once."""
+    """Return the values [SI] for every recording; the same dict object if all parameters are
+    shared.
+    """
     shared, recordings = values_at(candidate, point, 0), range(len(point.per_recording))
     own = [(k, one) for k, one in enumerate(candidate.free_parameters) if one.per_recording]
     if not own:
@@ -96,10 +112,10 @@ def all_values_at(candidate: Candidate, point: ParameterVector) -> list[dict[str
 
 
 def per_recording_mask(candidate: Candidate) -> NDArray[np.bool_]:
-    """Return which parameters each recording has of its own (parameters,)."""
+    """Return the mask (parameters,) of free parameters with a value for each recording."""
     return candidate.is_per_recording
 
 
 def bounds_of(candidate: Candidate) -> Reals:
-    """Return the ranges as coordinates (parameters, 2)."""
+    """Return the bounds of the free parameters as coordinates (parameters, 2)."""
     return candidate.bounds

@@ -1,7 +1,7 @@
-"""Layers: effects and drifts laid over the automaton under diagnosis, and its Program.
+"""Placed effects: effects and disturbances applied to the automaton under diagnosis.
 
-A drift is a slow unknown disturbance at one place (an Ornstein-Uhlenbeck process): with it an
-observer follows what the model leaves out, and the place at which it is needed is where something
+A disturbance (a drift in file names) is a slow unknown load at one place, an Ornstein-Uhlenbeck
+process. With it an observer follows what the model omits; the place that needs it is where physics
 is missing (Kristensen, Madsen, Jorgensen 2004).
 """
 
@@ -36,31 +36,32 @@ SLOWLY_VARYING_FORMS = ("constant_or_random_walk",)
 
 TIME_DIMENSION = parse_unit("s").dimension.powers
 
-KINDS = ("balance", "element", "output")
-
 PLACE_KIND_BY_SECTION = {
     "flow": "balance",
     "inputs": "input",
     "elements": "element",
     "outputs": "output",
 }
-"""The kind of place that the names of a section are."""
+"""The kind of place that the names of a section denote."""
 
 MAX_STEP = Fraction(5, 1000)
-"""Longest major step [s] of a prediction; events inside it are located."""
+"""Longest major step [s] of a prediction; events inside a step are located."""
 
 STABLE_FRACTION = Fraction(1, 2)
-"""A step is at most this part of the largest stable one: parameters move while they are fitted."""
+"""A step is at most this fraction of the largest stable one, because a fit changes parameters."""
 
 PARAMETER_FACTOR = Fraction(4)
-"""How far an effect's parameter may move while it is fitted, as a factor."""
+"""Factor by which an effect's parameter may change in a fit, for the choice of a stable step."""
 
 MIN_DELAY_STEPS = 4
-"""Fewest major steps between two samples of a model with a delay: none is shorter than a step."""
+"""Fewest major steps between two samples of a model with a delay, which is at least one step long.
+"""
 
 MAX_ANGLE_STEP = Fraction(1, 1000)
-"""Longest major step [s] of one with an input that goes along with an angle: motors turn by much in
-a sample. A tone of 12 periods a turn at 100 rad/s then has five steps a period."""
+"""Longest major step [s] of a model with an effect at an input that depends on an angle.
+
+An order of 12 periods a turn at 100 rad/s then has five steps a period.
+"""
 
 MAX_STEPS = 40
 """Most major steps between two samples."""
@@ -68,7 +69,7 @@ MAX_STEPS = 40
 
 @dataclass(frozen=True)
 class PlacedEffect:
-    """An effect at a place; `ending` is what its names end with."""
+    """An effect at a place; names that it adds to the automaton end with `_suffix`."""
 
     effect: Effect
     place: str
@@ -76,21 +77,21 @@ class PlacedEffect:
 
     @property
     def id(self) -> str:
-        """`effect@place`, as it stands in a variant."""
+        """The identifier `effect@place`, as in a variant file."""
         return f"{self.effect.name}@{self.place}"
 
     def qualified_name(self, name: str) -> str:
-        """Return the name that one of the effect's own names has in the automaton."""
+        """Return the name in the automaton of a name of the effect."""
         return f"{name}_{self.suffix}"
 
 
 def has_parameters(placed_effect: PlacedEffect) -> bool:
-    """Tell whether an effect has numbers to fit; one that has none follows anything at all."""
+    """Return whether an effect declares parameters; without any it would follow every signal."""
     return placed_effect.effect.body.get("parameters") is not None
 
 
 def varies_slowly(placed_effect: PlacedEffect) -> bool:
-    """Tell whether a number of an effect may change slowly along a recording."""
+    """Return whether a parameter of an effect may change slowly along a recording."""
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
     forms = [one.node.get("form") for one in entries if isinstance(one.node, MappingNode)]
@@ -98,7 +99,7 @@ def varies_slowly(placed_effect: PlacedEffect) -> bool:
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects of a folder, by name. Raises SpecError."""
+    """Return the effects in the YAML files of a folder, sorted by file name. Raises SpecError."""
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
     problems.raise_if_errors()
@@ -106,18 +107,18 @@ def read_effects(folder: Path) -> tuple[Effect, ...]:
 
 
 def shipped_effects() -> tuple[Effect, ...]:
-    """Return the effects that come with the product."""
+    """Return the effects of the shipped library."""
     return read_effects(Path(str(resources.files("spec"))) / "effects")
 
 
 def disturbance_effect(kind: str, place: str) -> PlacedEffect:
-    """Return the drift of a balance, an element or an output."""
+    """Return the disturbance at a balance, an element or an output (`kind`) named `place`."""
     path = Path(str(resources.files("diagnosis.model"))) / "disturbances" / f"drift_of_{kind}.yaml"
     return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
 def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
-    """Return an effect at every place of an automaton where it can be laid."""
+    """Return an effect at every place of an expanded automaton that matches it."""
     root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
     names = [
         name
@@ -128,15 +129,15 @@ def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, .
 
 
 def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
-    """Return an expanded document with layers laid over it, in their order. Raises SpecError."""
+    """Return an expanded document with effects applied in the given order. Raises SpecError."""
     problems = Problems()
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
     for placed_effect in placed_effects:
-        laying = EffectApplication(
+        application = EffectApplication(
             placed_effect.effect, placed_effect.place, placed_effect.suffix, {}, {}, span
         )
-        root = apply_effect(root, laying, problems)
+        root = apply_effect(root, application, problems)
         problems.raise_if_errors()
     return dataclasses.replace(document, root=root)
 
@@ -144,7 +145,7 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
 def automaton_with_effects(
     document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
 ) -> Automaton:
-    """Return the checked automaton with layers laid over it. Raises SpecError."""
+    """Return the checked automaton of a document with effects applied. Raises SpecError."""
     return automaton_of(overlay_effects(document, placed_effects), project)
 
 
@@ -155,11 +156,13 @@ def lower_tunable_program(
     period: Fraction,
     at_least: int = 1,
 ) -> tuple[Program, int]:
-    """Return the Program in which `names` are tunable, and its steps in a period [s].
+    """Return the Program in which `names` are tunable, and the number of major steps in a period
+    [s].
 
-    The step is a whole part of the period, one of at least `at_least`; it is stable for parameters
-    that effects `effect_parameters` at a quarter and at four times their value, and no longer than a time
-    that they brought: where a rate is limited, stability is not known beforehand.
+    The step divides the period into at least `at_least` and at most `MAX_STEPS` parts. It is stable
+    at the declared parameters and with those of `effect_parameters` at a quarter and four times
+    their values, and not longer than any time among these: the stability limit of a limited rate is
+    not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
@@ -178,7 +181,7 @@ def lower_tunable_program(
 
 
 def _time_values(automaton: Automaton, names: Sequence[str]) -> list[Fraction]:
-    """Return the values [s] of those parameters that are times."""
+    """Return the nonzero values [s] of the named parameters whose unit is a time."""
     known = [automaton.parameters[name] for name in names if name in automaton.parameters]
     return [
         parameter.value
@@ -193,9 +196,11 @@ def minimum_substeps(
     output_names: Sequence[str],
     period: Fraction,
 ) -> int:
-    """Return how many major steps there are to be in a period [s] between two samples at least.
+    """Return the fewest major steps in a sample period [s].
 
-    Several where what is `output_names` shows an input at once as well: it is held within a step.
+    It is `MIN_DELAY_STEPS` for a model with a delay or with direct feed-through to a compared
+    output (an output is constant within a step), more for an effect at an input that depends on an
+    angle (recognised by `floor`), else 1.
     """
     at_input = any(
         placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
@@ -209,6 +214,7 @@ def minimum_substeps(
 
 
 def _stable_step(automaton: Automaton, max_step: Fraction) -> Fraction:
+    """Return the step [s] that is stable for an automaton, at most `max_step` and at least 1 us."""
     for limit in () if automaton.is_sampled else stable_step_limits(automaton):
         stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
         max_step = min(max_step, STABLE_FRACTION * stable)
@@ -216,7 +222,7 @@ def _stable_step(automaton: Automaton, max_step: Fraction) -> Fraction:
 
 
 def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
-    """Return an automaton with some parameters scaled, within their ranges."""
+    """Return an automaton with some real parameters multiplied by `factor`, within their ranges."""
     parameters = dict(automaton.parameters)
     for name in names:
         parameter = parameters.get(name)
@@ -228,7 +234,9 @@ def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fracti
 
 
 def _place_kinds(document: Document) -> dict[str, set[str]]:
-    """Return what effects may be laid on, with the kinds of place that each could be."""
+    """Return the names in a document to which effects could apply, with the possible kinds of
+    place.
+    """
     found: dict[str, set[str]] = {}
     for section, kind in PLACE_KIND_BY_SECTION.items():
         node = document.root.get(section)
@@ -250,12 +258,13 @@ SECTION_BY_PLACE_KIND = {
 
 
 def place_path(placed_effect: PlacedEffect) -> str:
-    """Return `section.name` of where an effect is laid."""
-    return f"{SECTION_BY_PLACE_KIND[placed_effect.effect.place_patterns[0].kind]}.{placed_effect.place}"
+    """Return `section.name` of the place of an effect."""
+    kind = placed_effect.effect.place_patterns[0].kind
+    return f"{SECTION_BY_PLACE_KIND[kind]}.{placed_effect.place}"
 
 
 def effect_names(placed_effect: PlacedEffect) -> dict[str, str]:
-    """Return the names that an effect brings into a model, with those that it has for them."""
+    """Return the names that an effect adds to the automaton, mapped to their names in its file."""
     return {
         placed_effect.qualified_name(name): name for name in added_names(placed_effect.effect.body)
     }
