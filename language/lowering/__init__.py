@@ -1,1 +1,1 @@
-"""Lowering of model parts to operations: expressions, waits, resets, delays, ranges."""
+"""Lowering of the parts of a model: expressions, actions, waits, delays, events and ranges."""

@@ -1,7 +1,13 @@
-"""Action: entry, exit, reset and update as stages of assignments, each committed as a whole.
+"""Actions: entry, exit, reset and update as stages of assignments (rules 5 and 6).
 
-Rules 5 and 6: a stage reads the values before it and commits all of its assignments together; of a
-transition the stages are the exit of the source, the reset, the entry of the target.
+All assignments of a stage read the values before the stage, then all are stored:
+
+    x: y        ->    work.reset_x = state.y
+    y: x              work.reset_y = state.x
+                      state.x = work.reset_x
+                      state.y = work.reset_y
+
+The stages of a transition are the exit of the source, the reset and the entry of the target.
 """
 
 from __future__ import annotations
@@ -25,7 +31,7 @@ from language.model.region_queries import equation_formulas
 
 
 def storage_of(automaton: Automaton, name: str) -> str:
-    """Return the variable of a state or discrete variable."""
+    """Return the variable of a state or discrete variable: `state.<name>` or `discrete.<name>`."""
     return f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
 
 
@@ -35,7 +41,7 @@ def lower_stage(
     known: NameBindings,
     stage_name: str = "reset",
 ) -> list[Op]:
-    """Return assignments that all read the values before, then commit together."""
+    """Return the operations of one stage: all assignments are evaluated, then all are stored."""
     return [
         *read_stage(automaton, formulas, known, stage_name),
         *commit_stage(automaton, formulas, stage_name),
@@ -48,7 +54,7 @@ def read_stage(
     known: NameBindings,
     stage_name: str = "reset",
 ) -> list[Op]:
-    """Return what reads the values before a stage."""
+    """Return the first half of a stage: `work.<stage>_<name> = <value>` for each assignment."""
     found: list[Op] = []
     for name, formula in formulas.items():
         value = lower_assigned_value(
@@ -60,7 +66,10 @@ def read_stage(
 
 
 def commit_stage(automaton: Automaton, names: Iterable[str], stage_name: str = "reset") -> list[Op]:
-    """Return what commits the assignments of a stage together."""
+    """Return the second half of a stage: each `work.<stage>_<name>` is stored in its variable.
+
+    A value outside the range of its variable is saturated (rule 18).
+    """
     found: list[Op] = []
     for name in names:
         whole = automaton.state_variables[name].type in WHOLE_TYPES
@@ -77,7 +86,9 @@ def lower_stage_of_regions(
 ) -> Block:
     """Return one stage of the transitions that all regions take: all read, then all commit.
 
-    `selected_variable` is the variable of a region that holds the number of its transition, 0 for none.
+    `selected_variable` gives the variable of a region that holds the number of its transition, 0
+    for none. `number_of` and `assignments_of` give the number and the assignments of a transition.
+    A region whose transitions assign nothing has no operations.
     """
     reads: list[Op] = []
     commits: list[Op] = []
@@ -101,7 +112,10 @@ def lower_stage_of_regions(
 def lower_entry(
     automaton: Automaton, target: Mode, assignments: Mapping[str, Formula], known: NameBindings
 ) -> Block:
-    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    """Return the entry actions of `target`, or nothing if there are no assignments.
+
+    The equations of the target that the entry reads are evaluated first, after the reset.
+    """
     if not assignments:
         return ()
     inside = {name: place for name, place in known.items() if name not in equation_formulas(target)}
@@ -111,13 +125,13 @@ def lower_entry(
 
 
 def initial_entry_assignments(automaton: Automaton) -> dict[str, Formula]:
-    """Return what the entry of the initial modes of all regions writes."""
+    """Return the entry assignments of the initial modes of all regions, by variable."""
     initial = [region.modes[region.initial] for region in automaton.all_regions]
     return {name: formula for mode in initial for name, formula in mode.entry.items()}
 
 
 def action_variables(automaton: Automaton) -> list[Variable]:
-    """Return the work variables of all stages."""
+    """Return the `work` variables of all stages, each once."""
     found: dict[str, Variable] = {}
     for mode in automaton.all_modes:
         resets = [transition.reset for transition in mode.transitions]
@@ -130,7 +144,7 @@ def action_variables(automaton: Automaton) -> list[Variable]:
 
 
 def discrete_variables(automaton: Automaton) -> list[Variable]:
-    """Return the discrete variables of an automaton."""
+    """Return `discrete.<name>` for each discrete variable of an automaton."""
     return [
         Variable(
             f"discrete.{name}",
@@ -145,7 +159,7 @@ def discrete_variables(automaton: Automaton) -> list[Variable]:
 
 
 def stage_variable(automaton: Automaton, stage_name: str, name: str) -> Variable:
-    """Return the variable of what a stage has computed and not yet committed."""
+    """Return the variable `work.<stage>_<name>`, which holds a value that is not yet stored."""
     thing = automaton.state_variables[name]
     unit = str(thing.unit.dimension)
     kind = value_type(thing.type)

@@ -1,4 +1,4 @@
-"""Stamp: solved numbers know the tunables that they came from; a change sets a fault bit."""
+"""Calibration stamps: a fault bit for solved numbers that do not belong to the page (rule 17g)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from language.model.automaton import Automaton
 from language.text.diagnostic import Problems
 
 STALE_CALIBRATION = "stale_calibration"
+"""The fault bit of a calibration page that does not match the stamps."""
 COMPARE_STAMPS = "compare_stamps"
-"""The block that compares: run before the first tick and after a change of the page (rule C15)."""
+"""The block that compares; it runs before the first tick and after a change of the page (rule C15).
+"""
 
 
 def calibration_stamps(
@@ -20,7 +22,11 @@ def calibration_stamps(
     parameters: Mapping[str, Constant],
     problems: Problems,
 ) -> tuple[Constant, ...]:
-    """Return a stamp for each tunable that enters a solved number: its value then (rule 17g)."""
+    """Return a constant `solved.stamp_<name>` for each tunable that a solved number reads.
+
+    Its value is that of the parameter when the spec was checked. A tunable table is reported, since
+    it has no single value.
+    """
     found = []
     for name in sorted({name for constant in constants for name in constant.depends_on}):
         parameter = parameters[name]
@@ -35,7 +41,7 @@ def calibration_stamps(
 
 
 def compare_stamps_block(stamps: Iterable[Constant]) -> Block:
-    """Return what compares the calibration with the stamps."""
+    """Return the operations that set the fault bit for each tunable that differs from its stamp."""
     ops: list[Op] = []
     for stamp in stamps:
         (name,) = stamp.depends_on

@@ -1,4 +1,4 @@
-"""Activity: whether nodes of a chart are active or complete, from the variables of its regions."""
+"""Conditions that a node of a chart is active or complete, from its regions' mode variables."""
 
 from __future__ import annotations
 
@@ -8,22 +8,29 @@ from language.model.statechart import Chart, ChartNode
 
 
 def is_active(chart: Chart, node: ChartNode, base: str) -> Expr:
-    """Return whether a node is active: its region is in one of the innermost modes inside it."""
+    """Return the condition that a node is active: its region is in one of the node's leaves.
+
+    Leaves with consecutive numbers give one interval `low <= mode and mode <= high`. `base` is the
+    mode variable of the chart.
+    """
     variable = Ref(mode_variable(base, node.region))
-    wanted = sorted(leaf.number for leaf in chart.leaves_of(node) if leaf.number is not None)
-    others = {leaf.number for leaf in chart.leaves(node.region)} - {*wanted}
-    low, high = wanted[0], wanted[-1]
+    numbers = sorted(leaf.number for leaf in chart.leaves_of(node) if leaf.number is not None)
+    others = {leaf.number for leaf in chart.leaves(node.region)} - {*numbers}
+    low, high = numbers[0], numbers[-1]
     if low < high and not any(number is not None and low < number < high for number in others):
         above, below = Compare(">=", variable, integer(low)), Compare("<=", variable, integer(high))
         return Binary("and", above, below)
     found: Expr = Compare("==", variable, integer(low))
-    for number in wanted[1:]:
+    for number in numbers[1:]:
         found = Binary("or", found, Compare("==", variable, integer(number)))
     return found
 
 
 def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
-    """Return whether a node has come to its end: in a final mode, or in one in each region."""
+    """Return the condition that a node is complete: one of its final child modes is active.
+
+    A parallel node is complete when all of its regions are; an atomic node gives a constant.
+    """
     if node.kind == "parallel":
         return _conjunction(
             [is_complete(chart, region, base) for region in chart.child_regions(node)]
@@ -39,7 +46,7 @@ def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
 
 
 def may_complete(chart: Chart, node: ChartNode) -> bool:
-    """Tell whether a node can come to its end."""
+    """Return whether a node can become complete: it has a final mode, in each region if parallel."""
     if node.kind == "parallel":
         return all(may_complete(chart, region) for region in chart.child_regions(node))
     if node.kind == "atomic":
@@ -48,6 +55,7 @@ def may_complete(chart: Chart, node: ChartNode) -> bool:
 
 
 def _conjunction(parts: list[Expr]) -> Expr:
+    """Return the conjunction of one or more conditions."""
     found = parts[0]
     for part in parts[1:]:
         found = Binary("and", found, part)

@@ -1,4 +1,4 @@
-"""Wires: the expressions between the instances of a system, as a Program of their own."""
+"""The connections of a system as a Program: one block for each expression between instances."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ from language.model.declaration import Formula
 from language.model.system import Connection, Scenario, System
 
 WIRE_RESULT = "wire.value"
+"""The variable that each block sets."""
 
 
 def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
-    """Return the expressions of a system and a scenario: connections, outputs, inputs."""
+    """Return the formulas of a system and a scenario by the name of their block.
+
+    They are those of connections, outputs and input stimuli; a connection or an output that is a
+    signal has none.
+    """
     found: dict[str, Formula] = {}
     for connection in system.connections.values():
         if isinstance(connection.source, Formula):
@@ -33,24 +38,25 @@ def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
 
 
 def connection_block(connection: Connection) -> str:
-    """Return the name of the block that evaluates a connection."""
+    """Return the name of the block of a connection: `connection.<instance>.<input>`."""
     return "connection." + ".".join(connection.target)
 
 
 def piece_block(name: str, number: int) -> str:
-    """Return the name of the block that evaluates a piece of an input."""
+    """Return the name of the block of a piece of an input stimulus, numbered from 0."""
     return f"piece.{name}.{number}"
 
 
 def output_block(name: str) -> str:
-    """Return the name of the block that evaluates an output of the system."""
+    """Return the name of the block of an output of the system."""
     return f"output.{name}"
 
 
 def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Program:
-    """Return a Program with a block for each expression: `signal.<name>` to `wire.value`.
+    """Return a Program with one block for each formula, which reads `signal.<name>`.
 
-    `truths` are the signals that are true or false.
+    Each block sets `wire.value`. The Program is named `wires` and computes in float64. `truths` are
+    the signals of type bool.
     """
     read = {name.path for formula in formulas.values() for name in names(formula.tree)}
     known = {name: Ref(f"signal.{name}") for name in read}

@@ -1,4 +1,7 @@
-"""Constants: the values of parameters, rounded and exactly, and what `X_Derive` recomputes."""
+"""Constants of a Program: the values of parameters and the block that recomputes derived ones.
+
+Values are rounded to the number type of the automaton; times are evaluated exactly.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,11 @@ from language.text.diagnostic import Problems, SpecError
 
 
 def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, Constant]:
-    """Return the constant of every parameter, by name. Reports one that is not finite."""
+    """Return the constants of all parameters and of the axes of tables, by name.
+
+    A parameter comes after those that it is derived from. A tunable wait is a count of ticks. A
+    value that is not finite is reported and replaced by 0.
+    """
     known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
     values: dict[str, Scalar] = {}
@@ -64,7 +71,10 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
 
 
 def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
-    """Return the axes of a table parameter as constants; axes are fixed, whatever the values."""
+    """Return the axes of a table parameter as fixed constants `axis.<name>_<k>`, k from 1.
+
+    The list is empty for a parameter that is no table.
+    """
     table = automaton.parameters[name].table
     key = f"{declaring_automaton(automaton, name)} {automaton.parameters[name].key}.table.over"
     return [
@@ -81,7 +91,7 @@ def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
 
 
 def derive_block(automaton: Automaton) -> Block:
-    """Return the assignments of what is derived from tunable parameters, in order."""
+    """Return the assignments of the parameters that depend on tunable ones, in order of dependence."""
     known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
     ops = []
@@ -96,7 +106,7 @@ def derive_block(automaton: Automaton) -> Block:
 
 
 def constant_values(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
-    """Return the values by the Program's names, a tuple for an array."""
+    """Return the values of constants by their names in the Program; an array is a tuple."""
     found: dict[str, Any] = {c.name: c.items or c.value for c in constants.values()}
     return found
 
@@ -104,7 +114,11 @@ def constant_values(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
 def evaluate_constant(
     formula: Formula, automaton: Automaton, values: Mapping[str, Scalar], what: str
 ) -> float:
-    """Return a formula of parameters, computed in double. Raises SpecError where it is not one."""
+    """Return the value of a formula of parameters, computed in float64.
+
+    `what` names the quantity in messages. SpecError if the formula reads another name, or if the
+    value is not finite.
+    """
     problems = Problems()
     try:
         value = float(
@@ -128,7 +142,11 @@ def evaluate_constant(
 
 
 def evaluate_exactly(formula: Formula, automaton: Automaton) -> Fraction:
-    """Return a formula of fixed parameters exactly (for times). Raises SpecError."""
+    """Return the value of a formula of numbers and parameters as an exact fraction.
+
+    Only the operations + - * /, negation and powers are allowed. SpecError for another expression
+    and for a division by zero.
+    """
     problems = Problems()
 
     def value(tree: SyntaxTree) -> Fraction:

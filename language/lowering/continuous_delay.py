@@ -1,9 +1,9 @@
-"""History of a continuous automaton: `delay` as operations, `after` and `every` as time events.
+"""Delays and timers of a continuous automaton: `delay` as buffers, `after` and `every` as alarms.
 
-A delayed quantity is kept at the major steps, when everything of that instant has happened, and
-read by linear interpolation: a step of it becomes a ramp over one major step. What is read lies at
-least one major step back, so a step of the integration never needs what it computes, and nothing is
-kept while states flow (rule 1). Between two records only the three oldest values are read.
+A delayed quantity is recorded at the major steps, after all events of that instant, and read by
+linear interpolation; a step of it becomes a ramp over one major step. Each delay is at least one
+major step, so a step of the integration never reads values that it computes itself, and nothing is
+recorded during flow (rule 1). Between two records, at most the three oldest values are read.
 """
 
 from __future__ import annotations
@@ -50,14 +50,15 @@ from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula
 
 RECORD_AGE = Ref("memory.age")
-"""Time since the last record [s]; an engine sets it."""
+"""The time since the last record [s]."""
 
 
 @dataclass(frozen=True)
 class ContinuousDelay:
-    """One delayed quantity: `steps` is its delay in major steps, the longest if it is `tunable`.
+    """A delayed quantity; `delay_steps` is its delay in major steps.
 
-    `tunable` is the parameter [s] that the delay is, at least one major step.
+    A tunable delay has the parameter [s] as `tunable_delay` and the upper end of its range as
+    `delay_steps`. It is clipped to one major step at least.
     """
 
     number: int
@@ -72,12 +73,15 @@ class ContinuousDelay:
         return math.ceil(self.delay_steps)
 
     def variable_name(self, part: str) -> str:
-        """Return the variable of a part: `values`, `newest`, `far`, `middle`, `near`."""
+        """Return `memory.<part>_<number>`.
+
+        The parts are values, newest, far, middle, near, delay and count.
+        """
         return f"memory.{part}_{self.number}"
 
 
 def continuous_delays_of(automaton: Automaton) -> tuple[ContinuousDelay, ...]:
-    """Return what a continuous automaton delays, what is inside another delay first."""
+    """Return the delays of a continuous automaton, numbered from 1; inner delays come first."""
     found: list[ContinuousDelay] = []
     for tree in memory_calls_by_key(automaton, ("delay",)).values():
         time, step = tree.arguments[1], automaton.step
@@ -93,7 +97,10 @@ def continuous_delays_of(automaton: Automaton) -> tuple[ContinuousDelay, ...]:
 
 
 def tunable_delay_of(automaton: Automaton, time: SyntaxTree) -> tuple[str, Fraction] | None:
-    """Return the parameter that a time is if it is tunable, and the end of its range [s]."""
+    """Return the parameter that a delay is, and the upper end of its range [s].
+
+    The result is None unless the expression is the name of a tunable parameter with a range.
+    """
     if isinstance(time, Name):
         parameter = automaton.parameters.get(time.path)
         if parameter and parameter.kind == "tunable" and parameter.range:
@@ -104,10 +111,11 @@ def tunable_delay_of(automaton: Automaton, time: SyntaxTree) -> tuple[str, Fract
 def delayed_value_bindings(
     automaton: Automaton, delays: tuple[ContinuousDelay, ...]
 ) -> dict[str, Expr]:
-    """Return what each delayed quantity is at `work.s` after the start of a step.
+    """Return each delayed quantity at `work.s` after the start of a step, by its memory key.
 
-    Counted in major steps back from the last record it is at q - (age + s) / step, q being the
-    delay: between the values N and N - 1 back, N = ceil(q), or between those N - 1 and N - 2 back.
+    Let q be the delay in major steps and N = ceil(q). The value lies q - (age + s) / step major
+    steps before the last record: between the records N and N - 1 steps back, or N - 1 and N - 2
+    steps back.
     """
     found: dict[str, Expr] = {}
     for history in delays:
@@ -129,7 +137,7 @@ def delayed_value_bindings(
 
 
 def _tunable_delay_value(delay: ContinuousDelay, elapsed_steps: Expr) -> Expr:
-    """What a delay of a tunable length is, `elapsed_steps` major steps after the last record."""
+    """Return the value of a tunable delay, `elapsed_steps` major steps after the last record."""
     far, middle, near = (Ref(delay.variable_name(part)) for part in ("far", "middle", "near"))
     last = subtract(Call("real", (Ref(delay.variable_name("count"), is_integer=True),)), real(1.0))
     over = subtract(subtract(Ref(delay.variable_name("delay")), elapsed_steps), last)
@@ -138,26 +146,29 @@ def _tunable_delay_value(delay: ContinuousDelay, elapsed_steps: Expr) -> Expr:
 
 
 def record_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
-    """Return what a major step keeps: all read the values of before it."""
+    """Return the operations that record the delayed quantities at a major step.
+
+    All quantities are evaluated before the first one is stored.
+    """
     ops: list[Op] = []
     commit: list[Op] = []
     for history in delays:
-        kept = Ref(f"work.keep_{history.number}")
+        value = Ref(f"work.keep_{history.number}")
         newest = Ref(history.variable_name("newest"), is_integer=True)
-        ops.append(Assign(kept.name, lower_expression(history.call.arguments[0], known)))
+        ops.append(Assign(value.name, lower_expression(history.call.arguments[0], known)))
         commit.append(Assign(newest.name, _ring_index(history, newest, 1)))
-        commit.append(Store(history.variable_name("values"), newest, kept))
+        commit.append(Store(history.variable_name("values"), newest, value))
         commit += _update_oldest(history)
     return (*ops, *commit)
 
 
 def fill_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
-    """Return what fills each history with the value at the start."""
+    """Return the operations that fill the records of each delay with its present value."""
     ops: list[Op] = []
     for history in delays:
-        kept, slot = Ref(f"work.keep_{history.number}"), Ref("work.slot")
-        ops.append(Assign(kept.name, lower_expression(history.call.arguments[0], known)))
-        store = Store(history.variable_name("values"), slot, kept)
+        value, slot = Ref(f"work.keep_{history.number}"), Ref("work.slot")
+        ops.append(Assign(value.name, lower_expression(history.call.arguments[0], known)))
+        store = Store(history.variable_name("values"), slot, value)
         ops.append(Loop(history.whole_steps + 1, slot.name, (store,)))
         ops.append(Assign(history.variable_name("newest"), integer(0)))
         ops += _update_oldest(history)
@@ -165,17 +176,22 @@ def fill_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Bloc
 
 
 def _interpolate(newer: Ref, older: Ref, fraction: Expr) -> Expr:
+    """Return newer + fraction * (older - newer)."""
     return add(newer, multiply(fraction, subtract(older, newer)))
 
 
 def _ring_index(delay: ContinuousDelay, newest: Ref, offset: int) -> Expr:
-    """The place in the ring that comes `offset` places after the newest value."""
+    """Return the index that lies `offset` places after the newest value in the ring buffer."""
     size = delay.whole_steps + 1
     last = Compare(">=", newest, integer(size - offset))
     return Select(last, subtract(newest, integer(size - offset)), add(newest, integer(offset)))
 
 
 def _update_oldest(delay: ContinuousDelay) -> list[Op]:
+    """Return the operations that copy the oldest records of a delay to far, middle and near.
+
+    A delay of whole major steps does not need `near`.
+    """
     newest = Ref(delay.variable_name("newest"), is_integer=True)
     if delay.tunable_delay is not None:
         return _update_oldest_tunable(delay, newest)
@@ -192,7 +208,7 @@ def _update_oldest(delay: ContinuousDelay) -> list[Op]:
 
 
 def _update_oldest_tunable(history: ContinuousDelay, newest: Ref) -> list[Op]:
-    """The delay as it is now, and the values around its end."""
+    """Return the operations that read a tunable delay and copy the records around it."""
     delay, count = history.variable_name("delay"), history.variable_name("count")
     assert history.tunable_delay is not None
     steps = divide(history.tunable_delay, real(history.major_step))
@@ -214,7 +230,7 @@ def _update_oldest_tunable(history: ContinuousDelay, newest: Ref) -> list[Op]:
 
 
 def continuous_delay_variables(delays: tuple[ContinuousDelay, ...]) -> list[Variable]:
-    """Return the variables of histories; `finished` leaves out what is not used."""
+    """Return the variables of the delays; `finalise_program` removes the unused ones."""
     found = [
         Variable(RECORD_AGE.name, "real", "s", about="time since the last record"),
         Variable("work.slot", "whole"),
@@ -238,7 +254,10 @@ def continuous_delay_variables(delays: tuple[ContinuousDelay, ...]) -> list[Vari
 
 
 def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
-    """Return the times after which an `after` or `every` in a guard is true, by mode."""
+    """Return an alarm for each different `after` and `every` in the guards of each mode.
+
+    The times [s] are exact; `every` repeats.
+    """
     found: list[Alarm] = []
     for mode in automaton.all_modes:
         for tree in _timer_calls(mode).values():
@@ -250,7 +269,7 @@ def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
 
 
 def alarm_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
-    """Return, by the key of a mode, what the times in its guards are."""
+    """Return the alarm variables of `after` and `every`, by key path of mode, then memory key."""
     alarms = iter(alarms_of(automaton))
     return {
         mode.key: {key: Ref(next(alarms).variable) for key in _timer_calls(mode)}
@@ -259,6 +278,7 @@ def alarm_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
 
 
 def _timer_calls(mode: Mode) -> dict[str, FunctionCall]:
+    """Return the different `after` and `every` calls in the guards of a mode, by memory key."""
     parts = [part for t in mode.transitions for part in walk(t.when.tree)]
     found = [
         part for part in parts if isinstance(part, FunctionCall) and part.function in TIME_FUNCTIONS

@@ -1,10 +1,11 @@
-"""Turning: `rising`, `falling` and `changed` in guards of a continuous automaton (rule 8).
+"""Edge detection in guards of a continuous automaton: `rising`, `falling` and `changed` (rule 8).
 
-The level of an edge is its argument, negated for `falling`. The edge is true while the level is
-true and was not at the last instant of the same activation at which everything had happened:
-`memory.level_n`, true on entry. Of `changed` it is any value, the edge is another one than that of
-the last instant, of which there is none on entry: `memory.opposite_n`. A level that turns either
-way is an event of its own, so that an edge does not depend on where the steps end.
+The level of an edge is its argument, negated for `falling`. An edge is true while the level is true
+and was false at the last settled instant of the same activation. `memory.level_<n>` holds the level
+of that instant and is true on entry. The level of `changed` is a value of any type; the edge is
+true while it differs from the value of the last instant. On entry there is no such value, which
+`memory.opposite_<n>` tells. Every change of a level is an event, so an edge does not depend on the
+ends of the steps.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from language.model.automaton import Automaton, Mode
 
 
 def edge_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
-    """Return, by the key of a mode, what the edges in its guards are."""
+    """Return the conditions of edge calls in guards, by key path of the mode, then memory key."""
     found: dict[str, dict[str, Expr]] = {mode.key: {} for mode in automaton.all_modes}
     for edge in edge_detectors_of(automaton):
         is_new = _level_differs(automaton, edge)
@@ -39,7 +40,10 @@ def edge_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
 
 
 def set_levels(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op]:
-    """Return what sets the levels of a mode; those of the other modes of its region stay."""
+    """Return the operations that evaluate the levels of a mode's edges.
+
+    The levels of the other modes of its region keep the value of the last instant.
+    """
     region = {other.key for other in automaton.region(mode.region).modes.values()}
     ops: list[Op] = []
     for edge in edge_detectors_of(automaton):
@@ -56,12 +60,12 @@ def set_levels(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op
 
 
 def level_change_conditions(automaton: Automaton) -> list[Expr]:
-    """Return, for each edge, whether its level is another than at the last instant."""
+    """Return, for each edge, the condition that its level differs from that of the last instant."""
     return [_level_differs(automaton, edge) for edge in edge_detectors_of(automaton)]
 
 
 def store_levels(automaton: Automaton) -> Block:
-    """Return what an instant leaves, when everything has happened."""
+    """Return the assignments that store the levels at the end of a settled instant."""
     found = []
     for edge in edge_detectors_of(automaton):
         found.append(Assign(_last_level_ref(automaton, edge).name, _level_ref(automaton, edge)))
@@ -71,7 +75,7 @@ def store_levels(automaton: Automaton) -> Block:
 
 
 def reset_levels(automaton: Automaton, mode: Mode | None = None) -> Block:
-    """Return what ends with an activation of a mode; of all modes at the start."""
+    """Return the assignments that clear the edge memory of a mode; None stands for all modes."""
     edges = (
         edge_detectors_by_mode(automaton).get(mode.key, ())
         if mode
@@ -86,7 +90,7 @@ def reset_levels(automaton: Automaton, mode: Mode | None = None) -> Block:
 
 
 def level_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the edges."""
+    """Return the variables of the edges of a continuous automaton."""
     found = []
     for edge in edge_detectors_of(automaton):
         kind = edge_value_type(automaton, edge)
@@ -102,17 +106,21 @@ def level_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _level_differs(automaton: Automaton, edge: EdgeDetector) -> Expr:
+    """Return the condition that the level of an edge differs from that of the last instant."""
     other = Compare("!=", _level_ref(automaton, edge), _last_level_ref(automaton, edge))
     return Binary("and", Ref(edge.armed_variable), other) if edge.is_change else other
 
 
 def _level_ref(automaton: Automaton, edge: EdgeDetector) -> Ref:
+    """Return the variable of the level at the instant that is evaluated."""
     return edge_value_ref(automaton, edge, f"work.level_{edge.number}")
 
 
 def _last_level_ref(automaton: Automaton, edge: EdgeDetector) -> Ref:
+    """Return the variable of the level at the last settled instant."""
     return edge_value_ref(automaton, edge, f"memory.level_{edge.number}")
 
 
 def _is_watched_ref(edge: EdgeDetector) -> Ref:
+    """Return the variable of whether the mode of an edge is the one that is evaluated."""
     return Ref(f"work.here_{edge.number}")

@@ -1,8 +1,9 @@
-"""Memory of a sampled automaton: `previous` and `delay` as operations.
+"""Memory of a sampled automaton: `previous` and `delay` as buffers of past values.
 
-A delay of N ticks is a ring of N values; the oldest is overwritten once a tick, when the equations
-of the resulting mode hold and before the updates. Until it was written once, a delayed value is
-the value of now. What guards remember of an activation is in language/activation.py.
+A delay of N ticks is a ring buffer of N values. A tick overwrites the oldest value after the
+equations of the resulting mode are evaluated and before the updates. Until the first write, a
+delayed value equals the present value. `language/lowering/edge_detection.py` holds the memory of
+guards.
 """
 
 from __future__ import annotations
@@ -48,17 +49,18 @@ from language.typecheck.infer import TypeChecker
 from language.typecheck.types import EnumType, IntType
 
 MAX_DELAY = 4096
-"""Longest delay in values kept: 32 kB of an instance."""
+"""The longest delay in values: 32 kB of an instance."""
 
 MAX_REWIND = 64
-"""Longest rewind in ticks kept."""
+"""The longest rewind in ticks."""
 
 IS_DELAY_FILLED = Ref("memory.kept")
+"""The variable that the delay buffers hold values."""
 
 
 @dataclass(frozen=True)
 class SampledDelay:
-    """A value as it was some ticks ago (`ticks` 1: `previous`)."""
+    """The value of a call some ticks ago; `previous` has 1 tick, a delay of 0 ticks has no buffer."""
 
     number: int
     call: FunctionCall
@@ -67,23 +69,26 @@ class SampledDelay:
 
     @property
     def variable_name(self) -> str:
-        """The variable that holds the values: a scalar where there is one, else a ring."""
+        """The variable of the values: a scalar for one tick, else a ring buffer."""
         return f"memory.delay_{self.number}"
 
     @property
     def oldest_index(self) -> str:
-        """The variable that says which value of the ring is the oldest."""
+        """The variable of the index of the oldest value in the ring buffer."""
         return f"memory.oldest_{self.number}"
 
 
 def mode_formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the equations, updates, entries, exits, noises, guards and resets of a mode."""
+    """Yield all formulas of a mode: the equations, then those of `action_formulas`."""
     yield from mode.equations.values()
     yield from action_formulas(mode)
 
 
 def action_formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the formulas of a mode that are no equations."""
+    """Yield the formulas of a mode other than its equations.
+
+    They are updates, entries, exits, process noise, guards, resets and `until` of a rewind.
+    """
     for stage in (mode.update, mode.entry, mode.exit):
         yield from stage.values()
     if mode.observer:
@@ -98,7 +103,7 @@ def action_formulas(mode: Mode) -> Iterator[Formula]:
 def memory_calls_by_key(
     automaton: Automaton, functions: tuple[str, ...]
 ) -> dict[str, FunctionCall]:
-    """Return each different use of some functions, by key; what is inside comes first."""
+    """Return the different calls of some functions by memory key; inner calls come first."""
     found: dict[str, FunctionCall] = {}
     for part in memory_calls(automaton):
         if part.function in functions:
@@ -108,7 +113,7 @@ def memory_calls_by_key(
 
 @cache_on_owner
 def memory_calls(automaton: Automaton) -> tuple[FunctionCall, ...]:
-    """Return every use of a function with memory; what is inside of one comes before it."""
+    """Return all calls of functions with memory, with repetitions; inner calls come first."""
     found: list[FunctionCall] = []
     for tree in _evaluated_trees(automaton):
         found += reversed(
@@ -122,13 +127,13 @@ def memory_calls(automaton: Automaton) -> tuple[FunctionCall, ...]:
 
 
 def uses_function(automaton: Automaton, function: str) -> bool:
-    """Tell whether a function is used anywhere, with memory or without."""
+    """Return whether any expression of an automaton calls a function, with memory or without."""
     parts = (part for tree in _evaluated_trees(automaton) for part in walk(tree))
     return any(isinstance(part, FunctionCall) and part.function == function for part in parts)
 
 
 def _evaluated_trees(automaton: Automaton) -> list[SyntaxTree]:
-    """Return every expression that is evaluated in a mode or in a decision."""
+    """Return every expression of truth tables and modes that is evaluated, flows included."""
     trees = [formula.tree for formula in truth_table_formulas(automaton.tables)]
     for mode in automaton.all_modes:
         trees += [formula.tree for formula in mode_formulas(mode)]
@@ -137,13 +142,16 @@ def _evaluated_trees(automaton: Automaton) -> list[SyntaxTree]:
 
 
 def evaluate_ticks(automaton: Automaton, time: SyntaxTree) -> int:
-    """Return a time of fixed values in ticks, rounded up, exactly (rule 4). Raises SpecError."""
+    """Return ceil(time / period) of a constant time [s], computed exactly (rule 4a).
+
+    SpecError if the time is not made of numbers and parameters.
+    """
     assert automaton.period is not None
     return math.ceil(evaluate_exactly(Formula(time, ""), automaton) / automaton.period)
 
 
 def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
-    """Return what a sampled automaton remembers of its values."""
+    """Return the `previous` and `delay` calls of an automaton, numbered from 1; inner calls first."""
     found: list[SampledDelay] = []
     for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
         ticks = evaluate_ticks(automaton, tree.arguments[1]) if tree.function == "delay" else 1
@@ -153,7 +161,7 @@ def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
 
 
 def expression_type(automaton: Automaton, tree: SyntaxTree) -> ValueType:
-    """Return the type of a checked expression: as the check of dimensions sees it."""
+    """Return the value type of an expression that has passed the type check."""
     scope = NameEnvironment(automaton.name_types, memory_functions=frozenset(MEMORY_FUNCTIONS))
     kind = TypeChecker(scope, Problems()).infer_type(tree)
     if kind == "truth":
@@ -162,7 +170,10 @@ def expression_type(automaton: Automaton, tree: SyntaxTree) -> ValueType:
 
 
 def add_delay_bindings(delays: tuple[SampledDelay, ...], known: NameBindings) -> dict[str, Expr]:
-    """Return what names are, and what each delayed value is."""
+    """Return `known` with the value of each delayed call added under its memory key.
+
+    The value is the buffered one, or the present value until the buffers hold values.
+    """
     found = dict(known)
     for delay in delays:
         now = lower_expression(delay.call.arguments[0], found)
@@ -178,22 +189,25 @@ def add_delay_bindings(delays: tuple[SampledDelay, ...], known: NameBindings) ->
 def record_delays_block(
     automaton: Automaton, delays: tuple[SampledDelay, ...], known: NameBindings
 ) -> Block:
-    """Return what a tick keeps, once its equations hold: all read the values of before it."""
+    """Return the operations that record the delayed values of a tick.
+
+    All values are evaluated before the first one is stored. The first record fills a ring buffer.
+    """
     values: list[Op] = []
     fill: list[Op] = []
     replace: list[Op] = []
     commit: list[Op] = []
     for delay in delays:
-        kept = Ref(f"work.keep_{delay.number}")
+        value = Ref(f"work.keep_{delay.number}")
         if delay.ticks:
-            values.append(Assign(kept.name, lower_expression(delay.call.arguments[0], known)))
+            values.append(Assign(value.name, lower_expression(delay.call.arguments[0], known)))
         if delay.ticks == 1:
-            commit.append(Assign(delay.variable_name, kept))
+            commit.append(Assign(delay.variable_name, value))
         if delay.ticks > 1:
             slot, oldest = Ref("work.slot"), Ref(delay.oldest_index)
-            fill.append(Loop(delay.ticks, slot.name, (Store(delay.variable_name, slot, kept),)))
+            fill.append(Loop(delay.ticks, slot.name, (Store(delay.variable_name, slot, value),)))
             last = Compare("==", oldest, integer(delay.ticks - 1))
-            replace.append(Store(delay.variable_name, oldest, kept))
+            replace.append(Store(delay.variable_name, oldest, value))
             replace.append(Assign(oldest.name, Select(last, integer(0), add(oldest, integer(1)))))
     ring: Block = (Branch(IS_DELAY_FILLED, tuple(replace), tuple(fill)),) if fill else ()
     done: Block = (Assign(IS_DELAY_FILLED.name, Value(True)),) if values else ()
@@ -203,7 +217,7 @@ def record_delays_block(
 def sampled_delay_variables(
     automaton: Automaton, delays: tuple[SampledDelay, ...]
 ) -> list[Variable]:
-    """Return the variables of delays; `finished` leaves out what is not used."""
+    """Return the variables of delays; `finalise_program` removes the unused ones."""
     found = [
         Variable("memory.kept", "truth", about="delayed values are kept"),
         Variable("work.slot", "whole"),
@@ -219,11 +233,12 @@ def sampled_delay_variables(
 
 
 def _describe_delay(delay: SampledDelay) -> str:
+    """Return the comment of the variable of a delay."""
     return "value of the tick before" if delay.ticks == 1 else f"values of {delay.ticks} ticks"
 
 
 def find_memory_call(automaton: Automaton) -> FunctionCall | None:
-    """Return a use of a function with memory, None where there is none."""
+    """Return the first call of a function with memory in the modes of an automaton, or None."""
     for mode in automaton.all_modes:
         trees = [formula.tree for formula in mode_formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]

@@ -1,8 +1,8 @@
-"""Activation: what the guards of a sampled automaton remember since their mode was entered.
+"""Edge detection and activation timers of guards in a sampled automaton (rule 8).
 
-`rising` and `falling` have a truth value each: whether the opposite was seen at the tick before, in
-the same activation. `changed` has the value of the tick before. `after` is a counter of ticks per
-mode, `every` one that begins anew when it is full (rule 8).
+`rising` and `falling` store one truth value: whether the opposite level was present at the previous
+tick of the same activation of the mode. `changed` stores the value of the previous tick. `after` is
+a counter of ticks for each mode; `every` is a counter that restarts at its period.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from language.model.automaton import Automaton, Mode
 
 @dataclass(frozen=True)
 class EdgeDetector:
-    """A `rising`, `falling` or `changed` in the guards of a mode (its key path)."""
+    """A call of `rising`, `falling` or `changed` in the guards of a mode, given by its key path."""
 
     number: int
     mode_key: str
@@ -44,18 +44,18 @@ class EdgeDetector:
 
     @property
     def armed_variable(self) -> str:
-        """The variable: an earlier instant of this activation has what an edge needs."""
+        """The truth value that an earlier tick of this activation allows an edge now."""
         return f"memory.opposite_{self.number}"
 
     @property
     def is_change(self) -> bool:
-        """Tell whether any other value is an edge."""
+        """Whether the call is `changed`, for which each different value is an edge."""
         return self.call.function == "changed"
 
 
 @dataclass(frozen=True)
 class PeriodicTrigger:
-    """An `every` in the guards of a mode: true at each `ticks`-th tick since its entry."""
+    """A call of `every` in the guards of a mode: true each `period_ticks` ticks after its entry."""
 
     timer: str
     mode: Mode
@@ -64,7 +64,7 @@ class PeriodicTrigger:
 
 @cache_on_owner
 def edge_detectors_of(automaton: Automaton) -> tuple[EdgeDetector, ...]:
-    """Return the edges that the guards of each mode read."""
+    """Return the different edge calls in the guards of each mode, numbered from 1."""
     found: dict[tuple[str, str], EdgeDetector] = {}
     for mode in automaton.all_modes:
         for part in _calls_in_guards(mode, EDGE_FUNCTIONS):
@@ -75,7 +75,7 @@ def edge_detectors_of(automaton: Automaton) -> tuple[EdgeDetector, ...]:
 
 @cache_on_owner
 def edge_detectors_by_mode(automaton: Automaton) -> Mapping[str, list[EdgeDetector]]:
-    """Return the edges by the key of the mode whose guards read them."""
+    """Return the edge detectors by the key path of their mode; modes without any are left out."""
     found: dict[str, list[EdgeDetector]] = {}
     for edge in edge_detectors_of(automaton):
         found.setdefault(edge.mode_key, []).append(edge)
@@ -83,17 +83,20 @@ def edge_detectors_by_mode(automaton: Automaton) -> Mapping[str, list[EdgeDetect
 
 
 def edge_value_type(automaton: Automaton, edge: EdgeDetector) -> ValueType:
-    """Return the type of what an edge looks at."""
+    """Return the value type of the argument of an edge call."""
     return expression_type(automaton, edge.call.arguments[0])
 
 
 def edge_value_ref(automaton: Automaton, edge: EdgeDetector, name: str) -> Ref:
-    """Return a variable that holds what an edge looks at."""
+    """Return the reference to a variable `name` with the type of the argument of an edge call."""
     return Ref(name, edge_value_type(automaton, edge) == "whole")
 
 
 def guard_memory_bindings(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
-    """Return what the edges and times of a mode's guards are."""
+    """Return the conditions of the edge, `after` and `every` calls in a mode's guards.
+
+    The keys are the memory keys of the calls. `after` of a time of 0 ticks is true.
+    """
     found: dict[str, Expr] = {}
     for edge in edge_detectors_by_mode(automaton).get(mode.key, ()):
         found[memory_key(edge.call)] = Ref(f"work.edge_{edge.number}")
@@ -111,7 +114,7 @@ def guard_memory_bindings(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
 
 
 def detect_edges(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op]:
-    """Return the edges of now, and what they leave for the next tick."""
+    """Return the operations that set `work.edge_<n>` of a mode's edges and store their levels."""
     ops: list[Op] = []
     for edge in edge_detectors_by_mode(automaton).get(mode.key, ()):
         level, seen = lower_expression(edge.call.arguments[0], known), Ref(edge.armed_variable)
@@ -130,7 +133,11 @@ def detect_edges(automaton: Automaton, mode: Mode, known: NameBindings) -> list[
 
 
 def count_ticks(automaton: Automaton) -> Iterator[Op]:
-    """One more tick was spent in the mode."""
+    """Yield the operations that count a tick for each `after` and `every` whose mode is active.
+
+    after    timer.after_n += 1 if its mode is active, up to the longest time of that mode
+    every    timer.every_n = 1 if timer.every_n >= period else timer.every_n + 1
+    """
     for timer, mode, longest in _after_timers(automaton).values():
         yield Count(timer, _is_active(automaton, mode), longest, f"{automaton.name} {mode.key}")
     for beat in _periodic_triggers(automaton).values():
@@ -141,7 +148,7 @@ def count_ticks(automaton: Automaton) -> Iterator[Op]:
 
 
 def reset_activation(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
-    """Return what a transition forgets: the edges of its source; its target's time starts."""
+    """Return the operations that disarm the edges of `source` and start the timers of `target`."""
     ops: list[Op] = [
         Assign(edge.armed_variable, Value(False))
         for edge in edge_detectors_by_mode(automaton).get(source.key, ())
@@ -150,7 +157,7 @@ def reset_activation(automaton: Automaton, source: Mode, target: Mode) -> list[O
 
 
 def start_timers(automaton: Automaton, target: Mode) -> list[Op]:
-    """Return what starts the times in a mode that is entered."""
+    """Return the operations that set the `after` and `every` counters of an entered mode to 0."""
     timers = _after_timers(automaton)
     ops: list[Op] = []
     if target.key in timers:
@@ -160,7 +167,7 @@ def start_timers(automaton: Automaton, target: Mode) -> list[Op]:
 
 
 def activation_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of edges and times."""
+    """Return the variables of edge detectors and of the counters of `after` and `every`."""
     found: list[Variable] = []
     for edge in edge_detectors_of(automaton):
         kind = edge_value_type(automaton, edge)
@@ -184,6 +191,7 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _is_active(automaton: Automaton, mode: Mode) -> Expr:
+    """Return the condition that a mode is active."""
     if automaton.statechart:
         node = next(node for node in automaton.statechart.nodes if node.mode_key == mode.key)
         return is_active(automaton.statechart, node, "memory.mode")
@@ -192,7 +200,10 @@ def _is_active(automaton: Automaton, mode: Mode) -> Expr:
 
 @cache_on_owner
 def _after_timers(automaton: Automaton) -> dict[str, tuple[str, Mode, int]]:
-    """Return, by mode, the counter of its ticks and how far it counts."""
+    """Return, by the key path of a mode, its counter, the mode and the longest `after` in ticks.
+
+    Modes without an `after` of at least one tick are left out.
+    """
     found: dict[str, tuple[str, Mode, int]] = {}
     for mode in automaton.all_modes:
         afters = _calls_in_guards(mode, ("after",))
@@ -204,7 +215,7 @@ def _after_timers(automaton: Automaton) -> dict[str, tuple[str, Mode, int]]:
 
 @cache_on_owner
 def _periodic_triggers(automaton: Automaton) -> dict[tuple[str, str], PeriodicTrigger]:
-    """Return each different `every`, by the key of its mode and its own."""
+    """Return each different `every` by the key path of its mode and its memory key."""
     found: dict[tuple[str, str], PeriodicTrigger] = {}
     for mode in automaton.all_modes:
         for part in _calls_in_guards(mode, ("every",)):
@@ -215,5 +226,6 @@ def _periodic_triggers(automaton: Automaton) -> dict[tuple[str, str], PeriodicTr
 
 
 def _calls_in_guards(mode: Mode, functions: tuple[str, ...]) -> list[FunctionCall]:
+    """Return the calls of some functions in the guards of a mode, in order, with repetitions."""
     parts = [part for way in mode.transitions for part in walk(way.when.tree)]
     return [part for part in parts if isinstance(part, FunctionCall) and part.function in functions]

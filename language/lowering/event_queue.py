@@ -1,9 +1,9 @@
-"""Event: those of a chart - as inputs, in the queue of a macro-step, and in guards.
+"""Events of a chart: inputs, the queue of a macro-step, and the events of transitions (rule 15c).
 
-A tick puts the events whose input is true into the queue, in the order in which they are declared;
-a transition that `raise`s one appends it. A micro-step has one event or none: the first one that
-of the queue's head; after that transitions without an event go on until none is enabled, then the
-next event is taken. What no transition takes is lost (rule 15c; SCXML: run to completion).
+In a tick, the events whose input is true enter the queue in the order of their declaration. A
+transition with `raise` appends an event. A micro-step has one event or none. After the micro-step
+of an event, transitions without an event are taken until none is enabled; then the next event is
+taken from the queue. An event that enables no transition is lost (SCXML: run to completion).
 """
 
 from __future__ import annotations
@@ -38,11 +38,14 @@ QUEUE_HEAD = Ref("work.head")
 QUEUE_TAIL = Ref("work.tail")
 CURRENT_EVENT = Ref("work.event")
 HAS_WAITING_EVENT = Compare("<", QUEUE_HEAD, QUEUE_TAIL)
-"""Whether an event waits in the queue."""
+"""The condition that the queue is not empty."""
 
 
 def event_inputs(chart: Chart, section: YamlNode | None) -> dict[str, Input]:
-    """Return the events that come from outside as inputs: there in a tick where they are true."""
+    """Return the input events of a chart as inputs of type bool, by name.
+
+    `section` is the `events` section of the document, which gives their places.
+    """
     found = {}
     for signal in chart.events.values():
         if signal.is_input and isinstance(section, MappingNode):
@@ -54,14 +57,18 @@ def event_inputs(chart: Chart, section: YamlNode | None) -> dict[str, Input]:
 
 
 def queue_capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
-    """Return how many events the queue of a tick holds: more could not be taken anyway."""
+    """Return the number of places of the queue of a tick.
+
+    It is the number of input events, plus the bound of micro-steps if a transition raises events: a
+    tick cannot take more of them.
+    """
     raised = any(way.raises for way in transitions)
     inputs = sum(signal.is_input for signal in chart.events.values())
     return inputs + (chart.micro_steps if raised else 0)
 
 
 def enqueue_input_events(chart: Chart) -> Block:
-    """Return what puts the events of a tick into the queue, and takes the first."""
+    """Return the operations that fill the queue with a tick's input events and take the first."""
     ops: list[Op] = [Assign(QUEUE_HEAD.name, integer(0)), Assign(QUEUE_TAIL.name, integer(0))]
     for signal in chart.events.values():
         if signal.is_input:
@@ -74,7 +81,7 @@ def enqueue_input_events(chart: Chart) -> Block:
 
 
 def enqueue_event(chart: Chart, name: str, capacity: int) -> Block:
-    """Return what appends an event to the queue; where that is full it is lost, with a fault."""
+    """Return the operations that append an event; a full queue loses it and sets a fault bit."""
     fits = Compare("<", QUEUE_TAIL, integer(capacity))
     return (
         Branch(fits, _append_event(chart.events[name].number), (FaultBit(MICRO_STEP_LIMIT_FAULT),)),
@@ -82,6 +89,7 @@ def enqueue_event(chart: Chart, name: str, capacity: int) -> Block:
 
 
 def _append_event(number: int) -> Block:
+    """Return the operations that append an event number to the queue without a test for room."""
     return (
         Store(QUEUE, QUEUE_TAIL, integer(number)),
         Assign(QUEUE_TAIL.name, add(QUEUE_TAIL, integer(1))),
@@ -89,7 +97,7 @@ def _append_event(number: int) -> Block:
 
 
 def dequeue_event() -> Block:
-    """Return what takes the first event of the queue."""
+    """Return the operations that make the first event of the queue the current one."""
     return (
         Assign(CURRENT_EVENT.name, Item(QUEUE, QUEUE_HEAD, True)),
         Assign(QUEUE_HEAD.name, add(QUEUE_HEAD, integer(1))),
@@ -97,7 +105,7 @@ def dequeue_event() -> Block:
 
 
 def event_condition(chart: Chart, transition: Transition) -> Expr | None:
-    """Return whether the event of this micro-step is one of a transition's; None if it has none."""
+    """Return the condition that the current event is one of a transition's; None if it has none."""
     found: Expr | None = None
     for name in transition.events:
         here = Compare("==", CURRENT_EVENT, integer(chart.events[name].number))
@@ -106,7 +114,7 @@ def event_condition(chart: Chart, transition: Transition) -> Expr | None:
 
 
 def event_queue_variables(capacity: int) -> list[Variable]:
-    """Return the queue of a tick."""
+    """Return the variables of the queue and of the current event."""
     found = [
         Variable(
             QUEUE_HEAD.name, "whole", about="place in the queue of the event that is heard next"

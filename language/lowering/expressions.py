@@ -1,4 +1,7 @@
-"""Lower: expressions and formulas of a model to expressions and operations of a Program."""
+"""Lowering of expressions, equations and balances to expressions and operations of a Program.
+
+The order of operations of the source is kept and nothing is simplified (rule 17b).
+"""
 
 from __future__ import annotations
 
@@ -54,17 +57,22 @@ from language.typecheck.integer_functions import lower_integer_call
 
 WHOLE_TYPES = ("int", "enum")
 NameBindings = Mapping[str, Expr]
-"""What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`,
-what functions with memory are under their `memory_key`."""
+"""The Program's expression of each name of the model at one place of the Program.
+
+`in(x.y)` has the key `in x.y`; a call of a function with memory has its `memory_key`.
+"""
 
 
 def lower_expression(tree: SyntaxTree, known: NameBindings) -> Expr:
-    """Return the Program's expression of a tree: same order of operations, nothing simplified."""
+    """Return the Program's expression of a syntax tree, in the same order of operations.
+
+    A whole number beside a real is converted to a real. A name that `known` lacks raises KeyError.
+    """
     return _lower_typed(tree, known)[0]
 
 
 def _lower_typed(tree: SyntaxTree, known: NameBindings) -> tuple[Expr, bool]:
-    """Return the expression of a tree, and whether its value is a whole number."""
+    """Return the Program's expression of a tree, and whether its value is a whole number."""
     match tree:
         case Name(path, _):
             return known[path], is_whole(known[path])
@@ -76,8 +84,8 @@ def _lower_typed(tree: SyntaxTree, known: NameBindings) -> tuple[Expr, bool]:
             first, second, whole = _lower_operands(left, right, known)
             return Binary(operator, first, second), whole  # type: ignore[arg-type]
         case FunctionCall():
-            made = _lower_application(tree, known)
-            return made, is_whole(made)
+            call = _lower_application(tree, known)
+            return call, is_whole(call)
         case BoolLiteral(value, _):
             return Value(value), False
         case Negation(operand, _):
@@ -101,7 +109,12 @@ def _lower_typed(tree: SyntaxTree, known: NameBindings) -> tuple[Expr, bool]:
 
 
 def _lower_application(tree: FunctionCall, known: NameBindings) -> Expr:
-    """Return a call; what reads the automaton's mode, memory or tables is known by its key."""
+    """Return the expression of a function call.
+
+    `in(...)` and functions with memory are looked up in `known`; `lookup` passes the axes, the
+    sizes and the values of its table; a function of whole numbers is lowered by
+    `lower_integer_call`.
+    """
     match tree:
         case FunctionCall("in", (Name(path, _),), _):
             return known[f"in {path}"]
@@ -127,16 +140,23 @@ def _lower_application(tree: FunctionCall, known: NameBindings) -> Expr:
 def _lower_whole_arguments(
     arguments: Sequence[SyntaxTree], known: NameBindings
 ) -> list[Expr] | None:
-    """Return arguments as whole numbers, where they are and literals beside them; else None."""
-    made = [_lower_typed(argument, known) for argument in arguments]
-    if not is_integer_call(arguments, [whole for _, whole in made]):
+    """Return the arguments as whole numbers; None if the call is not one of whole numbers.
+
+    A literal like `2` counts as a whole number if another argument is one.
+    """
+    lowered = [_lower_typed(argument, known) for argument in arguments]
+    if not is_integer_call(arguments, [whole for _, whole in lowered]):
         return None
-    pairs = zip(arguments, made, strict=True)
+    pairs = zip(arguments, lowered, strict=True)
     return [expr if whole else Value(integer_literal(tree) or 0) for tree, (expr, whole) in pairs]
 
 
 def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> Expr:
-    """Return the expression of a tree for a target that is whole, or not."""
+    """Return the expression of a tree, converted to the type of its target.
+
+    If `whole` is true the result is a whole number, by the call `whole` where the tree is a real;
+    otherwise it is a real.
+    """
     number = integer_literal(tree)
     if whole and number is not None:
         return Value(number)
@@ -147,12 +167,12 @@ def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> 
 
 
 def to_real(expr: Expr) -> Expr:
-    """Return an expression that is whole as a real."""
+    """Return the expression converted to a real; one that is not a whole number is unchanged."""
     return Call("real", (expr,)) if is_whole(expr) else expr
 
 
 def is_whole(expr: Expr) -> bool:
-    """Tell whether the value of an expression is a whole number (an enumeration's too)."""
+    """Return whether the value of an expression is a whole number; values of enumerations are."""
     match expr:
         case Ref(_, whole) | Item(_, _, whole):
             return whole
@@ -171,6 +191,7 @@ def is_whole(expr: Expr) -> bool:
 
 
 def _lower_real(tree: SyntaxTree, known: NameBindings) -> Expr:
+    """Return the Program's expression of a tree, converted to a real if it is a whole number."""
     value, whole = _lower_typed(tree, known)
     return Call("real", (value,)) if whole else value
 
@@ -178,9 +199,10 @@ def _lower_real(tree: SyntaxTree, known: NameBindings) -> Expr:
 def _lower_operands(
     left: SyntaxTree, right: SyntaxTree, known: NameBindings
 ) -> tuple[Expr, Expr, bool]:
-    """Two operands of one type and whether they are whole.
+    """Return two operands of one type, and whether they are whole numbers.
 
-    A literal like `2` beside a whole number is one, else they are reals.
+    A literal like `2` beside a whole number becomes a whole number. Otherwise both become reals if
+    one of them is.
     """
     (first, is_first), (second, is_second) = _lower_typed(left, known), _lower_typed(right, known)
     if is_first == is_second:
@@ -193,7 +215,10 @@ def _lower_operands(
 
 
 def _expand_power(base: Expr, exponent: int) -> Expr:
-    """x^n by multiplications from the left; a negative n divides 1 by it."""
+    """Return base^exponent as multiplications from left to right.
+
+    A negative exponent gives 1 divided by the product, the exponent 0 gives 1.0.
+    """
     if exponent == 0:
         return real(1.0)
     result = base
@@ -203,7 +228,10 @@ def _expand_power(base: Expr, exponent: int) -> Expr:
 
 
 def lower_rate(balance: Balance, known: NameBindings) -> Expr:
-    """Return der(state): the right side, divided once by the coefficient."""
+    """Return der(state) of a balance: its right side divided by the coefficient of the derivative.
+
+    A coefficient of 1 is left out. SpecError if the left side has no such coefficient.
+    """
     factor = coefficient_of(balance.left, balance.state)
     if isinstance(factor, SpecError):
         raise factor
@@ -218,9 +246,11 @@ def lower_equations(
     prefix: str,
     required_names: Iterable[str] | None = None,
 ) -> list[Op]:
-    """Return the assignments of a mode's equations in order, and make them known.
+    """Return the assignments `<group><name> = ...` of a mode's equations, in evaluation order.
 
-    `required_names` limits them to those that these names need, directly or through others.
+    `required_names` limits them to the equations that these names need, directly or through other
+    equations. `known` is changed: it gets the variable of each equation. `prefix` opens the key
+    paths.
     """
     order = equation_order(mode)
     needed = set(order) if required_names is None else equation_closure(mode, required_names)
@@ -234,7 +264,10 @@ def lower_equations(
 
 
 def _lower_equation(mode: Mode, name: str, known: NameBindings, group: str, prefix: str) -> Op:
-    """Return what sets an equation: one formula, or that of the active mode of a region beside."""
+    """Return the operation that sets an equation of a mode.
+
+    An equation that a parallel region defines becomes a Switch over the mode of that region.
+    """
 
     def set_to(formula: Formula) -> Assign:
         value = lower_assigned_value(formula.tree, known, formula.is_integer)
@@ -251,7 +284,7 @@ def _lower_equation(mode: Mode, name: str, known: NameBindings, group: str, pref
 
 
 def choose_by_mode(region: Region, known: NameBindings, blocks: Mapping[str, Block]) -> Switch:
-    """Return the choice of a block by the mode that a region is in."""
+    """Return a Switch over the mode of a region; `blocks` has a block for each mode by its name."""
     selector = known[f"mode {region.name}"]
     assert isinstance(selector, Ref)
     cases = tuple((region.modes[name].number, block) for name, block in blocks.items())
@@ -259,7 +292,7 @@ def choose_by_mode(region: Region, known: NameBindings, blocks: Mapping[str, Blo
 
 
 def equation_bindings(automaton: Automaton, prefix: str) -> dict[str, Expr]:
-    """Return the equations of all modes as what a Program reads."""
+    """Return the variable `<prefix><name>` of each equation of any mode, by name."""
     return {
         name: Ref(f"{prefix}{name}", whole) for name, whole in _whole_equations(automaton).items()
     }
@@ -267,13 +300,17 @@ def equation_bindings(automaton: Automaton, prefix: str) -> dict[str, Expr]:
 
 @cache_on_owner
 def _whole_equations(automaton: Automaton) -> dict[str, bool]:
-    """Return, for each equation that any mode has, whether it is a whole number."""
+    """Return, for each equation of any mode, whether its value is a whole number."""
     modes = automaton.all_modes
     return {name: formula.is_integer for mode in modes for name, formula in mode.equations.items()}
 
 
 def variable_bindings(automaton: Automaton, input_group: str) -> dict[str, Expr]:
-    """Return inputs (of a group), states and discrete variables as what a Program reads."""
+    """Return the variables of inputs, states and discrete variables, by name.
+
+    An input is `<input_group>.<name>`, or `latched.<name>` if the group is `input` and the input is
+    held in a range.
+    """
     found: dict[str, Expr] = {}
     for name, thing in automaton.inputs.items():
         group = (
@@ -289,5 +326,5 @@ def variable_bindings(automaton: Automaton, input_group: str) -> dict[str, Expr]
 
 
 def names_read(trees: Iterable[SyntaxTree]) -> list[str]:
-    """Return the names read in some trees."""
+    """Return the names that some trees read, in order, with repetitions."""
     return [read.path for tree in trees for read in names(tree)]

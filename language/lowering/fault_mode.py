@@ -1,4 +1,4 @@
-"""Fault: the names of the bits, and the transitions into the fault mode (rules 13 and 18)."""
+"""Fault bits and the transitions into the fault mode (rules 13 and 18b)."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ from language.model.statechart import Chart, ChartTransition
 from language.text.diagnostic import Problems
 
 FAULT_GUARD = "fault happened"
-"""The name under which the guard of these transitions is known; no spec can write it."""
+"""The name that the guard of these transitions reads; a spec cannot contain it."""
 FAULT_PRIORITY = -1
-"""Their priority: before all that a spec can write."""
+"""The priority of these transitions, which precedes each priority that a spec can contain."""
 
 
 def add_fault_transitions(automaton: Automaton) -> Automaton:
-    """Return an automaton that enters its fault mode, from every other mode, when a fault asks."""
+    """Return the automaton with a transition from every other mode into its fault mode.
+
+    An automaton without a fault mode is returned unchanged.
+    """
     if automaton.fault_mode is None:
         return automaton
     modes = {name: _add_fault_transition(automaton, mode) for name, mode in automaton.modes.items()}
@@ -34,7 +37,7 @@ def add_fault_transitions(automaton: Automaton) -> Automaton:
 
 
 def _add_chart_transitions(automaton: Automaton, chart: Chart) -> Chart:
-    """Return a chart that knows what these transitions leave."""
+    """Return the chart with these transitions and the nodes that they leave."""
     target = mode_paths(chart)[automaton.fault_mode or ""]
     ways = dict(chart.transitions)
     for leaf in chart.leaves(CHART):
@@ -44,6 +47,7 @@ def _add_chart_transitions(automaton: Automaton, chart: Chart) -> Chart:
 
 
 def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
+    """Return a mode with the transition into the fault mode; modes inside it are unchanged."""
     if f"{mode.name}.".startswith(f"{automaton.fault_mode}."):
         return mode
     assert automaton.fault_mode is not None
@@ -65,7 +69,10 @@ def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
 def fault_names(
     automaton: Automaton, blocks: Mapping[str, Block], extra: Iterable[str], problems: Problems
 ) -> tuple[str, ...]:
-    """Return the faults that are declared, then `extra`, then all others that something sets."""
+    """Return the fault bits: the declared ones, then `extra`, then those of ranges in use.
+
+    SpecError if there are more than MAX_FAULT_BITS.
+    """
     ops = [op for block in blocks.values() for op in walk_ops(block)]
     named = {op.fault for op in ops if isinstance(op, FaultBit)}
     own = [fault for fault in map(range_fault_of, saturable_variables(automaton)) if fault in named]

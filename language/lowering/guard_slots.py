@@ -1,4 +1,4 @@
-"""Positions of guards in the array of guard values of a mode."""
+"""Guard slots: the suffixes of the variables that hold the guards of the active modes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,19 @@ from language.model.chart_paths import mode_paths
 
 
 def guard_slot(region: str, index: int) -> str:
-    """Return the ending of the variables of a mode's guard: `guard_0`, `guard_gap_0`."""
+    """Return the suffix of a guard: `<index>` in the chart, `<region>_<index>` in another region.
+
+    The variables are `work.guard_<suffix>` and `memory.armed_<suffix>`.
+    """
     return str(index) if region == CHART else f"{region.replace('.', '_')}_{index}"
 
 
 @cache_on_owner
 def guard_slots(mode: Mode) -> list[str]:
-    """Return the endings of all guards that are watched while a mode of the chart is active."""
+    """Return the suffixes of all guards that are watched while a mode of the chart is active.
+
+    They are those of the mode itself, then those of its parallel regions.
+    """
     own = [guard_slot(CHART, index) for index in range(len(mode.transitions))]
     return own + [
         guard_slot(r.name, index)
@@ -29,7 +35,7 @@ def guard_slots(mode: Mode) -> list[str]:
 
 @cache_on_owner
 def all_guard_slots(automaton: Automaton) -> list[str]:
-    """Return the endings of the guard variables of an automaton."""
+    """Return the suffixes of the guard variables of all regions of an automaton."""
     return [
         guard_slot(r.name, index)
         for r in automaton.all_regions
@@ -38,7 +44,11 @@ def all_guard_slots(automaton: Automaton) -> list[str]:
 
 
 def mode_bindings(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:
-    """Return what `in(region.mode)` is, and under `mode region` the variable that says it."""
+    """Return the conditions `in <region>.<mode>` and the mode variables `mode <region>`, by key.
+
+    `base` is the mode variable of the chart; `prefix` stands before the names of regions. In a
+    chart with nested modes the conditions are those of the paths of its nodes.
+    """
     bindings: dict[str, Expr] = {}
     if automaton.statechart:
         for path, node in mode_paths(automaton.statechart).items():

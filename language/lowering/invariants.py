@@ -1,6 +1,7 @@
-"""Invariant: assertions about modes, which the engine checks and C leaves out (rule 11).
+"""Invariants: assertions about modes that the engine checks and C leaves out (rule 11b).
 
-Block `invariants` sets `check.<mode>_<name>` for those of the active modes; nothing reads them.
+The block `invariants` sets `check.<mode>_<name>` for each invariant of the active modes. No other
+block reads these variables.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from language.lowering.expressions import NameBindings, equation_bindings, lower
 from language.model.automaton import Automaton
 
 INVARIANTS = "invariants"
-"""The block; generated code has it not."""
+"""The name of the block; generated C does not contain it."""
 INVARIANT_PREFIX = "check."
 
 
@@ -31,18 +32,18 @@ def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
 
 
 def invariant_variables(automaton: Automaton) -> list[Variable]:
-    """Return what holds the truth of each invariant."""
+    """Return the variable of the truth value of each invariant."""
     return [
         Variable(info.variable, "truth", about=info.name) for info in invariant_infos(automaton)
     ]
 
 
 def invariant_blocks(automaton: Automaton, known: NameBindings) -> dict[str, Block]:
-    """Return the block that looks at the active modes; nothing where there are no invariants."""
+    """Return the block that evaluates the invariants of the active modes; empty without any."""
     if not invariant_infos(automaton):
         return {}
     here = {**known, **equation_bindings(automaton, "equation.")}
-    found: list[Switch] = []
+    switches: list[Switch] = []
     for region in automaton.all_regions:
         cases: list[tuple[int, Block]] = []
         for mode in region.modes.values():
@@ -57,5 +58,5 @@ def invariant_blocks(automaton: Automaton, known: NameBindings) -> dict[str, Blo
             if ops:
                 cases.append((mode.number, ops))
         if cases:
-            found.append(Switch(mode_variable("memory.mode", region.name), tuple(cases)))
-    return {INVARIANTS: tuple(found)}
+            switches.append(Switch(mode_variable("memory.mode", region.name), tuple(cases)))
+    return {INVARIANTS: tuple(switches)}

@@ -1,4 +1,4 @@
-"""Linear: the balances of a mode as rates, and their matrices at a point, as expressions."""
+"""Linearisation: rates, Jacobians and affine offsets of the flow of a mode, as expressions."""
 
 from __future__ import annotations
 
@@ -43,17 +43,21 @@ from language.numerics.evaluate import Scalar, evaluate
 from language.text.diagnostic import Problems, SpecError
 
 MAX_INLINED_NODES = 20_000
-"""Names, numbers and operations of an equation with all others put in; those shipped have 100."""
+"""The largest number of names, numbers and operations of an equation with all others inlined.
+
+The shipped examples have about 100.
+"""
 
 SymbolicMatrix = dict[str, dict[str, SyntaxTree]]
-"""A matrix by the names of its rows and columns, zeros left out."""
+"""A matrix of expressions by the names of row and column; entries that are zero are left out."""
 
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Where a flow is made linear: some names with their values, as expressions.
+    """A point of linearisation: the expressions of some names at the point.
 
-    `values` are those of the constants of `automaton`, whose parameters the values may read.
+    `constant_values` are the values of the constants of `automaton`, whose parameters the
+    expressions in `substitutions` may read.
     """
 
     automaton: Automaton
@@ -62,7 +66,10 @@ class LinearisationPoint:
 
     @property
     def evaluator(self) -> PointValue:
-        """The value of an expression at the point. Raises SpecError where a name has none."""
+        """A function that returns the value of an expression at the point.
+
+        It raises SpecError if a name has no value there.
+        """
         known = constant_bindings(self.automaton)
 
         def at(tree: SyntaxTree) -> Scalar:
@@ -77,27 +84,29 @@ class LinearisationPoint:
 
 
 def inline_equations(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
-    """Return the equations of a mode in states, inputs and parameters; some names are given.
+    """Return the equations of a mode in terms of states, inputs and parameters, by name.
 
-    Raises SpecError where they would be too large: each read of an equation copies it.
+    `substitutions` replaces names and is part of the result. Equations of parallel regions are not
+    inlined. SpecError if an equation would exceed MAX_INLINED_NODES, since each read copies it.
     """
     if exceeds_inlining_limit(mode):
         problems = Problems()
         label = f"the equations of mode `{mode.name}` are too large to be put into each other"
-        hint = f"they would have more than {MAX_INLINED_NODES} parts; write the matrices, or fewer steps"
+        hint = f"they would have more than {MAX_INLINED_NODES} parts; "
+        hint += "write the matrices, or fewer steps"
         problems.error("expression", mode.span, label, hint)
         raise SpecError(problems.reported)
     known = dict(substitutions)
     own = [name for name in equation_order(mode) if name in mode.equations]
-    for name in own:  # those of a region beside are not known: its mode chooses them
+    for name in own:  # equations of parallel regions depend on the mode of the region
         known[name] = substitute_names(mode.equations[name].tree, known)
     return known
 
 
 def exceeds_inlining_limit(mode: Mode) -> bool:
-    """Tell whether the equations of a mode, put into each other, have more parts than are handled.
+    """Return whether an inlined equation of a mode has more than MAX_INLINED_NODES parts.
 
-    An equation that is read twice by the next, and so on 50 times, would have 2^50 parts.
+    The size grows fast: 50 equations that each read the one before twice give 2^50 parts.
     """
     sizes: dict[str, int] = {}
     for name in equation_order(mode):
@@ -109,7 +118,10 @@ def exceeds_inlining_limit(mode: Mode) -> bool:
 
 
 def symbolic_rates(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
-    """Return der(x) of every state of a mode, with what is known put in."""
+    """Return der(x) of each state of a mode's flow, with `substitutions` applied to both sides.
+
+    SpecError if a balance has no coefficient of der(x).
+    """
     found = {}
     for name, balance in mode.flow.items():
         factor = coefficient_of(balance.left, name)
@@ -125,7 +137,11 @@ def symbolic_rates(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[
 def symbolic_jacobian(
     trees: Mapping[str, SyntaxTree], columns: Iterable[str], point: LinearisationPoint
 ) -> SymbolicMatrix:
-    """Return the derivatives of the trees (rows) by the columns at the point. Raises SpecError."""
+    """Return the derivatives of the trees (rows) by the columns at a point.
+
+    Zero entries and empty rows are left out. SpecError if a derivative does not exist, or if the
+    point does not decide which branch of a condition is taken.
+    """
     found: SymbolicMatrix = {}
     columns = tuple(columns)
     for row, tree in trees.items():
@@ -144,9 +160,10 @@ def symbolic_jacobian(
 def affine_offset(
     tree: SyntaxTree, columns: Collection[str], point: LinearisationPoint
 ) -> SyntaxTree:
-    """Return what the tangent of a tree has besides slope * column: its value where these are 0.
+    """Return the value of the tangent of a tree where all columns are 0.
 
-    Sums are taken apart, so that only the terms that are not linear read the point.
+    The tangent is taken at the point. Sums and products are split, so only nonlinear terms read the
+    point. SpecError if a nonlinear term reads a column without a value.
     """
 
     def inside(part: SyntaxTree) -> SyntaxTree:
@@ -178,13 +195,14 @@ def affine_offset(
 
 
 def _reads_any(tree: SyntaxTree, columns: Collection[str]) -> bool:
+    """Return whether a tree reads one of the columns."""
     return any(read.path in columns for read in names(tree))
 
 
 def _nonlinear_offset(
     tree: SyntaxTree, columns: Collection[str], point: LinearisationPoint
 ) -> SyntaxTree:
-    """The value at the point less slope * column there."""
+    """Return the value of a tree at the point minus the sum of slope * column there."""
     result = substitute_names(tree, point.substitutions)
     for column in dict.fromkeys(read.path for read in names(tree) if read.path in columns):
         if column not in point.substitutions:
@@ -197,11 +215,12 @@ def _nonlinear_offset(
 
 
 def _point_hint(name: str) -> str:
+    """Return the help that asks for the value of a name at the point."""
     return f"give its point: `at: {{{name}: ...}}`"
 
 
 def affine_form(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxTree:
-    """Return the sum of slope * column, plus the rest."""
+    """Return the sum of slope * column over all columns, plus the offset."""
     parts = [multiply(slope, Name(column, offset.span)) for column, slope in slopes.items()]
     return reduce(add, [*parts, offset])
 
@@ -209,9 +228,10 @@ def affine_form(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxT
 def linearise_model(
     model: Automaton, run: ModelRun, point: LinearisationPoint, problems: Problems
 ) -> Automaton:
-    """Return the model with affine flows: what is linear stays, what is curved has its tangent.
+    """Return the model with the flow of each mode replaced by its tangent at the point of a run.
 
-    Equations and guards stay as they are. `point` gives values and parameters, not yet places.
+    Linear terms stay as they are; equations and guards are unchanged. `run.linearise` gives the
+    point; `point` supplies constants only. A mode without a tangent is reported and stays as it is.
     """
     places = {name: formula.tree for name, formula in (run.linearise or {}).items()}
     there = dataclasses.replace(point, substitutions=places)
@@ -224,6 +244,7 @@ def linearise_model(
 
 
 def _linearise_mode(mode: Mode, run: ModelRun, point: LinearisationPoint) -> Mode:
+    """Return a mode with an affine flow; SpecError if a slope reads anything but parameters."""
     flow = symbolic_rates(mode, inline_equations(mode, {}))
     slopes = symbolic_jacobian(flow, tuple(flow), point)
     problems = Problems()

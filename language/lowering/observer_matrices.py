@@ -1,4 +1,4 @@
-"""Derived: an observer's A, B, C and what remains, taken from a mode of the model."""
+"""Symbolic matrices of an observer, derived from a mode of the model."""
 
 from __future__ import annotations
 
@@ -30,11 +30,12 @@ def derive_observer_matrices(
     values: Mapping[str, Scalar],
     problems: Problems,
 ) -> Observer | None:
-    """Return an observer with the matrices of its mode of the model; None where reported.
+    """Return an observer with the matrices of its mode of the model, as formulas.
 
-    dx/dt = A x + B u + f with A and B at the point `at`; f, read each tick, is what remains of the
-    balances: it holds the values of states and inputs that are not in x and u. Measurements of
-    equations likewise: y = C x + g. `name` is that of the mode here.
+    dx/dt = A x + B u + f and y = C x + g. A, B and C are derivatives at the point `at`. f and g
+    hold the other terms, with values of states and inputs that are not in x and u. `name` is the
+    mode of this automaton. An observer without `of` is returned unchanged; None means a reported
+    problem.
     """
     model = automaton.model
     if observer.of is None or model is None:
@@ -45,18 +46,18 @@ def derive_observer_matrices(
         known = inline_equations(mode, _default_inputs(automaton, observer))
         flow = symbolic_rates(mode, known)
         _check_states(automaton, observer, mode, flow)
-        seen = _output_equations(observer, mode, known)
+        outputs = _output_equations(observer, mode, known)
         point = LinearisationPoint(automaton, values, at)
         balances = {name: flow[name] for name in observer.states}
         a = symbolic_jacobian(balances, observer.states, point)
-        c = symbolic_jacobian(seen, observer.states, point)
+        c = symbolic_jacobian(outputs, observer.states, point)
         _check_constant(automaton, observer, {"A": a, "C": c})
         b = _input_matrix(automaton, balances, point)
         inputs = tuple(u for u in automaton.inputs if any(u in row for row in b.values()))
         f, f_constants = _affine_offsets(
             balances, (*observer.states, *inputs), point, f"{name}_f_constant"
         )
-        g, g_constants = _affine_offsets(seen, observer.states, point, f"{name}_g_constant")
+        g, g_constants = _affine_offsets(outputs, observer.states, point, f"{name}_g_constant")
         return dataclasses.replace(
             observer,
             inputs=inputs,
@@ -74,7 +75,7 @@ def derive_observer_matrices(
 
 
 def _default_inputs(automaton: Automaton, observer: Observer) -> dict[str, SyntaxTree]:
-    """Inputs of the model that are none of ours have their default, as in a run."""
+    """Return the defaults of the inputs of the model that the automaton does not have, by name."""
     assert automaton.model
     found: dict[str, SyntaxTree] = {}
     for name, thing in automaton.model.inputs.items():
@@ -88,7 +89,11 @@ def _default_inputs(automaton: Automaton, observer: Observer) -> dict[str, Synta
 def _check_states(
     automaton: Automaton, observer: Observer, mode: Mode, flow: Mapping[str, SyntaxTree]
 ) -> None:
-    """What the observer leaves out stands still in that mode and has a value here."""
+    """Raise SpecError unless the states of the observer fit the flow of the mode.
+
+    Each state is one of the model; a state that the observer omits has the rate 0, unless a run
+    predicts; the balances of the states read only names of the automaton.
+    """
     problems = Problems()
     assert automaton.model
     for name in observer.states:
@@ -113,6 +118,7 @@ def _check_states(
 def _output_equations(
     observer: Observer, mode: Mode, known: Mapping[str, SyntaxTree]
 ) -> dict[str, SyntaxTree]:
+    """Return the expression of each measurement: the inlined equation or the measured state."""
     found: dict[str, SyntaxTree] = {}
     for measure, name in observer.measures.items():
         found[measure] = known[name] if name in mode.equations else Name(name, observer.span)
@@ -122,6 +128,7 @@ def _output_equations(
 def _check_constant(
     automaton: Automaton, observer: Observer, matrices: Mapping[str, SymbolicMatrix]
 ) -> None:
+    """Raise SpecError if an entry of a matrix depends on anything but parameters."""
     problems = Problems()
     known = [(what, row, m[row]) for what, m in matrices.items() for row in m]
     for what, row, entries in known:
@@ -137,7 +144,10 @@ def _check_constant(
 def _input_matrix(
     automaton: Automaton, balances: Mapping[str, SyntaxTree], point: LinearisationPoint
 ) -> SymbolicMatrix:
-    """The columns of B: of the inputs that enter linearly; any other stays in f by its value."""
+    """Return the columns of B of the inputs that enter linearly with constant coefficients.
+
+    The other inputs stay in f by their values.
+    """
     found: SymbolicMatrix = {}
     for name, thing in automaton.inputs.items():
         if thing.type != "real":
@@ -158,7 +168,11 @@ def _affine_offsets(
     point: LinearisationPoint,
     prefix: str,
 ) -> tuple[dict[str, SyntaxTree], dict[str, SyntaxTree]]:
-    """Return what is neither A x nor B u, as sums of slope * value and a constant, and these."""
+    """Return the terms of each tree that are not linear in the columns, and their constant parts.
+
+    An offset that is affine in the other names becomes a sum of slope * value and a constant. The
+    constant is named `<prefix>.<row>` unless it is a literal. Rows with the offset 0 are left out.
+    """
     found: dict[str, SyntaxTree] = {}
     constants: dict[str, SyntaxTree] = {}
     for row, tree in trees.items():
@@ -179,10 +193,12 @@ def _affine_offsets(
 
 
 def _is_constant(automaton: Automaton, tree: SyntaxTree) -> bool:
+    """Return whether an expression reads parameters only."""
     return all(read.path in automaton.parameters for read in names(tree))
 
 
 def _to_formulas(rows: SymbolicMatrix, key: str) -> dict[str, dict[str, Formula]]:
+    """Return the entries of a symbolic matrix as formulas; keys are `<key>.<row>.<column>`."""
     return {
         row: {column: Formula(tree, f"{key}.{row}.{column}") for column, tree in entries.items()}
         for row, entries in rows.items()

@@ -1,4 +1,4 @@
-"""Parameter: what a Program reads of parameters - groups, kinds, order, tunables, units."""
+"""Parameters in a Program: groups, kinds, order of dependence, tunable parameters and units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ from language.typecheck.types import TypeName
 
 @cache_on_owner
 def constant_bindings(automaton: Automaton) -> dict[str, Expr]:
-    """Return the parameters, and the names of enumerations, as what a Program reads."""
+    """Return the Program's expressions of parameters, table axes and enumeration literals, by name.
+
+    A parameter is `constant.<name>`, `calibration.<name>` or `derived.<name>`, by its kind. A table
+    adds the keys `<name> axis <k>` and `<name> size <k>`, k from 1.
+    """
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
     found: dict[str, Expr] = {name: Value(n) for name, n in automaton.enum_literals.items()}
     for name, kind in parameter_kinds(automaton).items():
@@ -34,7 +38,10 @@ def constant_bindings(automaton: Automaton) -> dict[str, Expr]:
 
 @cache_on_owner
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
-    """Return each parameter's kind: what is derived from fixed values alone is fixed."""
+    """Return the kind of each parameter, in the order of the file: fixed, tunable or derived.
+
+    A parameter that is derived from fixed ones only is fixed.
+    """
     kinds: dict[str, str] = {}
     for name in parameter_order(automaton):
         parameter = automaton.parameters[name]
@@ -47,13 +54,13 @@ def parameter_kinds(automaton: Automaton) -> dict[str, str]:
 
 @cache_on_owner
 def parameter_order(automaton: Automaton) -> list[str]:
-    """Return the parameters so that each comes after those that it is derived from."""
+    """Return the names of all parameters, each after those that it is derived from."""
     parameters = automaton.parameters.items()
     return post_order({name: p.derived.reads if p.derived else () for name, p in parameters})
 
 
 def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
-    """Return the tunable parameters that some formulas read, directly or through derived ones."""
+    """Return the tunable parameters that formulas read, directly or indirectly, sorted by name."""
     found: dict[str, None] = {}
     stack = names_read(formula.tree for formula in formulas)
     seen: set[str] = set()
@@ -71,20 +78,24 @@ def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str,
 
 
 def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Constant:
-    """Return the Program's constant for a parameter."""
+    """Return the constant of a parameter, with unit, range, key path and table values.
+
+    `kind` is fixed, tunable or derived. A tunable wait is a whole number of ticks, and its range is
+    in ticks.
+    """
     parameter = automaton.parameters[name]
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
     is_wait = name in tunable_waits(automaton)
     limits = wait_range_in_ticks(automaton, parameter) if is_wait else parameter.range
-    kept: TypeName = "int" if is_wait else parameter.type
+    kind_of_value: TypeName = "int" if is_wait else parameter.type
     return Constant(
         name=f"{groups[kind]}.{name}",
         kind=kind,  # type: ignore[arg-type]
-        value=cast_to_type(value, kept),
+        value=cast_to_type(value, kind_of_value),
         unit=TICK_UNIT if is_wait else si_unit_text(automaton, name),
         key=f"{declaring_automaton(automaton, name)} {parameter.key}",
         range=(round_to_type(limits[0]), round_to_type(limits[1])) if limits else None,
-        type=value_type(kept),
+        type=value_type(kind_of_value),
         values=parameter.values,
         items=tuple(round_to_type(item) for item in parameter.table.values)
         if parameter.table
@@ -94,20 +105,24 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
 
 
 def cast_to_type(value: float, kind: TypeName) -> float | int | bool:
-    """Return a number as a value of a type."""
+    """Return a number in the Python type of a model type; a fraction is truncated to an int."""
     if kind == "real":
         return value
     return bool(value) if kind == "bool" else int(value)
 
 
 def declaring_automaton(automaton: Automaton, name: str) -> str:
-    """Return the automaton that declares a parameter: the model, or this one."""
+    """Return the name of the automaton that declares a parameter: the model or this automaton."""
     model = automaton.model
     return model.name if model and name in model.parameters else automaton.name
 
 
 def si_unit_text(automaton: Automaton, name: str) -> str:
-    """Return the SI unit of a name, for comments: the unit as written where it is SI."""
+    """Return the SI unit of a name for comments.
+
+    It is the text of the declared unit if that is an SI unit, else the text of the dimension; `1`
+    for a name without either.
+    """
     unit = _unit_of(automaton, name)
     if unit and unit.factor == 1 and not unit.offset:
         return unit.text
@@ -116,6 +131,7 @@ def si_unit_text(automaton: Automaton, name: str) -> str:
 
 
 def _unit_of(automaton: Automaton, name: str) -> Unit | None:
+    """Return the unit of a parameter, input, state or discrete variable; None for other names."""
     if name in automaton.parameters:
         return automaton.parameters[name].unit
     if name in automaton.inputs:

@@ -1,4 +1,7 @@
-"""Wiring: variables, outputs and start values that every Program has, and the last clean-up."""
+"""Assembly of a Program: variables, outputs, start values, and the removal of unused parts.
+
+The lowering of sampled and of continuous automata shares these functions.
+"""
 
 from __future__ import annotations
 
@@ -37,11 +40,14 @@ from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.typecheck.types import EnumType, IntType
 
 INACTIVE = "inactive"
-"""What a region inside a mode is in while that is left."""
+"""The name of the mode of a region inside a mode while that mode is not active."""
 
 
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
-    """Return the inputs of an automaton as variables of a group."""
+    """Return a variable `<group>.<name>` for each input, in the order of the file.
+
+    Only the group `input` has a comment: the key path and the description of the input.
+    """
     return [
         Variable(
             f"{group}.{name}",
@@ -55,7 +61,10 @@ def input_variables(automaton: Automaton, group: str) -> list[Variable]:
 
 
 def state_variables(automaton: Automaton) -> list[Variable]:
-    """Return the states and equations of an automaton as variables."""
+    """Return `state.<name>` for each state, then `equation.<name>` for each equation.
+
+    A state of a continuous automaton carries its range, in SI units.
+    """
     found = [
         Variable(
             f"state.{name}",
@@ -70,14 +79,21 @@ def state_variables(automaton: Automaton) -> list[Variable]:
 
 
 def event_range(automaton: Automaton, thing: State) -> tuple[float, float] | None:
-    """Return the range whose leaving is an event: that of a continuous automaton's variable."""
+    """Return the range whose violation is an event (rule 18c), rounded to float64.
+
+    The result is None for a sampled automaton and for a variable without a range.
+    """
     if automaton.is_sampled or thing.range is None:
         return None
     return round_to_type(thing.range[0]), round_to_type(thing.range[1])
 
 
 def equation_variables(automaton: Automaton, group: str) -> list[Variable]:
-    """Return the equations of an automaton as variables of a group."""
+    """Return a variable `<group><name>` for each equation of any mode.
+
+    `group` is a prefix such as `equation.` or `work.at_`. The order is that of the first mode that
+    defines each equation.
+    """
     found = []
     for name in dict.fromkeys(n for mode in automaton.all_modes for n in mode.equations):
         kind, unit, values = _equation_type(automaton, name)
@@ -86,7 +102,10 @@ def equation_variables(automaton: Automaton, group: str) -> list[Variable]:
 
 
 def _equation_type(automaton: Automaton, name: str) -> tuple[ValueType, str, tuple[str, ...]]:
-    """Return type, unit and names of an equation."""
+    """Return the value type, the unit and the enumeration literals of an equation.
+
+    The unit is `1` and there are no literals unless the type says otherwise.
+    """
     kind = automaton.name_types.get(name)
     if isinstance(kind, Dimension):
         return "real", str(kind), ()
@@ -95,7 +114,10 @@ def _equation_type(automaton: Automaton, name: str) -> tuple[ValueType, str, tup
 
 
 def output_wires(automaton: Automaton) -> tuple[OutputWire, ...]:
-    """Return the outputs in the order of the file; `mode` brings the regions not named there."""
+    """Return the outputs in the order of the file, each with the variable that it reads.
+
+    The output `mode` adds one output for each region that is not an output itself.
+    """
     found = []
     for output in automaton.outputs:
         name = automaton.output_source(output)
@@ -124,7 +146,10 @@ def output_wires(automaton: Automaton) -> tuple[OutputWire, ...]:
 
 
 def region_variables(automaton: Automaton, activation_unit: str) -> list[Variable]:
-    """Return the variables of the modes of all regions and of what fires in them."""
+    """Return the mode variable and the fired-transition variable of each region.
+
+    `activation_unit`, such as `tick`, is the word that the comments use for one execution.
+    """
     found = []
     for region in automaton.all_regions:
         where = "" if region.name == CHART else f" of region {region.name}"
@@ -136,12 +161,12 @@ def region_variables(automaton: Automaton, activation_unit: str) -> list[Variabl
 
 
 def clear_fired(automaton: Automaton) -> list[Op]:
-    """Return what forgets the transitions of before."""
+    """Return the assignments that set the fired-transition variable of each region to 0."""
     return [Assign(fired_variable(region.name), integer(0)) for region in automaton.all_regions]
 
 
 def any_fired_condition(automaton: Automaton) -> Expr:
-    """Return whether a transition has fired in any region."""
+    """Return the condition that a transition has fired in at least one region."""
     found: Expr | None = None
     for region in automaton.all_regions:
         here = Compare("!=", Ref(fired_variable(region.name)), integer(0))
@@ -151,7 +176,11 @@ def any_fired_condition(automaton: Automaton) -> Expr:
 
 
 def enter_initial_modes(automaton: Automaton, base: str) -> list[Assign]:
-    """Return what makes the initial modes active; `base` is the variable of the chart."""
+    """Return the assignments that make the initial mode of each region active.
+
+    `base` is the mode variable of the chart. In a chart with nested modes, a region that is not
+    part of the initial configuration gets its number for inactive.
+    """
     if automaton.statechart:
         return _enter_initial_nodes(automaton, automaton.statechart, base)
     return [
@@ -161,6 +190,7 @@ def enter_initial_modes(automaton: Automaton, base: str) -> list[Assign]:
 
 
 def _enter_initial_nodes(automaton: Automaton, chart: Chart, base: str) -> list[Assign]:
+    """Return the assignments that activate the initial configuration of nested modes."""
     numbers = {
         node.region: node.number
         for node in chart.initial_configuration()
@@ -175,7 +205,11 @@ def _enter_initial_nodes(automaton: Automaton, chart: Chart, base: str) -> list[
 
 
 def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
-    """Return the start values, each after those that it reads."""
+    """Return the assignments of the start values of all states and discrete variables.
+
+    Each variable comes after those that its start value reads. `prefix` opens the key paths. A
+    start value is held in the range of its variable (rule 18).
+    """
     ops: list[Op] = []
     carried = automaton.state_variables
     for name in post_order({name: state.initial.reads for name, state in carried.items()}):
@@ -186,7 +220,7 @@ def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix
 
 
 def input_defaults(automaton: Automaton) -> dict[str, float | bool]:
-    """Return the values of inputs that nothing is connected to."""
+    """Return the declared default of each input that has one, by name, in the type of the input."""
     found: dict[str, float | bool] = {}
     for name, thing in automaton.inputs.items():
         if thing.default is not None:
@@ -201,7 +235,10 @@ def assemble_program(
     variables: Iterable[Variable],
     transitions: tuple[TransitionInfo, ...],
 ) -> Program:
-    """Return a program of blocks with what follows from the automaton alone."""
+    """Return a Program of blocks, with outputs, modes, regions and invariants of the automaton.
+
+    Variables with equal names are merged; the last one wins. Faults and functions are still empty.
+    """
     return Program(
         name=automaton.name,
         number_type=automaton.numbers,
@@ -222,7 +259,7 @@ def assemble_program(
 
 
 def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
-    """Return the modes of a region with their numbers."""
+    """Return the modes of a region with their numbers, then the inactive mode if there is one."""
     found = [ModeInfo(mode.name, mode.number) for mode in region.modes.values()]
     if region.inactive is not None:
         found.append(ModeInfo(INACTIVE, region.inactive))
@@ -232,7 +269,12 @@ def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
 def finalise_program(
     program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()
 ) -> Program:
-    """Return the program with only what its entries use, and the variables to keep anyway."""
+    """Return the Program with only the blocks that are reachable from its entry blocks.
+
+    Constants and variables that no block, output or `keep` names are removed, except inputs and the
+    `is_new` flags. The elementary functions that are called are added. Literals are rounded to the
+    number type.
+    """
     blocks = _reachable_blocks(program.blocks, entries)
     used = {name for block in blocks.values() for name in block_names(block)}
     used |= {*keep, *(wire.source for wire in program.outputs)}
@@ -244,8 +286,8 @@ def finalise_program(
             break
         constants += [c for c in program.constants if c.name in more]
     functions = _used_functions(used, program.number_type)
-    kept = ("input.", "is_new.")
-    variables = [v for v in program.variables if v.name in used or v.name.startswith(kept)]
+    interface = ("input.", "is_new.")
+    variables = [v for v in program.variables if v.name in used or v.name.startswith(interface)]
     variables = _remove_unused_before(program, variables, blocks)
     return round_program(
         dataclasses.replace(
@@ -261,7 +303,10 @@ def finalise_program(
 def _remove_unused_before(
     program: Program, variables: list[Variable], blocks: dict[str, Block]
 ) -> list[Variable]:
-    """Leave out the memory of inputs that nobody reads."""
+    """Return the variables without each `before.<input>` that no block but `remember` reads.
+
+    The block `remember` in `blocks` is replaced by one without the assignments to them.
+    """
     if "remember" not in blocks:
         return variables
     reading = {n for name, b in blocks.items() if name != "remember" for n in block_names(b)}
@@ -272,6 +317,7 @@ def _remove_unused_before(
 
 
 def _reachable_blocks(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> dict[str, Block]:
+    """Return the blocks that the entries run, directly or through other blocks, in their order."""
     seen: set[str] = set()
     stack = [entry for entry in entries if entry in blocks]
     while stack:
@@ -283,6 +329,7 @@ def _reachable_blocks(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> 
 
 
 def _used_functions(used: set[str], number: NumberType) -> tuple[Function, ...]:
+    """Return the elementary functions whose `call` is in `used`, with those that these call."""
     known = FUNCTIONS_BY_TYPE[number]
     stack = [name.removeprefix("call ") for name in used if name.startswith("call ")]
     found: set[str] = set()

@@ -1,7 +1,9 @@
-"""Limit: what a sampled automaton does with a value outside its declared range (rules 13 and 18).
+"""Ranges of a sampled automaton: saturation, fallback and fault bits (rules 13 and 18).
 
-A value about to be written passes unchanged where `low <= value <= high`. Else a fault bit is set
-in the same step, and the variable gets the nearest bound, its fallback, or keeps its value.
+    x = v    ->    if v >= low and v <= high: x = v
+                   else: fault bit; x = clip(v, low, high), the fallback, or unchanged
+
+The policy of the range (`on_range`, `fallback`) selects the value of the second line.
 """
 
 from __future__ import annotations
@@ -33,32 +35,37 @@ from language.numerics.evaluate import INTEGER_OF_NAN
 from language.text.diagnostic import Problems
 
 MAX_FAULT_BITS = 32
-"""Fault bits of an instance: one word."""
+"""The number of fault bits of an instance, which are one uint32 word."""
 
 FAULT_PENDING = "memory.fault_pending"
+"""The variable that a fault has requested the fault mode."""
 
 FAULT_HAPPENED = "work.fault_happened"
+"""The variable that the fault mode is requested in this tick."""
 
 
 def range_fault_of(variable: Input | State) -> str:
-    """Return the fault bit that a range sets: its own unless it says another."""
+    """Return the name of the fault bit of a range: the declared one or `range_<name>`."""
     return variable.range_policy.fault or f"range_{variable.name}"
 
 
 def saturation_range(variable: Input | State) -> Range | None:
-    """Return the range that values are held in; an enumeration's are the places in its list."""
+    """Return the range that values are held in; None if there is none.
+
+    An input of an enumeration has the range of the indices of its literals.
+    """
     if isinstance(variable, Input) and variable.type == "enum":
         return Fraction(0), Fraction(len(variable.values) - 1)
     return variable.range
 
 
 def has_saturation(automaton: Automaton, variable: Input | State) -> bool:
-    """Tell whether values of an input, state or discrete variable are held in a range."""
+    """Return whether a variable is held in a range: it has one and the automaton is sampled."""
     return automaton.is_sampled and saturation_range(variable) is not None
 
 
 def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "") -> list[Op]:
-    """Return what writes a state or discrete variable, within its range if it has one."""
+    """Return the operations that write a state or discrete variable, held in its range if any."""
     thing = automaton.state_variables[name]
     target = f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
     if not has_saturation(automaton, thing):
@@ -67,7 +74,10 @@ def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "")
 
 
 def store_initial_value(automaton: Automaton, name: str, value: Expr, key: str) -> list[Op]:
-    """Return what gives a variable its first value; to keep there is its low bound."""
+    """Return the operations that write the start value of a variable.
+
+    If an invalid value would leave the variable unchanged, the lower bound is written first.
+    """
     ops = store_saturated(automaton, name, value, key)
     thing = automaton.state_variables[name]
     if not has_saturation(automaton, thing) or not _may_hold_value(thing):
@@ -79,7 +89,11 @@ def store_initial_value(automaton: Automaton, name: str, value: Expr, key: str) 
 def saturate_written_states(
     automaton: Automaton, names: Iterable[str]
 ) -> tuple[list[Op], list[Op]]:
-    """Return what stands before and after operations that write states by themselves (a run)."""
+    """Return the operations to insert before and after code that writes states without saturation.
+
+    The first list saves the states whose policy keeps the old value; the second one holds the new
+    values in their ranges. Names that are no states, or have no range, are ignored.
+    """
     before: list[Op] = []
     after: list[Op] = []
     for name in names:
@@ -96,7 +110,7 @@ def saturate_written_states(
 
 
 def latch_inputs(automaton: Automaton) -> Block:
-    """Return what takes the inputs of a tick: those with a range are held in it."""
+    """Return the operations that copy each input with a range to `latched.<name>`, saturated."""
     ops: list[Op] = []
     for name, thing in automaton.inputs.items():
         if has_saturation(automaton, thing):
@@ -106,7 +120,10 @@ def latch_inputs(automaton: Automaton) -> Block:
 
 
 def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
-    """Return what an input holds before the first tick: its default, or what is nearest to 0."""
+    """Return the assignments of `latched.<name>` before the first tick.
+
+    The value is the default of the input, or 0, moved to the nearest bound of the range.
+    """
     ops: list[Op] = []
     for name, thing in automaton.inputs.items():
         if has_saturation(automaton, thing):
@@ -117,7 +134,7 @@ def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
 
 
 def bound_literals(variable: Input | State) -> tuple[Expr, Expr]:
-    """Return the bounds of a range as literals."""
+    """Return the lower and the upper bound of a range as literals; (0, 0) without a range."""
     low, high = saturation_range(variable) or (Fraction(0), Fraction(0))
     return _literal(variable, low), _literal(variable, high)
 
@@ -125,7 +142,11 @@ def bound_literals(variable: Input | State) -> tuple[Expr, Expr]:
 def assign_saturated(
     automaton: Automaton, variable: Input | State, target: str, value: Expr, key: str = ""
 ) -> list[Op]:
-    """Return what writes a value within the range of a variable, or does what its limits say."""
+    """Return the operations that write a value to `target`, held in the range of `variable`.
+
+    A value that is no variable, or is the target itself, is stored in `work.new_<name>` first. A
+    value outside the range sets the fault bit and may request the fault mode.
+    """
     ops: list[Op] = []
     if not isinstance(value, Ref) or value.name == target:
         new = Ref(f"work.new_{variable.name}", value_type(variable.type) == "whole")
@@ -141,12 +162,12 @@ def assign_saturated(
 
 
 def saturable_variables(automaton: Automaton) -> list[Input | State]:
-    """Return all that may have a range: inputs, states, discrete variables."""
+    """Return all variables that may have a range: inputs, states and discrete variables."""
     return [*automaton.inputs.values(), *automaton.state_variables.values()]
 
 
 def require_ranges(automaton: Automaton) -> None:
-    """Refuse an automaton for C in which a number has no range (rule 18). Raises SpecError."""
+    """Raise SpecError with a problem for each number without a range; C needs them (rule 18)."""
     problems = Problems()
     for thing in saturable_variables(automaton):
         if thing.type in ("real", "int") and thing.range is None:
@@ -159,7 +180,7 @@ def require_ranges(automaton: Automaton) -> None:
 
 
 def saturation_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables that ranges use."""
+    """Return the variables of fault requests, latched inputs, and new and held values."""
     found = [
         Variable(FAULT_PENDING, "truth", about="a fault asks for the fault mode"),
         Variable(FAULT_HAPPENED, "truth"),
@@ -178,12 +199,13 @@ def saturation_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _may_hold_value(variable: Input | State) -> bool:
+    """Return whether a variable keeps its old value for some value outside its range."""
     keeps = variable.range_policy.on_range in ("hold", "fault") or variable.type == "enum"
     return keeps or variable.range_policy.fallback == "hold"
 
 
 def _assign_out_of_range(variable: Input | State, target: str, value: Expr) -> list[Op]:
-    """Return what an impossible value becomes; nothing where the variable keeps its value."""
+    """Return the operations that write a value outside the range; none if the old value stays."""
     fallback = variable.range_policy.fallback
     keeps = variable.range_policy.on_range in ("hold", "fault") or variable.type == "enum"
     near: Block = ()
@@ -200,7 +222,10 @@ def _assign_out_of_range(variable: Input | State, target: str, value: Expr) -> l
 
 
 def _request_fault_mode(automaton: Automaton, variable: Input | State, value: Expr) -> list[Op]:
-    """Return what asks for the fault mode: `on_range: fault`, or an input that is not finite."""
+    """Return the operations that request the fault mode after a value outside the range.
+
+    `on_range: fault` requests it always; a real input requests it if the value is not finite.
+    """
     if automaton.fault_mode is None:
         return []
     ask = Assign(FAULT_PENDING, Value(True))
@@ -212,7 +237,7 @@ def _request_fault_mode(automaton: Automaton, variable: Input | State, value: Ex
 
 
 def _clip(variable: Input | State, value: Expr, low: Expr, high: Expr) -> Expr:
-    """The nearest bound; NaN becomes the lower one (rule C7)."""
+    """Return the value clipped to (low, high); a NaN becomes `low` (rule C7)."""
     if variable.type == "real":
         return Call("clip", (value, low, high))
     inner = Select(Compare("<", value, high), value, high)
@@ -220,11 +245,16 @@ def _clip(variable: Input | State, value: Expr, low: Expr, high: Expr) -> Expr:
 
 
 def _is_finite(variable: Input | State, value: Expr) -> Expr:
-    """A difference with itself is 0 for what is finite and NaN, never >= 0, for the rest."""
+    """Return the condition that a value is finite.
+
+    For a real it is `v - v >= 0`, which is false for an infinity and for NaN. For a whole number it
+    is that the value is not the conversion of a NaN (rule C8).
+    """
     if variable.type == "real":
         return Compare(">=", subtract(value, value), real(0.0))
     return Compare("!=", value, Value(INTEGER_OF_NAN))
 
 
 def _literal(variable: Input | State, value: Fraction) -> Value:
+    """Return a number as a literal of a variable's type; a fraction is truncated if not real."""
     return real(value) if variable.type == "real" else Value(int(value))

@@ -1,8 +1,8 @@
-"""Past: what a sampled automaton keeps of its ticks for the transitions that go back.
+"""Tick history: recorded states and inputs of a sampled automaton for transitions with `rewind`.
 
-Rings of the states of the model and of the inputs that are asked for, written each tick after the
-jump while a mode is active that such a transition leaves; a counter says how many places belong to
-this activation, so that nobody looks behind the entry.
+Ring buffers of the states of the model and of the inputs that are needed. A tick writes them after
+its jump while a mode is active that a transition with `rewind` leaves. A counter limits reading to
+the ticks of this activation of the mode.
 """
 
 from __future__ import annotations
@@ -39,14 +39,16 @@ from language.model.automaton import Automaton, Mode, Rewind, Transition
 from language.model.region_queries import equation_closure, equation_formulas
 
 HISTORY_LENGTH = Ref("timer.past", is_integer=True)
-"""How many places belong to this activation of the mode."""
+"""The number of recorded ticks of this activation of the mode."""
 NEWEST_INDEX = Ref("memory.newest", is_integer=True)
+"""The index of the newest tick in the ring buffers."""
 HISTORY_INDEX = Ref("work.place", is_integer=True)
+"""The index of the tick that is read."""
 
 
 @dataclass(frozen=True)
 class Rollback:
-    """A transition of an automaton that goes back."""
+    """A transition with `rewind`, with its automaton and its source."""
 
     automaton: Automaton
     source: Mode
@@ -55,7 +57,7 @@ class Rollback:
 
     @property
     def max_ticks(self) -> int:
-        """The ticks that it looks back, rounded up exactly (rule 4)."""
+        """The number of ticks in `within`, rounded up exactly (rule 4a)."""
         assert self.automaton.period is not None
         return math.ceil(
             evaluate_exactly(self.rewind.within, self.automaton) / self.automaton.period
@@ -63,32 +65,32 @@ class Rollback:
 
     @property
     def flow_mode(self) -> str | None:
-        """The mode of the model whose flow leads back; None where the states stand still."""
+        """The mode of the model whose flow the source follows; None if the states are constant."""
         if self.source.run:
             return self.source.run.mode
         return self.source.observer.of if self.source.observer else None
 
     @property
     def block_suffix(self) -> str:
-        """The ending of its blocks: names may hold `_`, so its place among those of its mode."""
+        """The suffix of its blocks: mode and index of the transition, since names may contain `_`."""
         return f"{self.source.name}_{self.source.transitions.index(self.transition)}"
 
     @property
     def names_read_by_jump(self) -> list[str]:
-        """The names that the exit and the reset read."""
+        """The names that the exit and the reset read, with repetitions."""
         written = (*self.source.exit.values(), *self.transition.reset.values())
         return [name for formula in written for name in formula.reads]
 
 
 @cache_on_owner
 def rollbacks_of(automaton: Automaton) -> tuple[Rollback, ...]:
-    """Return the transitions of an automaton that go back."""
+    """Return the transitions with `rewind` of an automaton, in the order of the file."""
     modes = automaton.modes.values()
-    return tuple(rewinding for mode in modes for rewinding in rollbacks_from(automaton, mode))
+    return tuple(rollback for mode in modes for rollback in rollbacks_from(automaton, mode))
 
 
 def rollbacks_from(automaton: Automaton, mode: Mode) -> list[Rollback]:
-    """Return the transitions that leave a mode of the chart and go back."""
+    """Return the transitions with `rewind` that leave a mode of the chart, in file order."""
     return [
         Rollback(automaton, mode, transition, transition.rewind)
         for transition in mode.transitions
@@ -98,23 +100,27 @@ def rollbacks_from(automaton: Automaton, mode: Mode) -> list[Rollback]:
 
 @cache_on_owner
 def rollback_targets(automaton: Automaton) -> frozenset[str]:
-    """Return the modes that a transition enters which goes back."""
-    return frozenset(rewinding.transition.target for rewinding in rollbacks_of(automaton))
+    """Return the names of the modes that a transition with `rewind` enters."""
+    return frozenset(rollback.transition.target for rollback in rollbacks_of(automaton))
 
 
 def rolled_back_states(automaton: Automaton) -> tuple[str, ...]:
-    """Return the states that a rewind takes back: those of the model."""
+    """Return the names of the states that a rollback restores: all states of the model."""
     assert automaton.model
     return tuple(automaton.model.states)
 
 
 def record_tick_history(automaton: Automaton) -> Block:
-    """Return what a tick keeps, once it has jumped."""
-    rewinds = rollbacks_of(automaton)
-    if not rewinds:
+    """Return the operations that record a tick after its jump; none without a rollback.
+
+    A fired transition clears the history first. The tick is recorded if the active mode is the
+    source of a rollback.
+    """
+    rollbacks = rollbacks_of(automaton)
+    if not rollbacks:
         return ()
     size = _history_size(automaton)
-    keep: Block = (
+    record: Block = (
         Assign(
             NEWEST_INDEX.name,
             Select(_is_last_index(size), integer(0), add(NEWEST_INDEX, integer(1))),
@@ -129,30 +135,35 @@ def record_tick_history(automaton: Automaton) -> Block:
         ),
         Count(HISTORY_LENGTH.name, Value(True), size),
     )
-    numbers = dict.fromkeys(rewinding.source.number for rewinding in rewinds)
+    numbers = dict.fromkeys(rollback.source.number for rollback in rollbacks)
     return (
         Branch(any_fired_condition(automaton), (Assign(HISTORY_LENGTH.name, integer(0)),)),
-        Switch("memory.mode", tuple((number, keep) for number in numbers)),
+        Switch("memory.mode", tuple((number, record) for number in numbers)),
     )
 
 
 @cache_on_owner
 def recorded_inputs(automaton: Automaton) -> dict[str, Ref]:
-    """Return the inputs that are kept: what runs, `until`, exit, reset and entry read."""
+    """Return the variables of the inputs to record, by name, in the order of the file.
+
+    They are the inputs of the model and those that `until`, exit, reset and entry read, directly or
+    through equations.
+    """
     read: set[str] = set()
-    for rewinding in rollbacks_of(automaton):
-        target = automaton.target_mode(rewinding.transition)
-        entered = [name for formula in target.entry.values() for name in formula.reads]
-        asked = [*rewinding.rewind.until.reads, *rewinding.names_read_by_jump]
-        read |= _transitive_reads(rewinding.source, asked) | _transitive_reads(target, entered)
+    for rollback in rollbacks_of(automaton):
+        target = automaton.target_mode(rollback.transition)
+        entry_reads = [name for formula in target.entry.values() for name in formula.reads]
+        own_reads = [*rollback.rewind.until.reads, *rollback.names_read_by_jump]
+        read |= _transitive_reads(rollback.source, own_reads)
+        read |= _transitive_reads(target, entry_reads)
         read |= {*automaton.model.inputs} if automaton.model else set()
     names = variable_bindings(automaton, "input")
-    found = {name: names[name] for name in automaton.inputs if name in read}
-    return {name: ref for name, ref in found.items() if isinstance(ref, Ref)}
+    recorded = {name: names[name] for name in automaton.inputs if name in read}
+    return {name: ref for name, ref in recorded.items() if isinstance(ref, Ref)}
 
 
 def run_inputs(automaton: Automaton) -> list[str]:
-    """Return the inputs that the runs of an automaton read."""
+    """Return the names of the inputs of an automaton that its model has too."""
     assert automaton.model
     return [name for name in automaton.inputs if name in automaton.model.inputs]
 
@@ -160,19 +171,19 @@ def run_inputs(automaton: Automaton) -> list[str]:
 def recorded_input_ref(
     automaton: Automaton, name: str, group: Literal["past", "after"] = "past"
 ) -> Ref:
-    """Return an input at the point that is looked at, or at the tick after it."""
+    """Return the variable of a recorded input at the examined tick (`past`) or the one after it."""
     return Ref(f"work.{group}_{name}", recorded_inputs(automaton)[name].is_integer)
 
 
 def set_history_index(automaton: Automaton, ticks_back: Expr) -> Block:
-    """Return what finds the place of the tick so many places before the newest one."""
-    around = Assign(HISTORY_INDEX.name, add(HISTORY_INDEX, integer(_history_size(automaton))))
-    find = Assign(HISTORY_INDEX.name, subtract(NEWEST_INDEX, ticks_back))
-    return (find, Branch(Compare("<", HISTORY_INDEX, integer(0)), (around,)))
+    """Return the operations that set the read index to `ticks_back` ticks before the newest one."""
+    wrap = Assign(HISTORY_INDEX.name, add(HISTORY_INDEX, integer(_history_size(automaton))))
+    move = Assign(HISTORY_INDEX.name, subtract(NEWEST_INDEX, ticks_back))
+    return (move, Branch(Compare("<", HISTORY_INDEX, integer(0)), (wrap,)))
 
 
 def load_recorded_states(automaton: Automaton, group: Literal["at", "after"]) -> list[Op]:
-    """Return what takes the states from a place of the rings."""
+    """Return the operations that copy the states at the read index to `work.<group>_<name>`."""
     return [
         Assign(f"work.{group}_{name}", Item(f"memory.past_{name}", HISTORY_INDEX))
         for name in rolled_back_states(automaton)
@@ -180,13 +191,13 @@ def load_recorded_states(automaton: Automaton, group: Literal["at", "after"]) ->
 
 
 def load_current_states(automaton: Automaton, group: Literal["at", "after"]) -> list[Op]:
-    """Return what takes the states as they are now."""
+    """Return the operations that copy the present states to `work.<group>_<name>`."""
     names = rolled_back_states(automaton)
     return [Assign(f"work.{group}_{name}", Ref(f"state.{name}")) for name in names]
 
 
 def load_recorded_inputs(automaton: Automaton, group: Literal["past", "after"]) -> list[Op]:
-    """Return what takes the inputs from a place of the rings."""
+    """Return the operations that copy the inputs at the read index to `work.<group>_<name>`."""
     return [
         Assign(
             recorded_input_ref(automaton, name, group).name,
@@ -197,23 +208,23 @@ def load_recorded_inputs(automaton: Automaton, group: Literal["past", "after"]) 
 
 
 def load_current_inputs(automaton: Automaton, group: Literal["past", "after"]) -> list[Op]:
-    """Return what takes the inputs as they are now."""
-    kept = recorded_inputs(automaton).items()
-    return [Assign(recorded_input_ref(automaton, name, group).name, ref) for name, ref in kept]
+    """Return the operations that copy the present inputs to `work.<group>_<name>`."""
+    recorded = recorded_inputs(automaton).items()
+    return [Assign(recorded_input_ref(automaton, name, group).name, ref) for name, ref in recorded]
 
 
 def load_recorded_run_inputs(automaton: Automaton) -> list[Op]:
-    """Return what puts the inputs of a place of the rings where runs read those of before."""
-    kept = recorded_inputs(automaton)
+    """Return the operations that copy the inputs of a run at the read index to `before.<name>`."""
+    recorded = recorded_inputs(automaton)
     items = {
-        n: Item(f"memory.past_{n}", HISTORY_INDEX, kept[n].is_integer)
+        n: Item(f"memory.past_{n}", HISTORY_INDEX, recorded[n].is_integer)
         for n in run_inputs(automaton)
     }
     return [Assign(f"before.{name}", item) for name, item in items.items()]
 
 
 def tick_history_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of what is kept, and of the points that are taken from it."""
+    """Return the variables of the history and of values read from it; none without a rollback."""
     if not rollbacks_of(automaton):
         return []
     size = _history_size(automaton)
@@ -239,16 +250,18 @@ def tick_history_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _history_size(automaton: Automaton) -> int:
-    return max(rewinding.max_ticks for rewinding in rollbacks_of(automaton))
+    """Return the number of ticks that the ring buffers hold: the longest `within`."""
+    return max(rollback.max_ticks for rollback in rollbacks_of(automaton))
 
 
 def _is_last_index(size: int) -> Expr:
+    """Return the condition that the newest tick is at the end of the ring buffers."""
     return Compare(">=", NEWEST_INDEX, integer(size - 1))
 
 
 def _transitive_reads(mode: Mode, names: Iterable[str]) -> set[str]:
-    """Return the names that some names of a mode are made of."""
-    found, known = set(names), equation_formulas(mode)
-    for name in equation_closure(mode, found):
-        found |= {read for formula in known[name] for read in formula.reads}
-    return found
+    """Return the names and all names that the equations behind them read in a mode."""
+    reads, known = set(names), equation_formulas(mode)
+    for name in equation_closure(mode, reads):
+        reads |= {read for formula in known[name] for read in formula.reads}
+    return reads

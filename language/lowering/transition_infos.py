@@ -1,4 +1,4 @@
-"""What the engine reports of a transition: number, names, wait and events."""
+"""Transition data for engine and C: number, names, wait, timer and events of each transition."""
 
 from __future__ import annotations
 
@@ -25,9 +25,12 @@ from language.text.diagnostic import Problems
 
 
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
-    """Return the transitions, numbered from 1 in the order of the file, waits exact."""
+    """Return the data of all transitions, numbered from 1 in the order of the file.
+
+    A wait that is negative, too long or not constant is reported.
+    """
     found: list[TransitionInfo] = []
-    back = {id(rewinding.transition): rewinding.max_ticks for rewinding in rollbacks_of(automaton)}
+    back = {id(rollback.transition): rollback.max_ticks for rollback in rollbacks_of(automaton)}
     for mode in automaton.all_modes:
         for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
@@ -64,12 +67,15 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
 
 
 def wait_ticks(info: TransitionInfo) -> Expr:
-    """Return the ticks that a guard must have held, without the first."""
+    """Return the ticks of a wait: a literal, or the calibration parameter of a tunable wait."""
     return Ref(info.tunable_wait, is_integer=True) if info.tunable_wait else integer(info.ticks)
 
 
 def _chart_endpoints(automaton: Automaton, transition: Transition) -> tuple[str, str] | None:
-    """Return the paths of source and target in a chart; where nothing is entered, no target."""
+    """Return the paths of source and targets in a chart with nested modes; None without one.
+
+    Several targets are separated by commas; an internal transition has an empty target.
+    """
     if automaton.statechart is None:
         return None
     way, nodes = automaton.statechart.transitions[transition.key], automaton.statechart.nodes
@@ -80,21 +86,24 @@ def _chart_endpoints(automaton: Automaton, transition: Transition) -> tuple[str,
 def infos_of_mode(
     automaton: Automaton, mode: Mode, infos: tuple[TransitionInfo, ...]
 ) -> tuple[TransitionInfo, ...]:
-    """Return the transitions that leave a mode, in the order of the file."""
+    """Return the data of the transitions that leave a mode, in the order of the file."""
     first = _first_index_by_mode(automaton)[mode.key]
     return infos[first : first + len(mode.transitions)]
 
 
 @cache_on_owner
 def _first_index_by_mode(automaton: Automaton) -> Mapping[str, int]:
-    """Return, by the key of a mode, how many transitions leave the modes before it."""
+    """Return the number of transitions that leave earlier modes, by the key path of a mode."""
     modes = automaton.all_modes
     counts = accumulate((len(mode.transitions) for mode in modes), initial=0)
     return dict(zip((mode.key for mode in modes), counts, strict=False))
 
 
 def start_run(automaton: Automaton, target: Mode) -> list[Op]:
-    """Return what starts the run of a mode that is entered, and the covariance of its observer."""
+    """Return the operations on entry of a mode that start its run and its observer's covariance.
+
+    The list is empty for a mode without a run and without a covariance that is set on entry.
+    """
     ops: list[Op] = []
     observer = target.observer
     if observer and observer.gain == "recursive" and observer.covariance == "steady":

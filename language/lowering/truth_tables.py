@@ -1,8 +1,8 @@
-"""Decision: the truth tables of a sampled automaton, once a tick before its guards are read.
+"""Truth tables of a sampled automaton, evaluated once a tick before its guards.
 
-Rule: after the advance, on the equations of the mode that was active, all conditions are evaluated,
-then the one row of each table that holds; all rows read the values before the tables, then all
-commit. What a row does not write keeps its value. Equations are evaluated anew where they read it.
+The tables read the equations of the source mode after the advance. All conditions are evaluated
+first, then the one matching row of each table; then all results are stored. A variable that the row
+does not assign keeps its value.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ STAGE_NAME = "decided"
 
 
 def truth_table_block(automaton: Automaton, known: NameBindings) -> Block:
-    """Return `decide`: what all tables write; nothing where there is none."""
+    """Return the block `decide` of all truth tables; empty if there is none."""
     conditions: list[Op] = []
     rows: list[Op] = []
     for table in automaton.tables:
@@ -37,14 +37,14 @@ def truth_table_block(automaton: Automaton, known: NameBindings) -> Block:
 
 
 def has_table_dependent_equations(automaton: Automaton) -> bool:
-    """Tell whether some equation reads what a table writes."""
+    """Return whether an equation reads a variable that a truth table assigns."""
     written = {name for table in automaton.tables for name in table.assigned_names}
     formulas = [formula for mode in automaton.all_modes for formula in mode.equations.values()]
     return not written.isdisjoint(names_read(formula.tree for formula in formulas))
 
 
 def truth_table_variables(automaton: Automaton) -> list[Variable]:
-    """Return the work variables of the tables."""
+    """Return the `work` variables of the conditions and of the results of the tables."""
     found: list[Variable] = []
     for table in automaton.tables:
         found += [
@@ -56,7 +56,11 @@ def truth_table_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _lower_table(automaton: Automaton, table: TruthTable, known: NameBindings) -> Block:
-    """Exactly one row holds (language/checks/check_truth_table.py): the last one needs no question."""
+    """Return the chain of branches over the rows of a table, in order.
+
+    The checks ensure that exactly one row matches (language/checks/check_truth_table.py), so the
+    last row needs no condition.
+    """
     *others, last = table.rows
     chain = _lower_row(automaton, table, last, known)
     for row in reversed(others):
@@ -69,16 +73,17 @@ def _lower_table(automaton: Automaton, table: TruthTable, known: NameBindings) -
 def _lower_row(
     automaton: Automaton, table: TruthTable, row: TruthRow, known: NameBindings
 ) -> Block:
-    """What a row writes, and what it leaves as it is."""
-    kept = [
+    """Return the assignments of the results of a row; unassigned variables get their present value."""
+    unchanged = [
         Assign(f"work.{STAGE_NAME}_{name}", known[name])
         for name in table.assigned_names
         if name not in row.assignments
     ]
-    return (*read_stage(automaton, row.assignments, known, STAGE_NAME), *kept)
+    return (*read_stage(automaton, row.assignments, known, STAGE_NAME), *unchanged)
 
 
 def _row_condition(automaton: Automaton, table: TruthTable, row: TruthRow) -> Expr | None:
+    """Return the conjunction of the marks of a row; None if no condition has a mark."""
     found: Expr | None = None
     for name, mark in zip(table.conditions, row.marks, strict=True):
         if mark is not None:
@@ -89,4 +94,5 @@ def _row_condition(automaton: Automaton, table: TruthTable, row: TruthRow) -> Ex
 
 
 def _condition_ref(automaton: Automaton, table: TruthTable, condition: str) -> Ref:
+    """Return the variable of a condition of a table."""
     return Ref(f"work.decision_{automaton.tables.index(table) + 1}_{condition}")

@@ -1,7 +1,7 @@
-"""Wait: how long a guard of a sampled automaton must hold, in ticks, fixed or tunable (rule 4).
+"""Waits of a sampled automaton in ticks, fixed or tunable (rule 4a).
 
-A tunable wait is kept as a count of ticks: a time in seconds would be rounded to the working type
-and then up to one tick more than was asked for.
+A tunable wait is stored as a count of ticks. A time in seconds would be rounded to the number type
+first, and the count could then be one tick too large.
 """
 
 from __future__ import annotations
@@ -19,11 +19,14 @@ from language.model.names_read import names_read_by
 from language.text.diagnostic import Problems
 
 MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1
-"""Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
+"""The longest wait in ticks: the counters are uint16 and count one tick more (rule 4a)."""
 
 
 def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
-    """Return the tunable parameter that a wait is, None where it is fixed."""
+    """Return the name of the tunable parameter that is the wait of a transition.
+
+    The result is None for a wait that is absent or fixed, and in a continuous automaton.
+    """
     if wait is None or not automaton.period or not isinstance(wait.tree, Name):
         return None
     parameter = automaton.parameters.get(wait.tree.path)
@@ -32,19 +35,23 @@ def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
 
 @cache_on_owner
 def tunable_waits(automaton: Automaton) -> frozenset[str]:
-    """Return the tunable parameters that are waits."""
-    found = (tunable_wait(automaton, one.wait) for one in _all_transitions(automaton))
-    return frozenset(name for name in found if name)
+    """Return the names of the tunable parameters that are the wait of some transition."""
+    waits = (tunable_wait(automaton, each.wait) for each in _all_transitions(automaton))
+    return frozenset(name for name in waits if name)
 
 
 def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
-    """Return a time [s] in ticks, rounded up, exactly."""
+    """Return ceil(time / period): a time [s] in ticks, computed exactly."""
     assert automaton.period
     return math.ceil(time / automaton.period)
 
 
 def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
-    """Return the ticks that a tunable wait may have: those within its range."""
+    """Return the smallest and the largest whole number of ticks in the range of a tunable wait.
+
+    Without a declared range it is (0, MAX_WAIT_TICKS). The first exceeds the second if no whole
+    tick lies in the range.
+    """
     if parameter.range is None:
         return Fraction(0), Fraction(MAX_WAIT_TICKS)
     assert automaton.period
@@ -53,7 +60,11 @@ def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
 
 
 def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
-    """Report a tunable wait that something else reads, or that may be too long."""
+    """Report each tunable wait that another formula reads too, or whose range is not usable.
+
+    A range is usable if it lies within 0 to MAX_WAIT_TICKS, holds a whole tick, and holds the
+    value.
+    """
     waits = tunable_waits(automaton)
     if not waits:
         return
@@ -83,5 +94,6 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
 
 
 def _all_transitions(automaton: Automaton) -> Iterator[Transition]:
+    """Yield the transitions of all modes, in the order of the file."""
     for mode in automaton.all_modes:
         yield from mode.transitions
