@@ -1,4 +1,4 @@
-"""Chart initial: the nodes of a chart while they are read, and at which of them each is entered."""
+"""Initial nodes of a chart: resolution of `initial` of superstates, regions and histories."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNo
 
 @dataclass
 class RawNode:
-    """A node while it is read; indices are places in the list of all."""
+    """A node of a chart while the chart is read.
+
+    `parent`, `children`, `last` and `initial` are indices in the list of all nodes; `last` is the
+    last descendant.
+    """
 
     name: str
     path: str
@@ -33,7 +37,11 @@ class RawNode:
 
 
 def resolve_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
-    """Find what `initial` names; a history without one has that of the mode around it."""
+    """Set `initial` of all nodes below the root; problems are reported.
+
+    A history without `initial` gets that of its parent. A history whose `initial` contains a
+    history is a problem.
+    """
     for index, node in enumerate(nodes):
         if index != ROOT:
             node.initial = _resolve_initial(nodes, index, reader)
@@ -47,6 +55,11 @@ def resolve_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
 
 
 def _resolve_initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int, ...]:
+    """Return the indices that `initial` of one node names; an empty tuple after a reported problem.
+
+    A compound node with a single child needs no `initial`. A history is resolved among the children
+    of its parent and may have none; atomic and parallel nodes must not have one.
+    """
     raw = nodes[index]
     node = raw.table.get("initial")
     if raw.kind == "history":
@@ -74,7 +87,7 @@ def _resolve_initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tu
 def _resolve_names(
     nodes: Sequence[RawNode], owner: int, words: Sequence[ScalarNode], reader: Reader
 ) -> tuple[int, ...]:
-    """Return the nodes that some words name inside another; those that are not there are told."""
+    """Return the descendants of `owner` that `words` name; a name without a node is reported."""
     indices = []
     for word in words:
         hit = find_descendant(nodes, owner, word.text)
@@ -88,7 +101,10 @@ def _resolve_names(
 
 
 def _read_initial_names(node: YamlNode | None, raw: RawNode, reader: Reader) -> list[ScalarNode]:
-    """Return the names that stand in a list, or the only one."""
+    """Return the names in `initial`: those of a list, or the only one.
+
+    An empty list is reported.
+    """
     if isinstance(node, SequenceNode) and node.nodes:
         return reader.read_list(node, "initial")
     if isinstance(node, SequenceNode):

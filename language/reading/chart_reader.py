@@ -1,4 +1,4 @@
-"""Chart reader: modes inside modes to a tree, innermost modes by region, and superstates."""
+"""Chart reader: nested modes as a tree, with the modes of each region and the superstates."""
 
 from __future__ import annotations
 
@@ -33,13 +33,19 @@ from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, SequenceNode, YamlNode
 
 CHART_KEYS = ("events", "order", "micro_steps")
-"""Keys at the root that make the modes a chart."""
+"""Keys at the root that make an automaton a chart."""
 MAX_MICRO_STEPS = 255
+"""Largest bound of micro-steps in a tick."""
 NO_PARENT = -1
+"""The index of the parent of the root."""
 
 
 def is_chart(root: MappingNode) -> bool:
-    """Tell whether an automaton has modes inside modes, events, or several micro-steps."""
+    """Tell whether the tree of an automaton uses a key that only charts have.
+
+    Such keys are `events`, `order` and `micro_steps` at the root, modes and regions inside modes,
+    events and the like of transitions, and a list of targets.
+    """
     if any(key in root.entries for key in CHART_KEYS):
         return True
     owners = [root]
@@ -51,11 +57,13 @@ def is_chart(root: MappingNode) -> bool:
 
 
 def _mode_mappings(owner: MappingNode) -> Iterator[MappingNode]:
+    """Yield the mappings of the modes and templates directly below a mapping."""
     yield from _child_mappings(owner.get("modes"))
     yield from _child_mappings(owner.get("templates"))
 
 
 def _uses_chart_keys(mode: MappingNode) -> bool:
+    """Tell whether a mode or one of its transitions uses a key of charts or a list of targets."""
     ways = _child_mappings(mode.get("transitions"))
     return any(key in mode.entries for key in INNER_KEYS) or any(
         any(key in way.entries for key in CHART_TRANSITION_KEYS)
@@ -65,6 +73,7 @@ def _uses_chart_keys(mode: MappingNode) -> bool:
 
 
 def _child_mappings(node: YamlNode | None) -> Iterator[MappingNode]:
+    """Yield the values of a mapping that are mappings; nothing for another node."""
     for entry in node if isinstance(node, MappingNode) else ():
         if isinstance(entry.node, MappingNode):
             yield entry.node
@@ -72,7 +81,7 @@ def _child_mappings(node: YamlNode | None) -> Iterator[MappingNode]:
 
 @dataclass(frozen=True)
 class ModeStructure:
-    """What was read: the chart and the regions beside it; superstates and tree of a chart."""
+    """The regions of an automaton, `chart` first, and in a chart the superstates and the tree."""
 
     regions: tuple[Region, ...]
     superstates: tuple[Mode, ...] = ()
@@ -80,7 +89,7 @@ class ModeStructure:
 
 
 class ChartReader:
-    """Reads the tree of an automaton with the help of the reader of modes."""
+    """Reads the tree of nested modes of an automaton; a `ModeReader` reads each mode."""
 
     def __init__(self, mode_reader: ModeReader) -> None:
         self.mode_reader = mode_reader
@@ -90,7 +99,10 @@ class ChartReader:
         self.has_errors = False
 
     def read(self, span: Span) -> ModeStructure:
-        """Return the chart of an automaton. Raises SpecError where there is no tree."""
+        """Return the regions, superstates and tree of a chart.
+
+        `span` is the place of the automaton. Raises SpecError if reported problems leave no tree.
+        """
         signals = self._read_events()
         self._read_tree(span)
         chart = self._build_chart(signals)
@@ -98,7 +110,11 @@ class ChartReader:
         return ModeStructure(regions, self._collect_superstates(), chart)
 
     def _read_tree(self, span: Span) -> None:
-        """Read all nodes below a root, in the order of their numbers, and what is initial."""
+        """Read all nodes in preorder into `raw_nodes`, then resolve `initial`. Raises SpecError.
+
+        The modes at the root become the region `chart`. If there are only regions, `chart` gets one
+        mode that is always active.
+        """
         self.raw_nodes.append(
             RawNode("", "", "parallel", NO_PARENT, "", False, span, MappingNode({}, span))
         )
@@ -125,6 +141,7 @@ class ChartReader:
             self.problems.raise_if_errors()
 
     def _build_chart(self, events: Mapping[str, ChartEvent]) -> Chart:
+        """Return the chart with its transitions resolved."""
         nodes = tuple(self._build_node(index) for index in range(len(self.raw_nodes)))
         bare = Chart(nodes, events, "outer_first", 1, {})
         modes = {n: raw.mode for n, raw in enumerate(self.raw_nodes) if raw.mode is not None}
@@ -136,7 +153,10 @@ class ChartReader:
         )
 
     def _collect_superstates(self) -> tuple[Mode, ...]:
-        """Return the modes with modes inside; what they hold was handed down to those."""
+        """Return the superstates without the dynamics that their inner modes inherited.
+
+        They keep transitions, entry and exit actions.
+        """
         return tuple(
             dataclasses.replace(
                 raw.mode, equations={}, flow={}, update={}, observer=None, run=None, invariants={}
@@ -146,7 +166,7 @@ class ChartReader:
         )
 
     def _read_region(self, entry: Entry, parent: int, prefix: str) -> None:
-        """Read a region: a node that its parent is always in, with what is inside it."""
+        """Read a region of the root or of the node `parent` with all nodes inside."""
         is_root = parent == ROOT
         path = f"{prefix}{entry.key}"
         key = f"regions.{entry.key}" if is_root else ""
@@ -169,6 +189,11 @@ class ChartReader:
         key: str,
         parent_mode: Mode | None,
     ) -> None:
+        """Append a node to `raw_nodes`, then its descendants; read its mode.
+
+        A region of the root has no mode of its own, and a history is no mode. `parent_mode` is the
+        superstate whose dynamics the mode inherits; a region does not pass on its own.
+        """
         index = len(self.raw_nodes)
         table = self.mode_reader.apply_template(table)
         kind = self._node_kind(entry, table)
@@ -191,6 +216,7 @@ class ChartReader:
             raw.number = raw.mode.number
 
     def _check_history(self, entry: Entry, table: MappingNode) -> None:
+        """Report the keys of a history other than `history` and `initial`."""
         for key, own in table.entries.items():
             if key not in ("history", "initial", *TEXT_KEYS):
                 label = f"`{entry.key}` is a history: it has no `{key}`"
@@ -200,6 +226,7 @@ class ChartReader:
     def _read_children(
         self, raw: RawNode, index: int, key: str, path: str, parent_mode: Mode | None
     ) -> None:
+        """Read the regions of a parallel node, or the modes of a compound node."""
         prefix = "" if path == CHART else f"{path}."
         if raw.kind == "parallel":
             for entry in self.mode_reader.named_entries(raw.table.get("regions"), f"{key}.regions"):
@@ -213,6 +240,7 @@ class ChartReader:
                 self._read_node(entry, table, index, where, raw.region, False, inner, parent_mode)
 
     def _node_kind(self, entry: Entry, table: MappingNode) -> NodeKind:
+        """Return the kind of a node; a node with both `modes` and `regions` is reported."""
         if "history" in table.entries:
             return "history"
         if "modes" in table.entries and "regions" in table.entries:
@@ -224,7 +252,11 @@ class ChartReader:
         return "parallel" if "regions" in table.entries else "atomic"
 
     def _read_mode(self, entry: Entry, raw: RawNode, key: str, parent_mode: Mode | None) -> Mode:
-        """Return the mode of a node; what superstates of its region hold is handed down."""
+        """Return the mode of a node, which inherits the dynamics of superstates of its region.
+
+        Its name is the path inside its region. A number of a superstate and a priority of a mode
+        that is no region are reported.
+        """
         name = raw.path.removeprefix(f"{raw.region}.") if raw.region != CHART else raw.path
         if raw.is_region:
             name = raw.name
@@ -239,6 +271,7 @@ class ChartReader:
         return self.mode_reader.read_mode(Entry(name, entry.span, raw.table), site)
 
     def _build_node(self, index: int) -> ChartNode:
+        """Return the immutable node of the raw node at an index."""
         raw = self.raw_nodes[index]
         table = raw.table
         final = self.mode_reader.read_choice(
@@ -269,6 +302,7 @@ class ChartReader:
         )
 
     def _read_events(self) -> dict[str, ChartEvent]:
+        """Return the declared events by name, numbered from 1."""
         found: dict[str, ChartEvent] = {}
         for entry in self.mode_reader.named_entries(self.root.get("events"), "events"):
             table = self.mode_reader.read_mapping(entry.node, f"events.{entry.key}", ("from",))
@@ -277,11 +311,17 @@ class ChartReader:
         return found
 
     def _read_order(self) -> str:
+        """Return `order`, by default `outer_first`."""
         allowed = ("outer_first", "inner_first")
         return self.mode_reader.read_choice(self.root.get("order"), "order", allowed, "outer_first")
 
     def _read_micro_steps(self, events: Mapping[str, ChartEvent], modes: Iterable[Mode]) -> int:
-        """One, or as many as modes where one tick may have several events to take."""
+        """Return the bound of micro-steps in a tick (rule 7).
+
+        The default is 1. If a tick may have several events, because events are raised or several
+        are inputs, it is the number of innermost modes, from 2 to 255. A bound of 1 is reported if
+        a transition raises an event.
+        """
         raised = any(way.raises for mode in modes for way in mode.transitions)
         several = raised or sum(signal.is_input for signal in events.values()) > 1
         count = max(2, sum(raw.number is not None for raw in self.raw_nodes))
@@ -295,6 +335,10 @@ class ChartReader:
         return given
 
     def _build_region(self, chart: Chart, node: ChartNode) -> Region:
+        """Return the region of a node with its innermost modes and its initial mode.
+
+        A region inside a mode gets a number for inactivity: below all mode numbers, and at most -1.
+        """
         modes = {}
         for leaf in chart.leaves(node.region):
             mode = self.raw_nodes[leaf.index].mode

@@ -1,4 +1,4 @@
-"""Chart way: the transitions of a chart with their targets found, and what they leave."""
+"""Chart transitions: resolution of targets, and the node that each transition exits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from language.text.diagnostic import Problems, suggest_name
 def resolve_transitions(
     chart: Chart, modes: Mapping[int, Mode], problems: Problems
 ) -> dict[str, ChartTransition]:
-    """Return the ways of the modes of some nodes by their key path; wrong targets are reported."""
+    """Return the resolved transitions of modes, by key path; wrong targets are reported.
+
+    `modes` are the modes by the index of their node.
+    """
     result: dict[str, ChartTransition] = {}
     for index, mode in modes.items():
         for transition in mode.transitions:
@@ -26,6 +29,7 @@ def resolve_transitions(
 def _resolve_transition(
     chart: Chart, source: ChartNode, transition: Transition, problems: Problems
 ) -> ChartTransition:
+    """Return one resolved transition; targets that do not exist or do not fit are reported."""
     targets: list[ChartNode] = []
     for name in transition.targets:
         hit = resolve_target(chart, source, name)
@@ -49,7 +53,11 @@ def _resolve_transition(
 
 
 def _target_hint(chart: Chart, name: str) -> str:
-    """Return where a mode stands that is no target by its own name, else the nearest name."""
+    """Return a hint for an unknown target.
+
+    It is `to: []` for words like `none`, the paths of modes that have this name elsewhere in the
+    tree, or a similar name.
+    """
     if name in ("none", "null", "self", "stay"):
         return "`to: []` for no target"
     paths = [node.path for node in chart.nodes[ROOT + 1 :] if node.name == name]
@@ -61,7 +69,7 @@ def _target_hint(chart: Chart, name: str) -> str:
 def _check_orthogonal_targets(
     chart: Chart, transition: Transition, targets: Sequence[ChartNode], problems: Problems
 ) -> None:
-    """Several targets lie in different regions of one mode."""
+    """Report pairs of targets that are not in different regions of one parallel mode."""
     for number, target in enumerate(targets):
         for other in targets[:number]:
             shared = [node for node in chart.ancestors(target) if node.contains(other.index)]
@@ -75,6 +83,10 @@ def _check_orthogonal_targets(
 def _check_internal(
     source: ChartNode, transition: Transition, targets: Sequence[ChartNode], problems: Problems
 ) -> None:
+    """Report an internal transition whose targets are not descendants of its source.
+
+    An internal transition of a parallel mode must not have targets.
+    """
     if not transition.internal:
         return
     if any(not source.contains(t.index) or t.index == source.index for t in targets):

@@ -1,4 +1,4 @@
-"""Difference: a literal that is the width of something, not a point of a scale."""
+"""Difference literal: a quantity that is a difference, such as a noise level or an amplitude."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ HINT = "write a difference in K"
 def read_difference(
     reader: Reader, node: YamlNode | None, what: str, span: Span, unit: Unit
 ) -> Fraction:
-    """Return a literal in SI; a bare number is in `unit`, whose zero has no influence.
+    """Return a literal in SI as a difference; a bare number is in `unit` without its offset.
 
-    One with a unit that has a zero of its own (degC) is a point: reported.
+    A literal in a unit with an offset (degC) is reported: it is a point on a scale, not a
+    difference.
     """
     own_zero = dataclasses.replace(unit, offset=Fraction(0))
     value, own = reader.read_quantity(node, what, span, own_zero)

@@ -1,4 +1,4 @@
-"""Element reader: what effects are laid on - elements, places, and what the outputs read."""
+"""Element reader: elements and places, to which effects are applied, and outputs."""
 
 from __future__ import annotations
 
@@ -17,32 +17,33 @@ ELEMENT_KEYS = {
     "elastic": ("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
     "inertia": ("speed", "inertia", "far"),
 }
-"""Keys of an element by its kind; the first ones of each have to be there."""
+"""Allowed keys of an element by its kind."""
 REQUIRED_KEYS = {
     "elastic": ("twist", "rate", "torque", "stiffness"),
     "inertia": ("speed", "inertia"),
 }
+"""Required keys of an element by its kind."""
 PLACE_KEYS = ("weight", "load", "brake", "angle_rate")
-"""What a balance, input or output may say about itself for effects."""
+"""Keys that an entry of `places` may declare for a balance, input or output."""
 
 
 @dataclass(frozen=True)
 class OutputDeclarations:
-    """The outputs by name: where each stands, and what it reads."""
+    """The places of outputs in the file, and the variable that each output reads, by name."""
 
     spans: Mapping[str, Span]
     sources: Mapping[str, str]
 
 
 class ElementReader(Reader):
-    """Reads the sections that have no influence on the dynamics."""
+    """Reads elements, places and outputs, which do not influence the dynamics."""
 
     def __init__(self, problems: Problems) -> None:
         """Report into `problems`."""
         super().__init__(problems)
 
     def read_elements(self, node: YamlNode | None) -> dict[str, Element]:
-        """Return the elements by name."""
+        """Return the elements by name; one with an unknown kind is reported and left out."""
         found = {}
         for entry in self.named_entries(node, "elements"):
             key = f"elements.{entry.key}"
@@ -63,7 +64,7 @@ class ElementReader(Reader):
         return found
 
     def read_places(self, node: YamlNode | None) -> dict[str, Mapping[str, Formula]]:
-        """Return what places say about themselves, by the name of a state, input or output."""
+        """Return the formulas that `places` declares, by state, input or output and by key."""
         found: dict[str, Mapping[str, Formula]] = {}
         for entry in self.named_entries(node, "places"):
             key = f"places.{entry.key}"
@@ -72,7 +73,7 @@ class ElementReader(Reader):
         return found
 
     def read_outputs(self, node: YamlNode | None) -> OutputDeclarations:
-        """Return the outputs: a list of names, or a mapping from names to what they read."""
+        """Return the outputs of a list of names, or of a mapping from names to variables."""
         if not isinstance(node, MappingNode):
             items = self.read_list(node, "outputs")
             return OutputDeclarations(
@@ -87,7 +88,10 @@ class ElementReader(Reader):
 
 
 def outputs_as_mapping(node: YamlNode) -> MappingNode:
-    """Return the outputs of a tree as a mapping, whether they are a list or one already."""
+    """Return `outputs` as a mapping from each output to the variable that it reads.
+
+    A mapping is returned unchanged; each name of a list maps to itself.
+    """
     if isinstance(node, MappingNode):
         return node
     nodes = node.nodes if isinstance(node, SequenceNode) else ()

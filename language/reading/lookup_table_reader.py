@@ -1,4 +1,4 @@
-"""Table reader: a parameter with values over one or two axes, read by `lookup`."""
+"""Lookup table reader: a parameter with values over one or two axes, read by `lookup`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,21 @@ TableRow = dict[Fraction, Fraction]
 
 
 class LookupTableReader(Reader):
-    """Reads the `table` of a parameter; `declared` is what its axes may be named after."""
+    """Reads the key `table` of a parameter.
+
+    `axis_sections` are the sections whose variables give their units to axes of the same name.
+    """
 
     axis_sections: tuple[MappingNode, ...] = ()
 
     def read_lookup_table(
         self, table: MappingNode, key: str, value_range: Range | None
     ) -> LookupTable | None:
-        """Return `{over: x, unit: u, points: {...}}`, or None with the problem reported."""
+        """Return the table `{over: x, unit: u, points: {...}}`, or None with a problem reported.
+
+        `key` is the key path of the points. Values outside `value_range` and an axis with less than
+        two points are reported.
+        """
         unit = self.read_unit(table.get("unit"))
         names = self._read_axis_names(table)
         points = table.get("points")
@@ -41,6 +48,7 @@ class LookupTableReader(Reader):
         return LookupTable(axes, unit, values)
 
     def _read_axis_names(self, table: MappingNode) -> list[ScalarNode]:
+        """Return at most two names of axes from `over`."""
         node = table.get("over")
         if isinstance(node, ScalarNode):
             return [node]
@@ -54,7 +62,10 @@ class LookupTableReader(Reader):
         key: str,
         value_range: Range | None,
     ) -> tuple[tuple[Axis, ...], tuple[Fraction, ...]]:
-        """Return both axes and the values, one row for each point of the first axis."""
+        """Return the two axes, and the values row by row: the second axis varies fastest.
+
+        Rows whose points differ from those of the first row are reported.
+        """
         outer = self._find_axis_unit(names[0])
         first: dict[Fraction, TableRow] = {}
         second: Axis | None = None
@@ -79,6 +90,7 @@ class LookupTableReader(Reader):
     def _read_row(
         self, points: MappingNode, name: ScalarNode, unit: Unit, key: str, value_range: Range | None
     ) -> tuple[TableRow, Axis]:
+        """Return the values of one axis by point (SI), and the axis."""
         axis_unit = self._find_axis_unit(name)
         found: TableRow = {}
         for entry in points:
@@ -93,7 +105,11 @@ class LookupTableReader(Reader):
     def _read_point(
         self, entry: Entry, unit: Unit | None, key: str, previous_points: list[Fraction]
     ) -> tuple[Unit, Fraction]:
-        """Return the axis's unit and a point of it; a bare number is in the axis's unit."""
+        """Return the unit of an axis and a point (SI); a bare number is in the unit of the axis.
+
+        Without a known unit the first point determines it. A point that is not above the last of
+        `previous_points` is reported.
+        """
         scalar = ScalarNode(entry.key, entry.span)
         value, own = self.read_quantity(scalar, f"{key}.{entry.key}", entry.span, unit)
         if (
@@ -106,7 +122,7 @@ class LookupTableReader(Reader):
         return unit or own, value
 
     def _find_axis_unit(self, name: ScalarNode) -> Unit | None:
-        """Return the unit of the input or state that an axis is named after, if it is one."""
+        """Return the unit of the variable that an axis is named after, or None."""
         for section in self.axis_sections:
             thing = section.get(name.text)
             unit = thing.get("unit") if isinstance(thing, MappingNode) else None
@@ -119,6 +135,6 @@ class LookupTableReader(Reader):
 
 
 def section_of(tree: MappingNode, name: str) -> MappingNode:
-    """Return a section of an automaton, an empty one where it is absent."""
+    """Return a section of an automaton's tree; an empty mapping if it is absent or no mapping."""
     node = tree.get(name)
     return node if isinstance(node, MappingNode) else MappingNode({}, Span(tree.span.source, 0, 0))

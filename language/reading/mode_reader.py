@@ -1,4 +1,4 @@
-"""Mode reader: the modes of an automaton with their transitions, templates laid under them."""
+"""Mode reader: the modes of an automaton, with templates and inherited dynamics."""
 
 from __future__ import annotations
 
@@ -19,16 +19,19 @@ from language.text.document import Entry, MappingNode, YamlNode
 from language.text.overlay import apply_overlay, without_keys
 
 INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority", "transition_table")
-"""Keys of a mode in a chart."""
+"""Keys of a mode that only charts have."""
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
 REGION_KEYS = ("initial", "modes", "transition_table")
 IMPLICIT_MODE = "always"
-"""The mode of an automaton that has none of its own."""
+"""The name of the only mode of an automaton that declares no modes."""
 ACTION_KEYS = ("entry", "exit", "invariant")
 
 
 class ModeReader(Reader):
-    """Reads the modes of an automaton, `root`; `model` is what their runs may run."""
+    """Reads the modes of an automaton.
+
+    `root` is the tree of the automaton, and `model` the model whose modes it may run.
+    """
 
     def __init__(self, problems: Problems, model: Automaton | None, root: MappingNode) -> None:
         """Report into `problems`."""
@@ -40,7 +43,10 @@ class ModeReader(Reader):
         self.transition_reader = TransitionReader(problems, tuple(events.entries))
 
     def read_regions(self, span: Span) -> tuple[Region, ...]:
-        """Return the chart and the regions beside it; one mode `always` where none is written."""
+        """Return the region `chart`, then the parallel regions in the order of the file.
+
+        An automaton without modes at the root gets the mode `always`.
+        """
         entries = self.root_region_entries()
         chart = next((entry for entry in entries if entry.key == CHART), None)
         beside = tuple(self._read_region(entry) for entry in entries if entry is not chart)
@@ -57,7 +63,10 @@ class ModeReader(Reader):
         return (Region(CHART, modes, self._read_initial(self.root, modes, span), span), *beside)
 
     def root_region_entries(self) -> list[Entry]:
-        """Return the regions at the root; the modes of one called `chart` stand nowhere else."""
+        """Return the regions at the root; their names are checked.
+
+        If one is called `chart`, `modes` and `initial` at the root are reported as duplicates.
+        """
         entries = list(self.read_mapping(self.root.get("regions"), "regions"))
         for entry in entries:
             check_region_name(entry.key, entry.span, self.problems)
@@ -69,6 +78,7 @@ class ModeReader(Reader):
         return entries
 
     def _read_region(self, entry: Entry) -> Region:
+        """Return a parallel region. Raises SpecError if it has no mode."""
         table = self.read_mapping(entry.node, f"regions.{entry.key}", REGION_KEYS)
         modes = self._read_modes(table.get("modes"), entry.key, f"regions.{entry.key}.")
         if not modes:
@@ -77,7 +87,7 @@ class ModeReader(Reader):
         return Region(entry.key, modes, self._read_initial(table, modes, entry.span), entry.span)
 
     def _read_modes(self, node: YamlNode | None, region: str, key_prefix: str) -> dict[str, Mode]:
-        """Return the modes of a region; their key paths begin with `key_prefix`."""
+        """Return the modes of a region by name; their key paths begin with `key_prefix`."""
         modes: dict[str, Mode] = {}
         for entry in self.named_entries(node, "modes"):
             table = self.apply_template(self.read_mapping(entry.node, f"modes.{entry.key}"))
@@ -87,6 +97,10 @@ class ModeReader(Reader):
         return modes
 
     def _read_initial(self, table: MappingNode, modes: dict[str, Mode], span: Span) -> str:
+        """Return the name of the initial mode; a missing or unknown name is reported.
+
+        A region with a single mode needs no `initial`.
+        """
         node = table.get("initial")
         if node is None and len(modes) == 1:
             return next(iter(modes))
@@ -100,7 +114,10 @@ class ModeReader(Reader):
         return name
 
     def apply_template(self, mode: MappingNode) -> MappingNode:
-        """Return the keys of a mode laid over the template that it is like, if it is like one."""
+        """Return the mapping of a mode merged over the template that `like` names.
+
+        A mode without `like` is returned unchanged; an unknown template is reported.
+        """
         node = mode.get("like")
         if node is None:
             return mode
@@ -115,7 +132,7 @@ class ModeReader(Reader):
         return apply_overlay(template, without_keys(mode, "like"), self.problems, template=True)
 
     def read_mode(self, entry: Entry, context: ModeContext) -> Mode:
-        """Return a mode that has what the one around it hands down, else what the root says."""
+        """Return a mode with the dynamics that it inherits from its parent or from the root."""
         key, above = context.key, context.parent
         table = self.read_mapping(entry.node, key, (*MODE_KEYS, *ACTION_KEYS, *INNER_KEYS))
         invariants = self._read_invariants(table.get("invariant"), f"{key}.invariant")
@@ -138,17 +155,22 @@ class ModeReader(Reader):
         )
 
     def _root_sections(self, context: ModeContext) -> MappingNode:
-        """Return what the root says of every mode: of those of the chart that stand alone."""
+        """Return the root for a mode of the region `chart` without a parent, else an empty mapping.
+
+        `equations`, `flow` and `terms` of the root hold in all these modes.
+        """
         is_outermost = context.region == CHART and context.parent is None
         return self.root if is_outermost else MappingNode({}, self.root.span)
 
     def _read_equations(self, table: MappingNode, context: ModeContext) -> dict[str, Formula]:
+        """Return the inherited and own equations; equations that are given twice are reported."""
         found = dict(context.parent.equations) if context.parent else {}
         found |= self.read_formulas(self._root_sections(context).get("equations"), "equations")
         own = self.read_formulas(table.get("equations"), f"{context.key}.equations")
         return self._merge_formulas(found, own, "an equation for every mode")
 
     def _read_updates(self, table: MappingNode, context: ModeContext) -> dict[str, Formula]:
+        """Return the inherited and own updates; updates that are given twice are reported."""
         handed = dict(context.parent.update) if context.parent else {}
         own = self.read_formulas(table.get("update"), f"{context.key}.update")
         return self._merge_formulas(handed, own, "an update in a mode around this one")
@@ -156,7 +178,7 @@ class ModeReader(Reader):
     def _merge_formulas(
         self, inherited: dict[str, Formula], own: dict[str, Formula], what: str
     ) -> dict[str, Formula]:
-        """Return both; what a mode gives a second time is reported."""
+        """Return the union; a name in both is reported, and the own formula wins."""
         for name, formula in own.items():
             if name in inherited:
                 label = f"`{name}` has {what} already"
@@ -165,7 +187,10 @@ class ModeReader(Reader):
         return inherited | own
 
     def _read_flow(self, table: MappingNode, context: ModeContext) -> dict[str, Balance]:
-        """Return the balances of a mode, with the terms that are added to them."""
+        """Return the balances of a mode by state, with all terms added to their right sides.
+
+        An own balance replaces an inherited one.
+        """
         shared = self._root_sections(context)
         found = dict(context.parent.flow) if context.parent else {}
         found |= self._read_balances(shared.get("flow"), "flow")
@@ -175,6 +200,7 @@ class ModeReader(Reader):
         return found
 
     def _read_invariants(self, node: YamlNode | None, key: str) -> dict[str, Invariant]:
+        """Return the invariants of a mode by name; one with a wrong condition is left out."""
         found = {}
         for entry in self.named_entries(node, key):
             table = self.read_mapping(entry.node, f"{key}.{entry.key}", ("that", "message"))
@@ -186,16 +212,19 @@ class ModeReader(Reader):
         return found
 
     def _read_observer(self, node: YamlNode | None, context: ModeContext) -> Observer | None:
+        """Return the observer of a mode, by default that of its parent."""
         if node is None:
             return context.parent.observer if context.parent else None
         return read_observer(self, node, f"{context.key}.observer", self.model)
 
     def _read_run(self, node: YamlNode | None, context: ModeContext) -> ModelRun | None:
+        """Return the model run of a mode, by default that of its parent."""
         if node is None:
             return context.parent.run if context.parent else None
         return read_run(self, node, f"{context.key}.runs", self.model)
 
     def _read_balances(self, node: YamlNode | None, key: str) -> dict[str, Balance]:
+        """Return the balances of a section by state; one that cannot be parsed has error nodes."""
         found = {}
         for entry in self.named_entries(node, key):
             scalar = self.read_scalar(entry.node, f"{key}.{entry.key}", entry.span)
@@ -209,7 +238,10 @@ class ModeReader(Reader):
         return found
 
     def _add_terms(self, flow: dict[str, Balance], node: YamlNode | None, key: str) -> None:
-        """Add named summands to the right sides of balances, in the order of layers."""
+        """Add named summands to the right sides of balances of `flow`, in the order of the file.
+
+        A term for a state without a balance is reported.
+        """
         for entry in self.named_entries(node, key):
             terms = self.read_formulas(entry.node, f"{key}.{entry.key}")
             if entry.key not in flow:
@@ -224,7 +256,7 @@ class ModeReader(Reader):
 
 
 def check_mode_numbers(modes: Iterable[Mode], problems: Problems) -> None:
-    """Report each mode of a region that has the number of an earlier one."""
+    """Report each mode whose number an earlier mode of the region has."""
     names: dict[int, str] = {}
     for mode in modes:
         if mode.number in names:

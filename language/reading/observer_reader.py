@@ -1,4 +1,4 @@
-"""Observer and run: what carries the states of a sampled automaton over one tick."""
+"""Observer reader: Kalman filters and model runs, which carry states over a tick."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ FormulaMatrix = dict[str, dict[str, Formula]]
 
 
 def read_observer(reader: Reader, node: YamlNode, key: str, model: Automaton | None) -> Observer:
-    """Read an observer of a mode of the model, or one with written matrices."""
+    """Return the observer at a node: from a mode of the model (`of`) or with written matrices.
+
+    `key` is its key path. Missing and contradictory keys are reported.
+    """
     table = reader.read_mapping(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
     kalman = reader.read_mapping(table.get("kalman"), f"{key}.kalman", KALMAN_KEYS)
     gain = reader.read_choice(kalman.get("gain"), "gain", ("steady", "recursive"), "steady")
@@ -92,7 +95,10 @@ def read_observer(reader: Reader, node: YamlNode, key: str, model: Automaton | N
 def _read_measurement_noise(
     reader: Reader, table: MappingNode, key: str, measures: Mapping[str, str]
 ) -> dict[str, Formula]:
-    """Return the noise of each measurement; where any is given, each has one."""
+    """Return the noise of each measurement by name.
+
+    If some measurements have noise, those without it are reported.
+    """
     given = table.entries.get("measurement_noise")
     path = f"{key}.measurement_noise"
     noise = _read_vector(reader, table.get("measurement_noise"), path, set(measures))
@@ -104,6 +110,7 @@ def _read_measurement_noise(
 
 
 def _check_unique_states(reader: Reader, states: Iterable[str], entry: Entry | None) -> None:
+    """Report states that the list of states contains more than once."""
     for name, count in Counter(states).items():
         if count > 1 and entry:
             label = f"the observer has the state `{name}` {count} times"
@@ -111,6 +118,7 @@ def _check_unique_states(reader: Reader, states: Iterable[str], entry: Entry | N
 
 
 def _read_measures(reader: Reader, node: YamlNode | None, key: str) -> dict[str, str]:
+    """Return the measured input by the name of each measurement."""
     found = {}
     for entry in reader.named_entries(node, key):
         found[entry.key] = reader.read_string(entry.node, f"measures.{entry.key}", entry.span)
@@ -118,6 +126,7 @@ def _read_measures(reader: Reader, node: YamlNode | None, key: str) -> dict[str,
 
 
 def _check_required_keys(reader: Reader, table: MappingNode, span: Span) -> None:
+    """Report required keys that are missing in an observer."""
     if "kalman" not in table.entries:
         reader.problems.error("missing", span, "`kalman: {states: [...]}` is missing")
     for name in ("measures", *NOISE_KEYS):
@@ -128,7 +137,7 @@ def _check_required_keys(reader: Reader, table: MappingNode, span: Span) -> None
 def _reject_covariance_keys(
     reader: Reader, table: MappingNode, kalman: MappingNode, runs: bool
 ) -> None:
-    """A steady gain has no covariance that anything could change."""
+    """Report the keys of a recursive covariance in an observer with a steady-state gain."""
     for name in ("covariance", "covariance_range", "unknown_instant"):
         found = kalman.entries.get(name) or table.entries.get(name)
         if found:
@@ -140,7 +149,7 @@ def _reject_covariance_keys(
 
 
 def _read_unknown_instants(reader: Reader, node: YamlNode | None, key: str) -> dict[str, Formula]:
-    """Read within what time the new value of an input was taken: `{T_em: 10 ms}`."""
+    """Return the time by input within which its new value was sampled: `{T_em: 10 ms}`."""
     found = {}
     for entry in reader.named_entries(node, key):
         formula = reader.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
@@ -152,7 +161,10 @@ def _read_unknown_instants(reader: Reader, node: YamlNode | None, key: str) -> d
 def _read_variance_limits(
     reader: Reader, node: YamlNode | None, key: str, names: set[str]
 ) -> dict[str, tuple[Formula, Formula]]:
-    """Read the limits of variances: `{w_em: [low, high]}` in the square of the state's unit."""
+    """Return the lower and upper limit of the variance of each state: `{w_em: [low, high]}`.
+
+    They are in the square of the unit of the state.
+    """
     found = {}
     for entry in reader.read_mapping(node, key):
         if not _check_row_name(reader, entry, key, names):
@@ -168,7 +180,7 @@ def _read_variance_limits(
 
 
 def _check_matrix_source(reader: Reader, table: MappingNode) -> None:
-    """The matrices are taken from the model or written, not both."""
+    """Report matrices that are written although `of` takes them from the model."""
     written = [name for name in MATRIX_KEYS if name in table.entries]
     for name in written if "of" in table.entries else []:
         label = f"`{name}` is taken from the model: `of` stands beside it"
@@ -177,7 +189,7 @@ def _check_matrix_source(reader: Reader, table: MappingNode) -> None:
 
 
 def read_run(reader: Reader, node: YamlNode, key: str, model: Automaton | None) -> ModelRun:
-    """Read a run of one mode of the model."""
+    """Return the run of a mode of the model at a node; `key` is its key path."""
     table = reader.read_mapping(node, key, RUN_KEYS)
     mode = _read_model_mode(reader, table.get("of"), "a run", node.span, model) or ""
     point: dict[str, Formula] = {}
@@ -201,7 +213,7 @@ def read_run(reader: Reader, node: YamlNode, key: str, model: Automaton | None) 
 def _read_model_mode(
     reader: Reader, node: YamlNode | None, what: str, span: Span, model: Automaton | None
 ) -> str | None:
-    """Return the mode that `<model>.<mode>` names, None where that is a problem (reported)."""
+    """Return the mode that `<model>.<mode>` names, or None with a problem reported."""
     of = reader.read_string(node, "of", span)
     place = node.span if node else span
     name, _, mode = of.rpartition(".")
@@ -219,6 +231,7 @@ def _read_model_mode(
 def _read_matrix(
     reader: Reader, node: YamlNode | None, key: str, rows: set[str], columns: set[str]
 ) -> FormulaMatrix:
+    """Return the coefficients of a matrix by row and column name; unknown names are reported."""
     found = {}
     for entry in reader.read_mapping(node, key):
         if _check_row_name(reader, entry, key, rows):
@@ -229,6 +242,7 @@ def _read_matrix(
 def _read_operating_point(
     reader: Reader, node: YamlNode | None, key: str, model: Automaton | None
 ) -> dict[str, Formula]:
+    """Return the values of `at` by state or input of the model; other names are reported."""
     names = {*model.states, *model.inputs} if model else set()
     found = {}
     for entry in reader.read_mapping(node, key):
@@ -243,6 +257,7 @@ def _read_operating_point(
 def _read_vector(
     reader: Reader, node: YamlNode | None, key: str, names: set[str]
 ) -> dict[str, Formula]:
+    """Return the expressions of a mapping by row name; unknown names are reported."""
     found = {}
     for entry in reader.read_mapping(node, key):
         if _check_row_name(reader, entry, key, names):
@@ -253,6 +268,7 @@ def _read_vector(
 
 
 def _check_row_name(reader: Reader, entry: Entry, key: str, names: set[str]) -> bool:
+    """Tell whether the key of an entry is in `names`; report it otherwise."""
     if entry.key in names:
         return True
     label = f"`{entry.key}` is not a row or column of `{key.rpartition('.')[2]}`"

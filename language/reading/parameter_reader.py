@@ -1,4 +1,4 @@
-"""Parameter reader: parameters with values, formulas or tables, and how each is fitted."""
+"""Parameter reader: parameters with values, expressions or tables, and their settings for fits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FitForm = Literal["constant", "constant_or_random_walk"]
 
 
 class ParameterReader(Reader):
-    """Reads the section `parameters` of an automaton, `root`."""
+    """Reads the section `parameters` of an automaton with the tree `root`."""
 
     def __init__(self, problems: Problems, root: MappingNode) -> None:
         """Report into `problems`."""
@@ -28,11 +28,15 @@ class ParameterReader(Reader):
         self.axis_sections = (section_of(root, "inputs"), section_of(root, "states"))
 
     def read_parameters(self) -> dict[str, Parameter]:
-        """Return the parameters in the order of the file."""
+        """Return the parameters by name in the order of the file."""
         entries = self.named_entries(self.root.get("parameters"), "parameters")
         return {entry.key: self._read_parameter(entry) for entry in entries}
 
     def _read_parameter(self, entry: Entry) -> Parameter:
+        """Return one parameter; a value outside its range is reported.
+
+        The unit is `unit`, else that of the value, else 1.
+        """
         own_keys = ("value", "unit", "range", "tunable", "derived", "type", "values", "table")
         keys = (*own_keys, *FITTING_KEYS)
         table = self.read_mapping(entry.node, f"parameters.{entry.key}", keys)
@@ -71,6 +75,10 @@ class ParameterReader(Reader):
         return Parameter(*place, fitting, type_, values, about=about_of(table))
 
     def _read_derived(self, table: MappingNode, key: str, entry: Entry) -> Formula | None:
+        """Return the expression of a derived parameter, or None if it is missing.
+
+        Keys that exclude `derived` are reported.
+        """
         for other in ("value", "tunable", "range", "type"):
             if other in table.entries:
                 label = f"a derived parameter has no `{other}`"
@@ -78,6 +86,7 @@ class ParameterReader(Reader):
         return self.read_expression(table.get("derived"), f"{key}.derived", entry.span)
 
     def _read_table_parameter(self, entry: Entry, table: MappingNode) -> Parameter:
+        """Return a parameter with a lookup table; keys that exclude it are reported."""
         key = f"parameters.{entry.key}"
         for other in ("value", "derived", "unit", "type", "values", *FITTING_KEYS):
             if other in table.entries:
@@ -105,6 +114,7 @@ class ParameterReader(Reader):
         )
 
     def _read_fitting(self, table: MappingNode, unit: Unit, value_range: Range | None) -> Fitting:
+        """Return the settings of a parameter for a fit; values outside its range are reported."""
         node, plain = table.get("neutral"), table.get("plain")
         neutral: Fraction | Literal["absent"] | None = None
         if isinstance(node, ScalarNode) and node.text == "absent":
@@ -128,7 +138,7 @@ class ParameterReader(Reader):
     def _read_within_range(
         self, node: YamlNode, key: str, description: str, unit: Unit, value_range: Range | None
     ) -> Fraction:
-        """Return a value of a parameter that lies in its range."""
+        """Return a literal in SI; one outside the range is reported as `description`."""
         value, _ = self.read_quantity(node, key, node.span, unit)
         if value_range and not value_range[0] <= value <= value_range[1]:
             self.problems.error("range", node.span, f"{description} is outside the range")

@@ -1,4 +1,7 @@
-"""Reader: the helpers with which every kind of document is read into its model."""
+"""Reader: the base class of all readers, with methods for scalars, quantities, ranges and types.
+
+A reader reports problems into one collector and continues with a default value.
+"""
 
 from __future__ import annotations
 
@@ -26,13 +29,13 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 from language.typecheck.types import MAX_INT, TYPE_NAMES, TypeName
 
 NO_SPAN = Span(Source(""), 0, 0)
-"""The place of an absent mapping: nothing is ever reported there."""
+"""The place of an absent mapping; no problem is reported there."""
 TEXT_KEYS = frozenset({"about", "req"})
-"""Keys that go on anything and have no influence."""
+"""Keys that every mapping may have and that have no influence."""
 
 
 class Reader:
-    """Reads parts of a document, reporting what is wrong into one collector."""
+    """Reads parts of a document and reports problems into one collector."""
 
     def __init__(self, problems: Problems) -> None:
         """Report into `problems`."""
@@ -42,7 +45,11 @@ class Reader:
     def read_mapping(
         self, node: YamlNode | None, what: str, known_keys: Iterable[str] | None = None
     ) -> MappingNode:
-        """Return a mapping with known keys only; an empty one where the node is absent."""
+        """Return a mapping without its unknown keys; an empty one for an absent or empty node.
+
+        Unknown keys and a node that is no mapping are reported; `what` names the node. Without
+        `known_keys` all keys are allowed.
+        """
         if node is None:
             return MappingNode({}, NO_SPAN)
         if not isinstance(node, MappingNode):
@@ -62,13 +69,17 @@ class Reader:
         return MappingNode(kept, node.span)
 
     def _check_requirement_names(self, entry: Entry) -> None:
-        """Requirements are a name, or a list of names."""
+        """Report a value of `req` that is neither a name nor a list of names."""
         nodes = entry.node.nodes if isinstance(entry.node, SequenceNode) else (entry.node,)
         if not all(isinstance(node, ScalarNode) and node.text for node in nodes):
             label = "`req` is the name of a requirement, or a list of names"
             self.problems.error("form", entry.span, label, "like `req: [BL-3]`")
 
     def _report_unknown_key(self, entry: Entry, what: str, known: set[str]) -> None:
+        """Report an unknown key with a hint.
+
+        The hint is another spelling, a similar key, or the list of all known keys.
+        """
         hint = (
             key_alias_hint(entry.key, known)
             or key_hint(entry.key, what)
@@ -82,13 +93,13 @@ class Reader:
         self.problems.error("unknown-key", entry.span, label, hint)
 
     def named_entries(self, node: YamlNode | None, what: str) -> Iterator[Entry]:
-        """Iterate over the named things of a mapping, names checked."""
+        """Yield the entries of a mapping; keys that are no valid names are reported."""
         for entry in self.read_mapping(node, what):
             check_name(entry.key, entry.span, self.problems)
             yield entry
 
     def read_scalar(self, node: YamlNode | None, what: str, span: Span) -> ScalarNode | None:
-        """Return a scalar, or report that it is missing or something else."""
+        """Return a scalar; None with a problem reported if the node is absent or no scalar."""
         if node is None:
             self.problems.error("missing", span, f"`{what}` is missing")
         elif not isinstance(node, ScalarNode):
@@ -98,16 +109,17 @@ class Reader:
         return None
 
     def read_string(self, node: YamlNode | None, what: str, span: Span) -> str:
-        """Return the text of a scalar, or an empty text with a problem reported."""
+        """Return the text of a scalar; an empty text with a problem reported if there is none."""
         scalar = self.read_scalar(node, what, span)
         return scalar.text if scalar else ""
 
     def read_alternative(
         self, entry: Entry, key: str, alternatives: Mapping[str, tuple[str, ...]], verb: str
     ) -> tuple[str, MappingNode] | None:
-        """Return which of some kinds a thing is, and its keys; None with the problem reported.
+        """Return which of several kinds an entry is, and its mapping; None with a problem reported.
 
-        It has one key that names its kind, and beside it those that go with that kind.
+        `alternatives` gives for each key that names a kind the keys that may be beside it. Exactly
+        one kind must be given.
         """
         problem_count = len(self.problems.reported)
         beside = {key for keys in alternatives.values() for key in keys}
@@ -122,7 +134,7 @@ class Reader:
         return None
 
     def read_list(self, node: YamlNode | None, what: str) -> list[ScalarNode]:
-        """Return the scalars of a list."""
+        """Return the scalars of a list; empty for an absent node. Other items are reported."""
         if node is None:
             return []
         if not isinstance(node, SequenceNode):
@@ -136,7 +148,10 @@ class Reader:
     def read_choice(
         self, node: YamlNode | None, what: str, allowed: Iterable[str], default: str
     ) -> str:
-        """Return one of the allowed words."""
+        """Return one of the allowed words.
+
+        Returns `default` for an absent node and for an unknown word, which is reported.
+        """
         if node is None:
             return default
         text = self.read_string(node, what, node.span)
@@ -150,7 +165,10 @@ class Reader:
     def read_integer(
         self, node: YamlNode | None, what: str, default: int, low: int, high: int
     ) -> int:
-        """Return an integer between low and high."""
+        """Return an integer from `low` to `high`.
+
+        Returns `default` for an absent node and for any other value, which is reported.
+        """
         if node is None:
             return default
         text = self.read_string(node, what, node.span)
@@ -163,7 +181,10 @@ class Reader:
         return int(text)
 
     def read_unit(self, node: YamlNode | None) -> Unit:
-        """Return a unit, `1` where there is none."""
+        """Return a unit: 1 (`NO_UNIT`) for an absent node.
+
+        An unknown unit is reported and gives `UNKNOWN_UNIT`.
+        """
         if node is None:
             return NO_UNIT
         text = self.read_string(node, "unit", node.span)
@@ -174,9 +195,10 @@ class Reader:
             return UNKNOWN_UNIT
 
     def read_expression(self, node: YamlNode | None, key: str, span: Span) -> Formula | None:
-        """Return an expression, or None with the problem reported.
+        """Return an expression with its key path, or None with a problem reported.
 
-        Every text is parsed once: what stands at the root is read again in each mode.
+        A text that does not parse gives an `ErrorNode`. Results are stored by scalar and key,
+        because sections of the root are read again for each mode.
         """
         scalar = self.read_scalar(node, key.rpartition(".")[2], span)
         if scalar is None:
@@ -186,13 +208,14 @@ class Reader:
         return self.parsed_formulas[id(scalar), key][1]
 
     def _parse_formula(self, scalar: ScalarNode, key: str) -> Formula:
+        """Return the parsed expression of a scalar; an `ErrorNode` with a problem reported."""
         tree: SyntaxTree = ErrorNode(scalar.span)
         with self.problems.collect_errors():
             tree = parse_expression(scalar)
         return Formula(tree, key)
 
     def read_formulas(self, node: YamlNode | None, key: str) -> dict[str, Formula]:
-        """Return the expressions of a mapping by their names; one with a problem is left out."""
+        """Return the expressions of a mapping by name; entries that are no scalars are left out."""
         found = {}
         for entry in self.named_entries(node, key):
             formula = self.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
@@ -203,7 +226,11 @@ class Reader:
     def read_quantity(
         self, node: YamlNode | None, what: str, span: Span, unit: Unit | None
     ) -> Quantity:
-        """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""
+        """Return a literal in SI and its unit; a bare number is in `unit` if one is given.
+
+        A wrong literal gives 0 and `unit`, or `UNKNOWN_UNIT`. An expression, and a unit of another
+        dimension than `unit`, are reported.
+        """
         formula = self.read_expression(node, what, span)
         literal = _literal_value(formula.tree) if formula else None
         if formula and literal is None and not isinstance(formula.tree, ErrorNode):
@@ -222,7 +249,10 @@ class Reader:
         return value, own
 
     def read_type(self, table: MappingNode, what: str) -> tuple[TypeName, tuple[str, ...]]:
-        """Return the `type` of a declaration, and the `values` of an enumeration."""
+        """Return the `type` of a declaration, and the `values` of an enumeration (else empty).
+
+        Keys that do not fit the type are reported.
+        """
         kind = cast(TypeName, self.read_choice(table.get("type"), "type", TYPE_NAMES, "real"))
         node = table.get("values")
         items = self.read_list(node, "values")
@@ -255,7 +285,10 @@ class Reader:
         type_name: TypeName,
         names: Sequence[str],
     ) -> Fraction:
-        """Return a literal of some type as a number: a quantity in SI, 0 or 1, or a place."""
+        """Return a literal of a type as a number: SI value, integer, 0 or 1, or index in `names`.
+
+        A wrong literal gives 0 with a problem reported.
+        """
         if type_name == "real":
             return self.read_quantity(node, what, span, unit)[0]
         scalar = self.read_scalar(node, what, span)
@@ -270,14 +303,17 @@ class Reader:
     def read_default(
         self, table: MappingNode, key: str, unit: Unit, type_name: TypeName, names: Sequence[str]
     ) -> Fraction | None:
-        """Return the `default` of an input of some type; None where there is none."""
+        """Return the `default` of an input as a number, or None if it has none."""
         node = table.get("default")
         if node is None:
             return None
         return self.read_typed_value(node, f"{key}.default", node.span, unit, type_name, names)
 
     def check_integer_range(self, value_range: Range | None, node: YamlNode | None) -> Range | None:
-        """Return the range of whole numbers; one with a fraction or past 32 bits is reported."""
+        """Return the range of an integer, or None if there is none.
+
+        Bounds that are not whole or not within +-MAX_INT are reported and give None.
+        """
         if value_range is None or node is None:
             return None
         if any(bound.denominator != 1 or abs(bound) > MAX_INT for bound in value_range):
@@ -287,7 +323,7 @@ class Reader:
         return value_range
 
     def read_range(self, node: YamlNode | None, unit: Unit) -> Range | None:
-        """Return `[low, high]` in SI."""
+        """Return the bounds `[low, high]` in SI; None if the node is absent or wrong (reported)."""
         bounds = self.read_list(node, "range")
         if not isinstance(node, SequenceNode):
             return None
@@ -310,6 +346,10 @@ Quantity = tuple[Fraction, Unit]
 
 
 def _literal_value(tree: SyntaxTree) -> tuple[Fraction, Unit] | None:
+    """Return the value (SI) and unit of a number literal, also of a negated one; None otherwise.
+
+    In a unit with an offset the number is negated, not the SI value: -5 degC is 268.15 K.
+    """
     match tree:
         case NumberLiteral(value, unit, _):
             return value, unit
@@ -320,6 +360,6 @@ def _literal_value(tree: SyntaxTree) -> tuple[Fraction, Unit] | None:
 
 
 def about_of(table: MappingNode) -> str:
-    """Return the text that says what a thing is."""
+    """Return the description in `about`; an empty text if there is none."""
     node = table.get("about")
     return node.text if isinstance(node, ScalarNode) else ""

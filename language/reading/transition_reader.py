@@ -1,4 +1,4 @@
-"""Transition reader: the transitions of a mode, each with its guard."""
+"""Transition reader: the transitions of a mode with guards, waits, resets and events."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 
 @dataclass(frozen=True)
 class ModeContext:
-    """Where a mode stands.
+    """The position of a mode in the automaton.
 
-    `position` counts the modes of the region before it; `above` is the mode around it, if any;
-    `holds_modes` tells that there are modes inside, which may come to an end.
+    `key` is its key path and `position` the number of modes before it in its region. `parent` is
+    the superstate around it, or None. `has_inner_modes` tells that the mode has modes inside.
     """
 
     key: str
@@ -41,7 +41,7 @@ MemoryOption = Literal["reset", "continue"]
 
 
 class TransitionReader(Reader):
-    """Reads transitions; `events` are those that the automaton declares."""
+    """Reads transitions; `events` are the names of the declared events."""
 
     def __init__(self, problems: Problems, events: tuple[str, ...]) -> None:
         """Report into `problems`."""
@@ -51,7 +51,10 @@ class TransitionReader(Reader):
     def read_transitions(
         self, node: YamlNode | None, source: str, context: ModeContext
     ) -> Iterator[Transition]:
-        """Iterate over the transitions of the mode `source`; one without a guard is reported."""
+        """Yield the transitions of the mode `source` in the order of the file.
+
+        A transition without a guard is reported and left out.
+        """
         for entry in self.read_mapping(node, "transitions"):
             self._check_name(entry)
             transition = self._read_transition(entry, source, context)
@@ -59,7 +62,7 @@ class TransitionReader(Reader):
                 yield transition
 
     def _check_name(self, entry: Entry) -> None:
-        """A transition is named like anything; one named like a path to its target has `to`."""
+        """Report a transition whose key is no name; for a dotted path the hint proposes `to`."""
         if re.fullmatch(r"\w+(\.\w+)+", entry.key):
             name = entry.key.rpartition(".")[2]
             label = f"`{entry.key}` is not a name"
@@ -72,6 +75,11 @@ class TransitionReader(Reader):
     def _read_transition(
         self, entry: Entry, source: str, context: ModeContext
     ) -> Transition | None:
+        """Return one transition, or None if its guard is missing.
+
+        A transition without `when` and events is a completion transition of a mode with modes
+        inside.
+        """
         key = f"{context.key}.transitions.{entry.key}"
         table = self.read_mapping(entry.node, key, (*TRANSITION_KEYS, *CHART_TRANSITION_KEYS))
         to, wait, priority = (table.get(part) for part in ("to", "wait", "priority"))
@@ -108,7 +116,7 @@ class TransitionReader(Reader):
         )
 
     def _read_targets(self, node: YamlNode | None, entry: Entry) -> tuple[str, ...]:
-        """Return the names of the modes that a transition leads to: by default its own name."""
+        """Return the names in `to`; without the key, the name of the transition."""
         if node is None:
             return (entry.key,)
         if isinstance(node, ScalarNode) and not node.text:
@@ -118,14 +126,14 @@ class TransitionReader(Reader):
         return self._read_names(node, "to")
 
     def _read_names(self, node: YamlNode | None, what: str) -> tuple[str, ...]:
-        """Return the names of a list, or the only one."""
+        """Return the names of a list, or of a single scalar; empty for an absent node."""
         if isinstance(node, SequenceNode):
             return tuple(item.text for item in self.read_list(node, what))
         word = self.read_string(node, what, node.span) if node else ""
         return (word,) if word else ()
 
     def _read_events(self, table: MappingNode, what: str) -> tuple[str, ...]:
-        """Return the names of events, which are declared."""
+        """Return the names of events under the key `what`; undeclared events are reported."""
         node = table.get(what)
         names = self._read_names(node, what)
         for item in node.nodes if isinstance(node, SequenceNode) else (node,):
@@ -143,7 +151,11 @@ class TransitionReader(Reader):
     def _read_guard(
         self, table: MappingNode, key: str, entry: Entry, is_optional: bool
     ) -> Formula | None:
-        """Return the guard; an event needs none, nor does the end of a mode with modes inside."""
+        """Return the guard, or None with a problem reported.
+
+        If the guard is optional, because the transition has an event or its source has modes
+        inside, a missing `when` means `true`.
+        """
         node = table.get("when")
         if node is None and is_optional:
             return Formula(BoolLiteral(True, entry.span), f"{key}.when")
@@ -166,7 +178,10 @@ class TransitionReader(Reader):
         return self.read_expression(node, f"{key}.when", entry.span)
 
     def _read_rewind(self, node: YamlNode | None, key: str) -> Rewind | None:
-        """Read how far back a transition reaches, and to what."""
+        """Return the rewind of a transition, or None without the key.
+
+        An incomplete rewind is reported and gives None.
+        """
         if node is None:
             return None
         table = self.read_mapping(node, key, ("until", "within", "beyond"))

@@ -1,4 +1,4 @@
-"""Transition table: for each mode and each column where it leads, as ordinary transitions.
+"""Transition table reader: expansion of transition tables into ordinary transitions.
 
     transition_table:
       columns: {start: {when: key == crank, priority: 2}, hot: {when: temp > 90 degC, priority: 1}}
@@ -6,9 +6,9 @@
         idle: {start: run, hot: stay}
         run: {start: stay, hot: idle}
 
-A column is a transition without its target; a cell is the target, or `stay`. Complete: each of the
-modes beside the table has a row, each row all columns. Whether two columns can fire together is a
-question about the transitions that come of it (decision 0009).
+A column is a transition without a target. A cell is the target, or `stay` for no transition. Each
+mode beside the table needs a row, and each row needs all columns. The checks of transitions decide
+whether two columns can fire together (decision 0009).
 """
 
 from __future__ import annotations
@@ -26,16 +26,19 @@ STAY = "stay"
 
 
 def expand_transition_tables(tree: MappingNode, problems: Problems) -> MappingNode:
-    """Return an automaton's tree with the transitions of its tables in their modes."""
+    """Return an automaton's tree in which the tables of the root and of all modes are expanded.
+
+    Problems are reported into `problems`.
+    """
     reader = _TransitionTableReader(problems)
     return reader.expand_table(reader.expand_children(tree, ("modes", "regions")))
 
 
 class _TransitionTableReader(Reader):
-    """Reads tables wherever modes stand."""
+    """Expands the transition tables of a tree."""
 
     def expand_children(self, tree: MappingNode, keys: tuple[str, ...]) -> MappingNode:
-        """Return a tree in whose modes and regions the tables are written out."""
+        """Return a mapping in which the tables below the sections `keys` are expanded."""
         expanded = dict(tree.entries)
         for key in keys:
             group = tree.get(key)
@@ -48,6 +51,7 @@ class _TransitionTableReader(Reader):
         return MappingNode(expanded, tree.span)
 
     def _expand_node(self, node: YamlNode) -> YamlNode:
+        """Return the node of a mode or region with all its tables expanded."""
         return (
             self.expand_table(self.expand_children(node, ("modes", "regions")))
             if isinstance(node, MappingNode)
@@ -55,7 +59,11 @@ class _TransitionTableReader(Reader):
         )
 
     def expand_table(self, tree: MappingNode) -> MappingNode:
-        """Return a tree whose own table, if it has one, is written out in the modes beside it."""
+        """Return a mapping whose own table is removed and expanded into its `modes`.
+
+        A mapping without a table is returned unchanged. A table without modes or columns, and rows
+        of unknown modes, are reported.
+        """
         entry, modes = tree.entries.get(TABLE_KEY), tree.get("modes")
         if entry is None:
             return tree
@@ -84,7 +92,10 @@ class _TransitionTableReader(Reader):
     def _expand_mode(
         self, mode: Entry, row: Entry | None, columns: Mapping[str, Entry], table: Entry
     ) -> Entry:
-        """Return a mode with the transitions of its row."""
+        """Return a mode with the transitions of its row added to its own.
+
+        A missing row, an unknown column and a transition with the name of a column are reported.
+        """
         if mode.key == STAY:
             label = f"`{STAY}` in a cell leads nowhere: no mode beside a table has this name"
             self.problems.error("name", mode.span, label)
@@ -115,7 +126,10 @@ class _TransitionTableReader(Reader):
         return _replace_node(mode, MappingNode({**body.entries, "transitions": made}, body.span))
 
     def _read_cell(self, row: Entry, cell: Entry | None, column: Entry) -> Entry | None:
-        """Return the transition of a cell, None where it stays."""
+        """Return the transition of a cell, or None for `stay`.
+
+        A missing cell is reported and gives None.
+        """
         if cell is None:
             label = f"`{row.key}` says nothing of `{column.key}`"
             self.problems.error("incomplete", row.span, label, f"a mode, or `{STAY}`")
@@ -130,4 +144,5 @@ class _TransitionTableReader(Reader):
 
 
 def _replace_node(entry: Entry, node: YamlNode) -> Entry:
+    """Return an entry with the same key and place and another node."""
     return Entry(entry.key, entry.span, node)

@@ -1,4 +1,4 @@
-"""Truth table reader: conditions by name, rows like `"T F -": {permit: false}`, at last `else`."""
+"""Truth table reader: named conditions, rows like `"T F -": {permit: false}`, and a last `else`."""
 
 from __future__ import annotations
 
@@ -16,23 +16,27 @@ MARK_ALIASES: Mapping[str, str] = {
     **dict.fromkeys("FfNn0", "F"),
     **dict.fromkeys("-*Xx", "-"),
 }
-"""How other tools write a mark."""
+"""Spellings of marks in other tools, for hints."""
 MAX_CONDITIONS = 16
-"""Conditions of a table: the search for an undecided row looks at 2^16 at most."""
+"""Largest number of conditions; the search for an undecided row examines up to 2^16 cases."""
 
 
 class TruthTableReader(Reader):
-    """Reads the section `tables` of an automaton; `discrete` is what its rows may write."""
+    """Reads the section `tables`; `discrete` are the variables that rows may assign."""
 
     discrete: tuple[str, ...] = ()
 
     def read_truth_tables(self, tree: MappingNode) -> tuple[TruthTable, ...]:
-        """Return the tables in the order of the file."""
+        """Return the truth tables of an automaton's tree in the order of the file."""
         self.discrete = tuple(self.read_mapping(tree.get("discrete"), "discrete").entries)
         node = tree.get("tables")
         return tuple(self._read_table(entry) for entry in self.named_entries(node, "tables"))
 
     def _read_table(self, entry: Entry) -> TruthTable:
+        """Return one table.
+
+        Empty sections, too many conditions and a row `else` that is not the last are reported.
+        """
         key = f"tables.{entry.key}"
         body = self.read_mapping(entry.node, key, ("if", "rows"))
         conditions = self.read_formulas(body.get("if"), f"{key}.if")
@@ -53,6 +57,7 @@ class TruthTableReader(Reader):
         return TruthTable(entry.key, conditions, rows, key, entry.span)
 
     def _read_row(self, entry: Entry, key: str, width: int) -> TruthRow:
+        """Return one row of `width` marks; a row with wrong marks is reported and gets none."""
         is_rest = entry.key == ELSE_ROW
         marks = ["-"] * width if is_rest else entry.key.split()
         if len(marks) != width or not all(mark in MARKS for mark in marks):
@@ -70,7 +75,10 @@ class TruthTableReader(Reader):
 
 
 def _row_hint(key: str, width: int) -> str:
-    """Return how a row is written: this one, where its marks can be told."""
+    """Return a hint for a wrong row.
+
+    It is the correct spelling if the marks are recognised, otherwise the form of a row.
+    """
     marks = [MARK_ALIASES.get(mark, "") for mark in key if not mark.isspace()]
     if len(marks) == width and all(marks):
         return f'it is written `"{" ".join(marks)}"`'

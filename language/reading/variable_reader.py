@@ -1,4 +1,4 @@
-"""Variable reader: inputs, states and discrete variables with their types, ranges and faults."""
+"""Variable reader: inputs, states and discrete variables with types, ranges and faults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ RangeAction = Literal["saturate", "hold", "fault"]
 
 
 class VariableReader(Reader):
-    """The sections of an automaton that declare what changes; `model` knows units of states."""
+    """Reads the sections that declare variables.
+
+    A state without a unit gets that of the state of the same name in `model`.
+    """
 
     def __init__(
         self,
@@ -31,7 +34,10 @@ class VariableReader(Reader):
         tree: MappingNode,
         modes: Collection[str],
     ) -> None:
-        """Read `faults` and `fault_mode`, which the ranges name."""
+        """Read `faults` and `fault_mode` of the tree of an automaton.
+
+        `modes` are the names of the modes that a fault may enter.
+        """
         super().__init__(problems)
         self.model = model
         self.is_sampled = is_sampled
@@ -49,6 +55,7 @@ class VariableReader(Reader):
         return {entry.key: self._read_input(entry) for entry in self.named_entries(node, "inputs")}
 
     def _read_input(self, entry: Entry) -> Input:
+        """Return one input with its type, range and default (SI)."""
         keys = ("unit", "range", "default", "type", "values", *RANGE_POLICY_KEYS)
         key = f"inputs.{entry.key}"
         table = self.read_mapping(entry.node, key, keys)
@@ -64,7 +71,7 @@ class VariableReader(Reader):
         return Input(entry.key, unit, kind, default, limits, key, span, values, outside, about)
 
     def read_states(self, node: YamlNode | None) -> dict[str, State]:
-        """Return the states by name."""
+        """Return the states by name; a state without a unit has that of the model's state, or 1."""
         found = {}
         for entry in self.named_entries(node, "states"):
             keys = ("unit", "initial", "range", *RANGE_POLICY_KEYS)
@@ -93,7 +100,7 @@ class VariableReader(Reader):
         return found
 
     def read_discrete(self, node: YamlNode | None) -> dict[str, State]:
-        """Return the discrete variables by name."""
+        """Return the discrete variables by name; one without `initial` is reported and left out."""
         found = {}
         for entry in self.named_entries(node, "discrete"):
             key = f"discrete.{entry.key}"
@@ -128,7 +135,11 @@ class VariableReader(Reader):
         values: Sequence[str],
         value_range: Range | None,
     ) -> RangePolicy:
-        """What becomes of a value outside its range (rule 18)."""
+        """Return the reaction to a value outside its range (rule 18).
+
+        Keys in a continuous automaton, keys without a range, unknown faults and a missing fault
+        mode are reported.
+        """
         for key in RANGE_POLICY_KEYS:
             place = table.entries.get(key)
             if place and not self.is_sampled:
@@ -156,6 +167,7 @@ class VariableReader(Reader):
         return RangePolicy(cast(RangeAction, on_range), fallback, fault)
 
     def _read_faults(self, tree: MappingNode) -> dict[str, bool]:
+        """Return the declared faults by name, and whether each one is latched."""
         found = {}
         for entry in self.named_entries(tree.get("faults"), "faults"):
             table = self.read_mapping(entry.node, f"faults.{entry.key}", ("latched",))
