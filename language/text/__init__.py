@@ -1,1 +1,1 @@
-"""Text of a project: files, YAML nodes with places, diagnostics, provenance."""
+"""Text of a project: files, YAML nodes with their places, diagnostics and provenance."""

@@ -1,4 +1,4 @@
-"""Problems: mistakes in the user's spec or data, each with its place, collected and rendered."""
+"""Diagnostics: problems of a user's spec or data with their places, and their rendering as text."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from language.text.error_codes import code_of
 from language.text.sanitise import crop_line, escape_invisible, mask_invisible, truncate
 
 MAX_LABEL_LENGTH = 1000
-"""Characters of a message; a name of a million characters is quoted in part."""
+"""Longest label or help text that is printed [characters]; longer texts are truncated."""
 
 Severity = Literal["error", "warning"]
 
 SIMILARITY_CUTOFF = 0.6
-"""Similarity above which a known name is proposed for an unknown one (difflib's own default)."""
+"""Smallest similarity at which a known name is suggested (the default of difflib)."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """A text that spans point into: the name shown to the user and the lines of the text.
+    """A text that spans refer to: the name that the user sees and the lines of the text.
 
-    `layer` says which effect its lines were laid by, `laid` where that was asked for.
+    If an effect inserted the lines, `layer` names the effect and its place, and `applied_at` is the
+    place in the spec that applies the effect.
     """
 
     name: str
@@ -35,9 +36,9 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A place in a source: line and column count from 1, width in characters (at least 1).
+    """A place in a source: line and column, counted from 1, and a width of at least 1 character.
 
-    A `whole` place is that of a text that an overlay rewrote: its parts have no other place.
+    An atomic span belongs to a text that an overlay rewrote: parts of that text have no own place.
     """
 
     source: Source
@@ -47,7 +48,10 @@ class Span:
     is_atomic: bool = False
 
     def subspan(self, offset: int, width: int = 1) -> Span:
-        """Return the span `offset` characters into this one."""
+        """Return the span that starts `offset` characters after the start of this one.
+
+        An atomic span returns itself. A width below 1 becomes 1.
+        """
         if self.is_atomic:
             return self
         return Span(self.source, self.line, self.column + offset, max(1, width))
@@ -59,7 +63,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake of the user: what kind, where, what is wrong, and what would help."""
+    """One mistake of the user: its kind, its place, a label that describes it, and a help text."""
 
     kind: str
     span: Span
@@ -69,53 +73,54 @@ class Problem:
 
     @property
     def code(self) -> str:
-        """The number of its kind, like `MW201`: docs/problems.md explains it."""
+        """The code of the kind, like `MW201` (docs/problems.md); empty if the kind has none."""
         return code_of(self.kind)
 
 
 class SpecError(Exception):
-    """Raised where a stage cannot go on: carries all problems found until then."""
+    """An error that ends a stage of reading or checking; it carries all problems found so far."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
-        """Keep the problems; they are rendered in one place, by the caller."""
+        """Store the problems; the caller renders them."""
         super().__init__(problems)
         self.problems = tuple(problems)
 
     def __str__(self) -> str:
-        """Return all problems in one line."""
+        """Return the places and labels of all problems on one line, separated by `; `."""
         return "; ".join(f"{p.span}: {p.label}" for p in self.problems)
 
 
 class Problems:
-    """A collector: a stage reports into it and goes on as long as that makes sense."""
+    """A collector of problems: a stage adds to it and continues after an error where possible."""
 
     def __init__(self) -> None:
-        """Start empty."""
+        """Create an empty collector."""
         self.reported: list[Problem] = []
 
     def error(self, kind: str, span: Span, label: str, help: str = "") -> None:
-        """Report an error."""
+        """Append a problem of severity "error"."""
         self.reported.append(Problem(kind, span, label, help))
 
     def warning(self, kind: str, span: Span, label: str, help: str = "") -> None:
-        """Report a warning."""
+        """Append a problem of severity "warning"."""
         self.reported.append(Problem(kind, span, label, help, "warning"))
 
     @property
     def has_errors(self) -> bool:
-        """Tell whether an error (not only warnings) was reported."""
+        """Return whether the collector holds an error; warnings do not count."""
         return any(p.severity == "error" for p in self.reported)
 
     def raise_if_errors(self) -> None:
-        """Raise SpecError with everything found so far, if an error is among it."""
+        """Raise SpecError with all problems, warnings included, if one of them is an error."""
         if self.has_errors:
             raise SpecError(self.reported)
 
     @contextmanager
     def collect_errors(self) -> Iterator[None]:
-        """Take the problems of a SpecError raised inside and go on.
+        """Return a context that catches a SpecError of its body and appends its problems.
 
-        What it carries may begin with those that are here already: they are taken once.
+        If the problems of the error begin with those that this collector already holds, only the
+        remaining ones are appended.
         """
         try:
             yield
@@ -126,13 +131,21 @@ class Problems:
 
 
 def suggest_name(name: str, candidates: Iterable[str]) -> str:
-    """Return "did you mean `x`?" for the known name nearest to `name`, or an empty text."""
+    """Return "did you mean `x`?" with the candidate most similar to `name`, or an empty text.
+
+    The text is empty if no candidate has a similarity of at least SIMILARITY_CUTOFF.
+    """
     matches = difflib.get_close_matches(name, sorted(candidates), n=1, cutoff=SIMILARITY_CUTOFF)
     return f"did you mean `{matches[0]}`?" if matches else ""
 
 
 def render_problem(problem: Problem) -> str:
-    """Return `file:line:col: severity: label [code]`, the line, carets and the help."""
+    """Return a problem as text: `file:line:col: severity: label [code]`, source line, carets, help.
+
+    The source line and the carets are left out if the source does not have that line, the help if
+    it is empty. A last line names the effect if an effect inserted the text. Invisible characters
+    are escaped.
+    """
     span = problem.span
     code = f" [{problem.code}]" if problem.code else ""
     label = truncate(problem.label, MAX_LABEL_LENGTH) + code
@@ -145,20 +158,20 @@ def render_problem(problem: Problem) -> str:
     if problem.help:
         rows.append(escape_invisible(f"help: {truncate(problem.help, MAX_LABEL_LENGTH)}"))
     if span.source.applied_at:
-        rows.append(f"in {span.source.layer}, laid at {span.source.applied_at}")
+        rows.append(f"in {span.source.layer}, applied at {span.source.applied_at}")
     return "\n".join(rows)
 
 
 def sort_problems(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without repetitions, sorted by file, line and column."""
+    """Return the problems without duplicates, sorted by file, line, column and label."""
     unique = dict.fromkeys(problems)
     return sorted(unique, key=lambda p: (p.span.source.name, p.span.line, p.span.column, p.label))
 
 
 def render_all(problems: Iterable[Problem]) -> str:
-    """Return all problems rendered, sorted by place, with blank lines between."""
+    """Return all problems as one text, sorted by place and separated by blank lines."""
     return "\n\n".join(render_problem(problem) for problem in sort_problems(problems))
 
 
 class MissingToolError(Exception):
-    """A program or package that is needed is not installed; the message says how to get it."""
+    """An error for a missing program or package; the message says how to install it."""

@@ -1,4 +1,4 @@
-"""Document: YAML text as a tree in which every value knows its file, line and column."""
+"""Documents: a YAML file as a tree of nodes in which every value has its place."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from pathlib import Path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_BYTES = 4 * 1024 * 1024
-"""Largest spec read: hand-written specs are a few kB; more is a wrong file."""
+"""Largest file that is read [bytes]; a spec written by hand has a few kB."""
 LINE_END = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
-"""What ends a line for YAML; str.splitlines knows more."""
+"""The line ends of YAML; str.splitlines accepts more characters."""
 
 
 @dataclass(frozen=True)
 class ScalarNode:
-    """A leaf: its text as written (quotes removed), resolved by who reads it.
+    """A leaf of the tree: its text as written, without quotes; the reader of the key interprets it.
 
-    `changes` are the places of the overlays that rewrote a part of the text, in order.
+    `changes` are the places of the overlays that rewrote a part of the text, in the order of
+    rewriting.
     """
 
     text: str
@@ -31,7 +32,7 @@ class ScalarNode:
 
     @property
     def text_span(self) -> Span:
-        """The place of the first character of the text itself, behind an opening quote."""
+        """The span of the text without quotes; atomic if an overlay rewrote the text."""
         if self.changes:
             return dataclasses.replace(self.span, is_atomic=True)
         return self.span.subspan(1, len(self.text)) if self.quoted else self.span
@@ -39,7 +40,7 @@ class ScalarNode:
 
 @dataclass(frozen=True)
 class Entry:
-    """A key of a mapping with the place of the key and the value."""
+    """A key of a mapping: the key, the span of the key and the node of its value."""
 
     key: str
     span: Span
@@ -47,20 +48,20 @@ class Entry:
 
     @property
     def text_span(self) -> Span:
-        """The place of the key itself, without its quotes."""
+        """The span of the key without its quotes."""
         is_quoted = self.span.width == len(self.key) + 2
         return self.span.subspan(1, len(self.key)) if is_quoted else self.span
 
 
 @dataclass(frozen=True)
 class MappingNode:
-    """A mapping, in the order of the file."""
+    """A mapping; the entries are in the order of the file."""
 
     entries: dict[str, Entry]
     span: Span
 
     def get(self, key: str) -> YamlNode | None:
-        """Return the value of a key, or None."""
+        """Return the node of a key, or None if the mapping does not have the key."""
         entry = self.entries.get(key)
         return entry.node if entry else None
 
@@ -71,7 +72,7 @@ class MappingNode:
 
 @dataclass(frozen=True)
 class SequenceNode:
-    """A sequence."""
+    """A sequence of nodes in the order of the file."""
 
     nodes: tuple[YamlNode, ...]
     span: Span
@@ -82,7 +83,7 @@ YamlNode = ScalarNode | MappingNode | SequenceNode
 
 @dataclass(frozen=True)
 class Document:
-    """One file: its kind (automaton, system, ...), its name and its tree."""
+    """One file: its kind ("automaton", "system", ...), its name and its tree."""
 
     kind: str
     name: str
@@ -92,7 +93,7 @@ class Document:
 
 
 def require_kind(document: Document, kind: str, problems: Problems) -> None:
-    """Report a document of another kind, and stop. Raises SpecError."""
+    """Raise SpecError if a document is not of the kind `kind`; report the problem, too."""
     if document.kind != kind:
         given, wanted = (
             f"{'an' if each[0] in 'aeiou' else 'a'} {each}" for each in (document.kind, kind)
@@ -103,7 +104,11 @@ def require_kind(document: Document, kind: str, problems: Problems) -> None:
 
 
 def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]:
-    """Read a file as UTF-8 text. Raises SpecError for a missing, huge or binary file."""
+    """Return the source and the text of a UTF-8 file; a byte order mark is removed.
+
+    The source has the name `display_name`, or else the path. Raises SpecError if the file does not
+    exist, is not a regular file, is larger than MAX_BYTES or is not UTF-8.
+    """
     name = display_name or str(path)
     place = Span(Source(name), 1, 1)
     problems = Problems()
@@ -135,5 +140,8 @@ def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]
 
 
 def lines_of(text: str) -> tuple[str, ...]:
-    """Return the lines of a text as YAML counts them, without their ends."""
+    """Return the lines of a text as YAML counts them, without line ends.
+
+    An empty text has no lines.
+    """
     return tuple(LINE_END.split(text.removesuffix("\n"))) if text else ()

@@ -1,4 +1,4 @@
-"""Passage: where expressions stand in the tree of an automaton or an effect."""
+"""Formula sites: the key paths of expressions in the tree of an automaton or an effect."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ScalarTransform = Callable[[KeyPath, ScalarNode], ScalarNode]
 
 ALL_SCALARS = "every scalar below"
 NON_FORMULA_KEYS = frozenset({"about", "req", "kind"})
-"""Keys inside whose values are no expressions."""
+"""Keys whose values contain no expressions."""
 OBSERVER_SITES = {
     key: ALL_SCALARS
     for key in ("A", "B", "C", "f", "process_noise", "measurement_noise", "at", "unknown_instant")
@@ -41,7 +41,10 @@ AUTOMATON_SITES: dict[str, Any] = {
     "tables": {"*": {"if": ALL_SCALARS, "rows": ALL_SCALARS}},
     "instances": {"*": {"inputs": ALL_SCALARS}},
 }
-"""Expressions that effects may redirect; start values and parameters are not among them."""
+"""Sites of an automaton whose names an effect may replace.
+
+Start values and parameters are excluded.
+"""
 EFFECT_SITES: dict[str, Any] = {
     **AUTOMATON_SITES,
     "states": {"*": {"initial": ALL_SCALARS}},
@@ -49,19 +52,23 @@ EFFECT_SITES: dict[str, Any] = {
     "parameters": {"*": {"derived": ALL_SCALARS}},
     "redirect": {"*": ALL_SCALARS},
 }
-"""Expressions that an effect brings."""
+"""Sites of the expressions that an effect contains."""
 
 
 def map_formulas(
     tree: MappingNode, sites: Mapping[str, Any], transform: ScalarTransform
 ) -> MappingNode:
-    """Return a tree in which every expression is what `transform` makes of it."""
+    """Return a copy of a tree in which each scalar at one of the sites is replaced by `transform`.
+
+    `transform` gets the key path and the scalar. Keys, spans and all other values stay as they are.
+    """
     node = _map_node(tree, sites, transform, ())
     assert isinstance(node, MappingNode)
     return node
 
 
 def _map_node(node: YamlNode, sites: Any, transform: ScalarTransform, path: KeyPath) -> YamlNode:
+    """Return a node with the formulas at `sites`, relative to the node, transformed."""
     match node:
         case ScalarNode():
             return transform(path, node) if sites == ALL_SCALARS else node
@@ -80,6 +87,7 @@ def _map_node(node: YamlNode, sites: Any, transform: ScalarTransform, path: KeyP
 
 
 def _sites_below(sites: Any, key: str) -> Any:
+    """Return the sites below a key, or None if the values below the key contain no expressions."""
     if sites == ALL_SCALARS:
         return None if key in NON_FORMULA_KEYS else ALL_SCALARS
     return sites.get(key, sites.get("*"))

@@ -1,4 +1,4 @@
-"""Tree: looking into a document's tree and changing one place of it."""
+"""Node edits: functions that search a tree of nodes or return a changed copy of it."""
 
 from __future__ import annotations
 
@@ -10,20 +10,26 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 
 
 def entries(node: YamlNode | None) -> Iterator[Entry]:
-    """Iterate over the entries of a mapping; over nothing where there is none."""
+    """Yield the entries of a mapping in the order of the file.
+
+    Yield nothing for another node or None.
+    """
     if isinstance(node, MappingNode):
         yield from node
 
 
 def scalars_of(node: YamlNode | None) -> tuple[ScalarNode, ...]:
-    """Return the scalars of a list; of a single one, itself."""
+    """Return the scalars of a sequence, a scalar itself as a tuple, or an empty tuple."""
     if isinstance(node, SequenceNode):
         return tuple(item for item in node.nodes if isinstance(item, ScalarNode))
     return (node,) if isinstance(node, ScalarNode) else ()
 
 
 def find_node(tree: MappingNode, path: Sequence[str]) -> YamlNode | None:
-    """Return what stands under a path of keys, or None."""
+    """Return the node at a path of keys, or None if a key is absent.
+
+    An empty path gives the tree itself.
+    """
     node: YamlNode | None = tree
     for key in path:
         node = node.get(key) if isinstance(node, MappingNode) else None
@@ -31,7 +37,10 @@ def find_node(tree: MappingNode, path: Sequence[str]) -> YamlNode | None:
 
 
 def put_node(tree: MappingNode, path: Sequence[str], node: YamlNode) -> MappingNode:
-    """Return a tree with a node under a path of keys; what is absent on the way is made."""
+    """Return a copy of a tree with `node` at a path of keys; create missing mappings.
+
+    A value at the path is replaced. A key that exists already keeps its span.
+    """
     key, *rest = path
     if rest:
         below = tree.get(key)
@@ -43,7 +52,10 @@ def put_node(tree: MappingNode, path: Sequence[str], node: YamlNode) -> MappingN
 
 
 def replace_source(node: YamlNode, source: Source) -> YamlNode:
-    """Return a tree whose places are in another source."""
+    """Return a copy of a tree in which every span refers to `source`.
+
+    Lines and columns stay the same.
+    """
     span = _replace_span_source(node.span, source)
     match node:
         case ScalarNode():
@@ -63,11 +75,12 @@ def replace_source(node: YamlNode, source: Source) -> YamlNode:
 
 
 def _replace_span_source(span: Span, source: Source) -> Span:
+    """Return a copy of a span that refers to `source`."""
     return dataclasses.replace(span, source=source)
 
 
 def format_inline(node: YamlNode) -> str:
-    """Return a node as YAML in one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`."""
+    """Return a node as YAML on one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`."""
     if isinstance(node, MappingNode):
         return f"{{{', '.join(f'{entry.key}: {format_inline(entry.node)}' for entry in node)}}}"
     if isinstance(node, SequenceNode):

@@ -1,4 +1,4 @@
-"""Overlay: lay a partial tree over another one (variants, templates), by name."""
+"""Overlays: merging of a partial tree (variant, template user) into a base tree, key by key."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 def apply_overlay(
     base: MappingNode, overlay: MappingNode, problems: Problems, *, template: bool = False
 ) -> MappingNode:
-    """Return `base` with `overlay` laid over it (docs/language.md, "Variants, effects, calibrations").
+    """Return `base` merged with `overlay` (docs/language.md, "Variants, effects, calibrations").
 
-    Mappings merge by name, to any depth; a scalar or a list replaces; `{remove: true}` removes.
-    A removal of what is absent is a problem; an override by an equal value is a warning,
-    unless `base` is a template.
+    Mappings are merged key by key at every depth. A scalar or a sequence replaces the value of the
+    base. `{remove: true}` removes a key; it is an error if the base does not have the key. A value
+    equal to that of the base gives a warning unless `template` is true. Problems are added to
+    `problems`.
     """
     entries = dict(base.entries)
     for entry in overlay:
@@ -32,12 +33,13 @@ def apply_overlay(
 
 
 def without_keys(table: MappingNode, *keys: str) -> MappingNode:
-    """Return the table without some of its keys."""
-    kept = {key: entry for key, entry in table.entries.items() if key not in keys}
-    return MappingNode(kept, table.span)
+    """Return a copy of a mapping without the given keys; absent keys are ignored."""
+    entries = {key: entry for key, entry in table.entries.items() if key not in keys}
+    return MappingNode(entries, table.span)
 
 
 def _is_removal(node: YamlNode) -> bool:
+    """Return whether a node is `{remove: true}`."""
     if not isinstance(node, MappingNode) or set(node.entries) != {"remove"}:
         return False
     value = node.get("remove")
@@ -45,19 +47,20 @@ def _is_removal(node: YamlNode) -> bool:
 
 
 def _reject_removals(entry: Entry, base: MappingNode, problems: Problems) -> Entry:
-    """Nothing can be removed inside what is new."""
+    """Return a new entry without its removals; report each, since the base has no such key."""
     if not isinstance(entry.node, MappingNode):
         return entry
     nested_problems = Problems()
-    made = apply_overlay(MappingNode({}, entry.node.span), entry.node, nested_problems)
+    node = apply_overlay(MappingNode({}, entry.node.span), entry.node, nested_problems)
     near = suggest_name(entry.key, base.entries)
     for problem in nested_problems.reported:
         hint = problem.help or (f"`{entry.key}` is new: {near}" if near else "")
         problems.error("overlay", problem.span, problem.label, hint)
-    return Entry(entry.key, entry.span, made)
+    return Entry(entry.key, entry.span, node)
 
 
 def _merge_entry(base: Entry, overlay: Entry, problems: Problems, template: bool) -> YamlNode:
+    """Return the node that results from an entry of the overlay over an entry of the base."""
     if isinstance(base.node, MappingNode) and isinstance(overlay.node, MappingNode):
         return apply_overlay(base.node, overlay.node, problems, template=template)
     if (
@@ -71,7 +74,7 @@ def _merge_entry(base: Entry, overlay: Entry, problems: Problems, template: bool
 
 
 def _plain_content(node: YamlNode) -> object:
-    """What a tree says, without its places."""
+    """Return the content of a node as text, tuples and dicts, without spans, for comparison."""
     match node:
         case ScalarNode():
             return node.text

@@ -1,4 +1,4 @@
-"""Finding: where specs are found by name, and how a file and its head are read."""
+"""Project files: search of specs by name, and reading of a file with its head."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from language.text.document import Document, MappingNode, ScalarNode, lines_of, 
 from language.text.yaml_parser import parse_yaml
 
 ALLOW_OUTSIDE_ENV = "MODEWRIGHT_ALLOW_OUTSIDE"
-"""Environment variable that lets specs name any file; `--allow-outside` sets it."""
+"""Environment variable that allows files outside of the project; `--allow-outside` sets it."""
 
 RECORDINGS_ENV = "MODEWRIGHT_RECORDINGS"
-"""Environment variable that names the folder of recordings, wherever it is."""
+"""Environment variable with the folder of recordings, which may be outside of the project."""
 
 
 def path_exists(path: Path) -> bool:
-    """Tell whether there is something at a path; no path is too long or too odd to be asked for."""
+    """Return whether a path exists; a path that the operating system rejects does not exist."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -30,18 +30,21 @@ def path_exists(path: Path) -> bool:
 
 
 def project_root_of(file: Path) -> Path:
-    """Return the nearest folder above a file that has a `spec/`, else the file's own folder."""
+    """Return the nearest folder above a file that contains `spec/`; else the file's folder."""
     parents = file.resolve().parents
     return next((parent for parent in parents if (parent / "spec").is_dir()), parents[0])
 
 
 def require_inside_project(path: Path, span: Span, root: Path) -> None:
-    """Raise SpecError for a file that a spec names outside of its project; links are followed."""
+    """Raise SpecError if a spec names a file outside of its project; symbolic links are resolved.
+
+    Allowed are `root`, the project of the spec at `span`, the specs of the distribution and the
+    folder of recordings. There is no check if ALLOW_OUTSIDE_ENV is set, or if the named file or the
+    file of `span` does not exist.
+    """
     named_in = Path(span.source.name)
     if os.environ.get(ALLOW_OUTSIDE_ENV) or not path_exists(path) or not path_exists(named_in):
         return
-    from importlib import resources  # not for the help of the command line
-
     roots = [root, project_root_of(named_in), Path(str(resources.files("spec")))]
     if os.environ.get(RECORDINGS_ENV):
         roots.append(Path(os.environ[RECORDINGS_ENV]))
@@ -50,7 +53,8 @@ def require_inside_project(path: Path, span: Span, root: Path) -> None:
         return
     problems = Problems()
     label = "this file is outside of the project"
-    hint = f"its root is {project_root_of(named_in)}; `modewright --allow-outside ...` reads it nevertheless"
+    hint = f"its root is {project_root_of(named_in)}; "
+    hint += "`modewright --allow-outside ...` reads the file nevertheless"
     problems.error("outside", span, label, hint)
     raise SpecError(problems.reported)
 
@@ -70,19 +74,19 @@ DOCUMENT_KINDS = (
 HEAD_PATTERN = re.compile(rf"^({'|'.join(DOCUMENT_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
 
 NON_HEAD_KEYS = {"test": ("scenario",)}
-"""Kinds that are keys, too, of a file of another kind."""
+"""Kinds that are also keys inside a file of another kind; there they do not name the document."""
 
 LANGUAGE_VERSION = "1"
 
 DocumentHead = tuple[Path, str, str]
-"""A file, the kind of what it holds, and its name."""
+"""A file, the kind of its document, and the name of the document."""
 
 
 @dataclass(frozen=True)
 class Project:
-    """A folder whose `spec/` is searched first, before the specs that are shipped.
+    """A folder whose `spec/` is searched before the specs of the distribution.
 
-    `texts` are those of an editor, by resolved path: they stand for what is on the disk.
+    `texts` are the texts of open editors by resolved path; they replace the files on the disk.
     """
 
     root: Path
@@ -90,18 +94,22 @@ class Project:
 
     @cached_property
     def index(self) -> dict[str, list[Path]]:
-        """Files by the name of what they hold, those of the project first.
+        """Files by the name of their document; those of the project hide those of the distribution.
 
-        An effect is called like physics; what else has its name goes before it.
+        If an effect and another document have the same name, the index has the other document.
         """
         return {**self.effect_index, **self._index_by_name(lambda kind: kind != "effect")}
 
     @cached_property
     def effect_index(self) -> dict[str, list[Path]]:
-        """Files of effects by name, those of the project first."""
+        """Files of effects by name; those of the project hide those of the distribution."""
         return self._index_by_name(lambda kind: kind == "effect")
 
     def _index_by_name(self, is_wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
+        """Return the files of the wanted kinds by document name.
+
+        A name may have several project files.
+        """
         own: dict[str, list[Path]] = {}
         for path, kind, name in self._heads:
             if is_wanted(kind):
@@ -115,19 +123,28 @@ class Project:
 
     @cached_property
     def _heads(self) -> tuple[DocumentHead, ...]:
+        """The heads of all files below `spec/` of the project."""
         return tuple(_heads_below(self.root / "spec", self.texts))
 
     def read(self, path: Path) -> Document:
-        """Return the document of a file, in an editor's text where it is open. Raises SpecError."""
+        """Return the document of a file; the text of an editor has precedence. Raises SpecError."""
         text = self.texts.get(path.resolve()) if self.texts else None
         return read_document(path) if text is None else parse_document(source_of(path, text), text)
 
     def read_effect_document(self, name: str, span: Span) -> Document:
-        """Return the document of an effect. Raises SpecError."""
+        """Return the document of the effect `name`.
+
+        Raises SpecError if there is none or more than one.
+        """
         return self.read(self._unique_path(self.effect_index, name, span, "effect"))
 
     def path_of(self, reference: str, span: Span | None = None) -> Path:
-        """Return the file of a name or path. Raises SpecError for none or several."""
+        """Return the file that a name or a path refers to.
+
+        A reference with the suffix of YAML or with a path separator is a path: relative to the file
+        of `span`, or to the working directory if it does not exist there. Raises SpecError for a
+        path outside of the project, and for a name that has no file or several.
+        """
         if reference.endswith((".yaml", ".yml")) or os.sep in reference:
             base = Path(span.source.name).parent if span else Path()
             beside = base / reference
@@ -141,6 +158,10 @@ class Project:
     def _unique_path(
         self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
     ) -> Path:
+        """Return the only file of a name in an index.
+
+        Raises SpecError if there is none or more than one.
+        """
         found = index.get(reference, [])
         if len(found) == 1:
             return found[0]
@@ -157,7 +178,7 @@ class Project:
 
 
 def display_path(path: Path) -> str:
-    """Return a path as it is shown: relative to the working directory where that is shorter."""
+    """Return a path for messages: relative if below the working directory, else as it is."""
     try:
         relative = os.path.relpath(path)
     except ValueError:
@@ -166,18 +187,22 @@ def display_path(path: Path) -> str:
 
 
 def read_document(path: Path) -> Document:
-    """Read one file and its head. Raises SpecError."""
+    """Return the document of a file. Raises SpecError."""
     source, text = read_text(path, display_path(path))
     return parse_document(source, text)
 
 
 def source_of(path: Path, text: str) -> Source:
-    """Return the source of a text that an editor shows of a file."""
+    """Return the source for a text that an editor shows instead of the file."""
     return Source(display_path(path), lines_of(text))
 
 
 def parse_document(source: Source, text: str) -> Document:
-    """Return the document of a text: `language: 1`, then one kind and its name."""
+    """Return the document of a text. Raises SpecError.
+
+    The text needs `language: 1` and exactly one key of DOCUMENT_KINDS with the name of the
+    document.
+    """
     root = parse_yaml(source, text)
     problems = Problems()
     _check_version(root, problems)
@@ -202,6 +227,7 @@ def parse_document(source: Source, text: str) -> Document:
 
 
 def _check_version(root: MappingNode, problems: Problems) -> None:
+    """Report a document without `language: 1`."""
     first = next(iter(root), None)
     node = root.get("language")
     if node is None:
@@ -214,22 +240,28 @@ def _check_version(root: MappingNode, problems: Problems) -> None:
 
 
 def _heads_below(folder: Path, texts: Mapping[Path, str]) -> Iterator[DocumentHead]:
+    """Yield the heads of all YAML files below a folder, sorted by path."""
     for path in _yaml_files(folder):
         yield from ((path, kind, name) for kind, name in _heads_in(path, texts))
 
 
 @cache
 def _shipped_heads(folder: Path) -> tuple[DocumentHead, ...]:
-    """The heads of what is shipped, which nobody changes: they are read once in a process."""
+    """Return the heads of the distributed specs; cached, because the files do not change."""
     return tuple(_heads_below(folder, {}))
 
 
 def _yaml_files(folder: Path) -> Iterator[Path]:
+    """Yield the files `*.yaml` below a folder, sorted by path."""
     if folder.is_dir():
         yield from sorted(path for path in folder.rglob("*.yaml") if path.is_file())
 
 
 def _heads_in(path: Path, texts: Mapping[Path, str]) -> list[tuple[str, str]]:
+    """Return the kinds and names in the first 65536 characters of a file.
+
+    An unreadable file has none.
+    """
     text = texts.get(path.resolve()) if texts else None
     try:
         text = path.read_text("utf-8", errors="replace") if text is None else text

@@ -1,4 +1,7 @@
-"""Provenance: every value of an expanded spec with the places and layers that it came from."""
+"""Provenance: the values of an expanded spec with the places and the layers that they came from.
+
+A layer is a file (the base, a variant) or an effect at its place.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +19,14 @@ HEAD_PATTERN = re.compile(
 PLAIN_SCALAR = re.compile(
     r"[A-Za-z0-9$(.][A-Za-z0-9_ .+*/^()<>=@$-]*|-[0-9(A-Za-z][A-Za-z0-9_ .+*/^()<>=@$-]*"
 )
-"""Texts that YAML and we read alike without quotes."""
+"""Texts that need no quotes in YAML."""
 COMMENT_COLUMN = 64
-"""Where the places stand in the printed spec."""
+"""Column of the comment with the places in the printed spec."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """A place and the layer whose file it is in: `variant leaf`, `effect tyre_slip@vehicle`."""
+    """A place `file:line` and its layer: `variant leaf`, `effect tyre_slip@vehicle`."""
 
     place: str
     layer: str
@@ -35,7 +38,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class ProvenanceEntry:
-    """A value by its key path, where it came from, and what rewrote a part of it, in order."""
+    """A value with its key path, its origin and the origins of later changes of its text."""
 
     path: str
     value: str
@@ -44,13 +47,13 @@ class ProvenanceEntry:
 
     @property
     def places(self) -> str:
-        """All places as one text."""
+        """All origins as one text, separated by `, changed by `."""
         return ", changed by ".join(str(origin) for origin in (self.origin, *self.changes))
 
 
 @dataclass(frozen=True)
 class SpecDifference:
-    """A key path whose values differ; None where there is none."""
+    """A key path with different values in two specs; None stands for a missing value."""
 
     path: str
     old: ProvenanceEntry | None
@@ -58,12 +61,12 @@ class SpecDifference:
 
 
 def provenance_entries(tree: MappingNode) -> list[ProvenanceEntry]:
-    """Return every value of a tree in the order of the tree."""
+    """Return every scalar, sequence and empty mapping of a tree in the order of the tree."""
     return list(_iter_entries(tree, ()))
 
 
 def format_spec(tree: MappingNode) -> str:
-    """Return a tree as a spec that can be read again, with the places as comments."""
+    """Return a tree as the YAML text of a spec, with the places of each value as a comment."""
     return (
         "\n".join(_spec_lines(tree, 0, {row.path: row for row in provenance_entries(tree)}, ()))
         + "\n"
@@ -71,7 +74,10 @@ def format_spec(tree: MappingNode) -> str:
 
 
 def diff_specs(old: MappingNode, new: MappingNode) -> list[SpecDifference]:
-    """Return what differs between two trees, by key path: those of the old first."""
+    """Return the key paths whose values differ between two trees.
+
+    The paths of `old` come first, then the paths that only `new` has; spans do not count.
+    """
     before = {row.path: row for row in provenance_entries(old)}
     after = {row.path: row for row in provenance_entries(new)}
     result = []
@@ -83,7 +89,10 @@ def diff_specs(old: MappingNode, new: MappingNode) -> list[SpecDifference]:
 
 
 def format_diff(changes: Sequence[SpecDifference]) -> str:
-    """Return differences as lines: `-` what was, `+` what is."""
+    """Return differences as lines `- path: value` (old) and `+ path: value` (new).
+
+    Each line has the places of the value as a comment.
+    """
     lines = []
     for difference in changes:
         for sign, row in (("-", difference.old), ("+", difference.new)):
@@ -93,6 +102,7 @@ def format_diff(changes: Sequence[SpecDifference]) -> str:
 
 
 def _iter_entries(node: YamlNode, path: tuple[str, ...]) -> Iterator[ProvenanceEntry]:
+    """Yield the entries below a node at `path`."""
     match node:
         case ScalarNode(text, span, _, changes):
             yield _provenance_entry(path, text, span, changes)
@@ -110,16 +120,21 @@ def _iter_entries(node: YamlNode, path: tuple[str, ...]) -> Iterator[ProvenanceE
 def _provenance_entry(
     path: tuple[str, ...], text: str, span: Span, changes: tuple[Span, ...]
 ) -> ProvenanceEntry:
+    """Return the entry of a value; repeated origins of its changes are removed."""
     origins = dict.fromkeys(_origin_of(change) for change in changes)
     return ProvenanceEntry(".".join(path), text, _origin_of(span), tuple(origins))
 
 
 def _origin_of(span: Span) -> Origin:
+    """Return the origin of a span."""
     return Origin(f"{span.source.name}:{span.line}", layer_of(span.source))
 
 
 def layer_of(source: Source) -> str:
-    """Return the layer that a source is: an effect at its place, or the kind and name of a file."""
+    """Return the layer of a source: the effect with its place, or else kind and name of the file.
+
+    The text is empty if the source has neither.
+    """
     if source.layer:
         return source.layer
     for line in source.lines:
@@ -132,6 +147,7 @@ def layer_of(source: Source) -> str:
 def _spec_lines(
     node: MappingNode, depth: int, places: dict[str, ProvenanceEntry], path: tuple[str, ...]
 ) -> Iterator[str]:
+    """Yield the lines of a mapping as YAML, two blanks for each level of depth."""
     for entry in node:
         below = (*path, entry.key)
         head = "  " * depth + _quote_if_needed(entry.key) + ":"
@@ -145,16 +161,18 @@ def _spec_lines(
 
 
 def _append_comment(text: str, comment: str) -> str:
+    """Return a line with a comment at COMMENT_COLUMN."""
     return f"{text:<{COMMENT_COLUMN}}  # {comment}"
 
 
 def _quote_if_needed(text: str) -> str:
-    """Return a text as YAML reads it back."""
+    """Return a text as a YAML scalar: plain if it matches PLAIN_SCALAR, else in quotes."""
     is_plain = PLAIN_SCALAR.fullmatch(text) and not text.endswith(" ")
     return text if is_plain else json.dumps(text, ensure_ascii=False)
 
 
 def _format_sequence(items: SequenceNode) -> str:
+    """Return a sequence on one line; items that are not scalars become `...`."""
     parts = [
         _quote_if_needed(part.text) if isinstance(part, ScalarNode) else "..."
         for part in items.nodes

@@ -1,4 +1,4 @@
-"""Requirement: names of requirements that something of a spec fulfils, `req: [BL-3]`."""
+"""Requirements: the names of requirements that parts of a spec claim to fulfil, `req: [BL-3]`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNo
 
 @dataclass(frozen=True)
 class RequirementUse:
-    """A requirement named at a key path, empty for the whole file."""
+    """A reference to a requirement: name, key path (empty for the whole file) and span."""
 
     requirement: str
     path: str
@@ -19,12 +19,12 @@ class RequirementUse:
 
 
 def requirements_of(table: MappingNode) -> tuple[str, ...]:
-    """Return the names under `req`: one, or a list."""
+    """Return the names under the key `req` of a mapping; empty without the key."""
     return tuple(item.text for item in _requirement_scalars(table))
 
 
 def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[RequirementUse]:
-    """Yield every requirement that is named in a tree, in the order of the file."""
+    """Yield every reference to a requirement in a tree, in the order of the file."""
     if not isinstance(node, MappingNode):
         return
     for item in _requirement_scalars(node):
@@ -34,11 +34,12 @@ def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[Re
 
 
 def all_requirements(*trees: MappingNode) -> tuple[str, ...]:
-    """Return the requirements that are named in trees, each once."""
+    """Return the requirements named in the trees, each once, in order of first occurrence."""
     return tuple(dict.fromkeys(each.requirement for t in trees for each in find_requirements(t)))
 
 
 def _requirement_scalars(table: MappingNode) -> Iterator[ScalarNode]:
+    """Yield the scalars under `req` of a mapping that are not empty."""
     node = table.get("req")
     nodes = node.nodes if isinstance(node, SequenceNode) else (node,)
     yield from (each for each in nodes if isinstance(each, ScalarNode) and each.text)

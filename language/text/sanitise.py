@@ -1,24 +1,27 @@
-"""Text: free texts of specs and names of files, made harmless for the line they are printed in."""
+"""Sanitising: user-supplied texts made safe for output on one line of a terminal."""
 
 from __future__ import annotations
 
 import unicodedata
 
 INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
-"""Categories of Unicode that draw nothing, turn the direction of text or end a line."""
+"""Unicode categories of characters that are invisible, turn the direction or end a line."""
 MAX_LINE_LENGTH = 160
-"""Characters of a line shown to a person; longer ones are cut around what is meant."""
+"""Longest source line in a message [characters]; longer lines are cropped around the place."""
 
 
 def escape_invisible(text: str) -> str:
-    """Return a text in which every character that is not seen is written as an escape."""
+    r"""Return a text with invisible characters as escapes like `\x1b` or `\u200b`."""
     return "".join(
         _escape(c) if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in text
     )
 
 
 def mask_invisible(text: str) -> str:
-    """Return a text of equal length without characters that are not seen, for carets below it."""
+    """Return a text of the same length with tabs as blanks and invisible characters as U+FFFD.
+
+    Carets printed below the text stay aligned.
+    """
     characters = (" " if c == "\t" else c for c in text)
     return "".join(
         "\ufffd" if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in characters
@@ -26,12 +29,16 @@ def mask_invisible(text: str) -> str:
 
 
 def truncate(text: str, max_length: int = MAX_LINE_LENGTH) -> str:
-    """Return a text of at most so many characters."""
+    """Return a text cut to at most `max_length` characters; a text that is cut ends in `...`."""
     return text if len(text) <= max_length else text[: max_length - 3] + "..."
 
 
 def crop_line(text: str, column: int, width: int) -> tuple[str, int, int]:
-    """Return the part of a long line around a place, and the place's column and width in it."""
+    """Return a part of a line of at most MAX_LINE_LENGTH characters around a place.
+
+    `column` counts from 1. The result also has the column and the width of the place within the
+    part. A short line is returned unchanged.
+    """
     if len(text) <= MAX_LINE_LENGTH:
         return text, column, width
     start = max(0, column - 1 - MAX_LINE_LENGTH // 4)
@@ -40,5 +47,6 @@ def crop_line(text: str, column: int, width: int) -> tuple[str, int, int]:
 
 
 def _escape(character: str) -> str:
+    r"""Return a character as `\xNN` below U+0100, else as `\uNNNN`."""
     code = ord(character)
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"

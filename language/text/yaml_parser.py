@@ -1,4 +1,7 @@
-"""YAML tree: the text of a spec as nodes that know their places; nothing is expanded."""
+"""YAML parser: the text of a spec as a tree of nodes with spans.
+
+Anchors, aliases, tags and merge keys are problems: the tree is what the text shows.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +14,20 @@ from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
 
 Mark = Any
-"""A place as libyaml gives it: line and column from 0; its types know it under two names."""
+"""A position of libyaml: line and column, counted from 0."""
 MAX_DEPTH = 64
-"""Deepest nesting read; the language needs less than 12."""
+"""Largest depth of nesting; the language needs less than 12."""
 MAX_NODES = 200_000
-"""Most keys and values read; a spec of 4 MiB has about as many."""
+"""Largest number of nodes; a spec of 4 MiB has about as many."""
 MAX_PROBLEMS = 100
-"""Problems of form after which reading ends."""
+"""Number of problems after which parsing stops."""
 
 
 def parse_yaml(source: Source, text: str) -> MappingNode:
-    """Parse YAML text into a tree. Raises SpecError with every problem of form found."""
+    """Return the tree of a YAML text. Raises SpecError with all problems of form if there are any.
+
+    The root has to be a mapping. Values stay texts; no anchor, alias or tag is resolved.
+    """
     problems = Problems()
     builder = _YamlBuilder(source, problems)
     try:
@@ -44,6 +50,7 @@ def parse_yaml(source: Source, text: str) -> MappingNode:
 
 
 def _describe_error(source: Source, text: str, error: yaml.YAMLError) -> tuple[Span, str, str]:
+    """Return the span, the label and the help text for an error of libyaml."""
     if isinstance(error, yaml.reader.ReaderError):
         before = lines_of(f"{text.encode()[: error.position].decode(errors='ignore')}|")
         label = f"this is not YAML: it has the character U+{error.character:04X}"
@@ -68,7 +75,10 @@ def _describe_error(source: Source, text: str, error: yaml.YAMLError) -> tuple[S
 
 @dataclass
 class _OpenCollection:
-    """A mapping or list that is being read."""
+    """A mapping or sequence whose end has not been read yet.
+
+    `split_keys` are the keys whose value was joined from parts that YAML had split at a comma.
+    """
 
     start: Mark
     is_mapping: bool
@@ -79,7 +89,7 @@ class _OpenCollection:
 
 
 class _YamlBuilder:
-    """Takes events one by one; the levels that are open are a list, so depth costs no stack."""
+    """Builder of the tree from parser events, with a list of open collections, no recursion."""
 
     def __init__(self, source: Source, problems: Problems) -> None:
         self.source = source
@@ -91,6 +101,7 @@ class _YamlBuilder:
         self.is_aborted = False
 
     def handle_event(self, event: yaml.Event) -> None:
+        """Add the node of an event to the tree, or report a feature that is not allowed."""
         match event:
             case yaml.ScalarEvent():
                 self._reject_anchor_and_tag(event)
@@ -127,10 +138,12 @@ class _YamlBuilder:
                     self._abort(event.start_mark, label, "yaml")
 
     def _abort(self, mark: Mark, label: str, kind: str) -> None:
+        """Report an error after which no further event is read."""
         self.is_aborted = True
         self.problems.error(kind, self._span_between(mark, mark), label)
 
     def _reject_anchor_and_tag(self, event: yaml.NodeEvent) -> None:
+        """Report an anchor or a tag of a node."""
         place = self._span_between(event.start_mark, event.start_mark)
         if event.anchor is not None:
             label = "an anchor (`&name`) is not part of the language"
@@ -141,6 +154,7 @@ class _YamlBuilder:
             self.problems.error("yaml-feature", place, label, hint)
 
     def _add_node(self, node: YamlNode) -> None:
+        """Add a node to the innermost open collection; without one it becomes the root."""
         self.node_count += 1
         if self.node_count > MAX_NODES and self.open_levels:
             mark = self.open_levels[-1].start
@@ -158,7 +172,11 @@ class _YamlBuilder:
             level.key = None
 
     def _join_split_value(self, level: _OpenCollection, key: YamlNode, node: YamlNode) -> bool:
-        """Join a value that `{...}` ended at a comma: a `(` is open, what follows has no value."""
+        """Join a value with the key that follows it if YAML split the text of the value at a comma.
+
+        In `{a: f(x, y)}` YAML reads the value `f(x` and a key `y)` without a value. Such a pair is
+        recognised by an open `(` in the unquoted value. Return whether the parts were joined.
+        """
         last = next(reversed(level.entries.values()), None)
         if not (last and isinstance(last.node, ScalarNode) and isinstance(key, ScalarNode)):
             return False
@@ -181,12 +199,17 @@ class _YamlBuilder:
         return True
 
     def _report_split_value(self, entry: Entry) -> None:
+        """Report a value that YAML split at a comma, with the quoted form as help."""
         assert isinstance(entry.node, ScalarNode)
         label = "in `{...}` YAML ends this value at its comma"
         hint = f'quote it: `{entry.key}: "{entry.node.text}"`'
         self.problems.error("yaml-feature", entry.node.span, label, hint)
 
     def _add_entry(self, level: _OpenCollection, key: YamlNode, node: YamlNode) -> None:
+        """Add a key and its value to a mapping.
+
+        Report `<<`, a duplicate, a key that is no scalar.
+        """
         if self._join_split_value(level, key, node):
             return
         if not isinstance(key, ScalarNode):
@@ -194,7 +217,7 @@ class _YamlBuilder:
             self.problems.error("key", key.span, label, "quote a text with brackets")
         elif key.text == "<<":
             label = "a merge key (`<<`) is not part of the language"
-            hint = "lay a variant over the spec, or a mode over a template with `like`"
+            hint = "write a variant of the spec, or a template that modes name with `like`"
             self.problems.error("yaml-feature", key.span, label, hint)
         elif key.text in level.entries:
             first = level.entries[key.text].span
@@ -204,5 +227,6 @@ class _YamlBuilder:
             level.entries[key.text] = Entry(key.text, key.span, node)
 
     def _span_between(self, start: Mark, end: Mark) -> Span:
+        """Return the span between two marks; the width is 1 if they are on different lines."""
         width = end.column - start.column if end.line == start.line else 1
         return Span(self.source, start.line + 1, start.column + 1, max(1, width))
