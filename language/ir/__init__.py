@@ -1,1 +1,1 @@
-"""The intermediate representation: Program, operations, traversal, printer."""
+"""The intermediate representation: Program, operations, traversal, rewriting and printer."""

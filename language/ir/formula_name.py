@@ -1,4 +1,4 @@
-"""Formula name: a readable name for the value of an expression, and its text for a comment."""
+"""Formula names: readable names and comment texts for the values of expressions."""
 
 from __future__ import annotations
 
@@ -8,22 +8,29 @@ from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unar
 from language.ir.program import unqualified_name
 
 MAX_NAME_LENGTH = 32
-"""Characters of a name that is still read; longer ones are numbered instead."""
+"""Longest name that is used [characters]; a longer one is replaced by FALLBACK_NAME."""
 FALLBACK_NAME = "hoisted"
 OPERATOR_WORDS = {"+": "plus", "-": "minus", "/": "per"}
 PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2}
 EVALUATION_POINT_PREFIX = "at_"
-"""How the names of equations and states begin where they are values at a point of a step."""
+"""Prefix of the names of states and equations that belong to an evaluation point inside a step."""
 
 
 def formula_name(expr: Expr) -> str:
-    """Return a name like `m_g_r_w`, `k_hs_per_c_hs`, `per_J_v`, `r_w_cubed`, `half_h`."""
+    """Return an identifier for an expression: `m_g_r_w`, `per_J_v`, `r_w_cubed`, `half_h`.
+
+    The result is FALLBACK_NAME if the expression is of a kind without a name (comparison, choice,
+    array element), or if the name would be too long or begin with a digit. Names are not unique.
+    """
     name = re.sub(r"[^A-Za-z0-9_]+", "_", _build_name(expr)).strip("_")
     return name if len(name) <= MAX_NAME_LENGTH and not name[:1].isdigit() else FALLBACK_NAME
 
 
 def format_formula(expr: Expr) -> str:
-    """Return an expression as it is written: `m * g * r_w`."""
+    """Return an expression as infix text with few parentheses: `m * g * r_w`.
+
+    Variable names lose their group; reals have six significant digits. For comments only.
+    """
     match expr:
         case Value(value):
             return f"{value:g}" if isinstance(value, float) else str(value).lower()
@@ -47,6 +54,10 @@ def format_formula(expr: Expr) -> str:
 
 
 def _format_operand(expr: Expr, precedence: int) -> str:
+    """Return an operand as text, in parentheses if needed.
+
+    They are needed if the operand binds weaker than `precedence` or starts with `-`.
+    """
     text = format_formula(expr)
     if isinstance(expr, Binary | Compare | Select):
         own = PRECEDENCE.get(expr.operator, 0) if isinstance(expr, Binary) else 0
@@ -55,6 +66,7 @@ def _format_operand(expr: Expr, precedence: int) -> str:
 
 
 def _build_name(expr: Expr) -> str:
+    """Return the name of an expression; a kind without a name gives a text that is too long."""
     match expr:
         case Value(value):
             return {0.5: "half", 2.0: "twice"}.get(float(value), f"{value:g}")
@@ -75,6 +87,7 @@ def _build_name(expr: Expr) -> str:
 
 
 def _power_name(expr: Binary) -> str | None:
+    """Return `x_squared` for `x * x`, `x_cubed` for `x * x * x`, None for another product."""
     match expr:
         case Binary("*", Ref(name), Ref(other)) if name == other:
             return f"{_plain_name(name)}_squared"
@@ -85,4 +98,5 @@ def _power_name(expr: Binary) -> str | None:
 
 
 def _plain_name(name: str) -> str:
+    """Return a variable name without its group and without EVALUATION_POINT_PREFIX, dots as `_`."""
     return unqualified_name(name).removeprefix(EVALUATION_POINT_PREFIX).replace(".", "_")

@@ -1,8 +1,9 @@
-"""Number: the types that a Program computes in, and rounding to them - once, from the exact value.
+"""Number types: float64 and float32 as the types of a Program's reals, and rounding to them.
 
-A real of either type is a Python float here; one of float32 has at most 24 significant bits. An
-operation `+ - * / sqrt` in double, rounded once more, is that of float32: 53 >= 2 * 24 + 2
-(Figueroa 1995; rule 17a). numpy is left to the engine.
+A real of either type is a Python float here; a float32 has at most 24 significant bits. Each number
+is rounded once, from its exact value (rule 17a). An operation `+ - * / sqrt` computed in double and
+rounded again equals the float32 operation, because 53 >= 2 * 24 + 2 (Figueroa 1995). This module
+does not need numpy.
 """
 
 from __future__ import annotations
@@ -16,18 +17,21 @@ from typing import Literal
 NumberType = Literal["float64", "float32"]
 NUMBER_TYPES: tuple[NumberType, ...] = ("float64", "float32")
 SIGNIFICAND_BITS: Mapping[NumberType, int] = {"float64": 53, "float32": 24}
-"""Significant bits: a rounding is at most 2^-digits of the value."""
+"""Significant bits p of each type; the relative rounding error is at most 2^-p."""
 MAX_FINITE: Mapping[NumberType, float] = {
     "float64": 1.7976931348623157e308,
     "float32": 3.4028234663852886e38,
 }
 FLOAT32_STRUCT = struct.Struct("<f")
 MAX_DECIMALS = 9
-"""Significant decimals that tell every two float32 apart."""
+"""Number of significant decimals that distinguishes all float32 numbers."""
 
 
 def round_to_type(value: Fraction | float, number_type: NumberType = "float64") -> float:
-    """Return the nearest value of a type, ties to even; an infinity where none is near."""
+    """Return the number of a type nearest to a value, ties to even; overflow gives an infinity.
+
+    A Fraction is rounded once, from its exact value.
+    """
     if isinstance(value, Fraction):
         return (
             _to_float64(value)
@@ -38,7 +42,7 @@ def round_to_type(value: Fraction | float, number_type: NumberType = "float64") 
 
 
 def round_to_float32(value: float) -> float:
-    """Return the float32 nearest to a double."""
+    """Return the float32 nearest to a double, ties to even; overflow gives an infinity."""
     try:
         result: float = FLOAT32_STRUCT.unpack(FLOAT32_STRUCT.pack(value))[0]
     except OverflowError:
@@ -50,11 +54,15 @@ ROUNDING_FUNCTIONS: Mapping[NumberType, Callable[[float], float]] = {
     "float64": float,
     "float32": round_to_float32,
 }
-"""From the double result of an operation to that of the type."""
+"""Function of each type that rounds the double result of an operation."""
 
 
 def shortest_decimal(value: float, number_type: NumberType) -> str:
-    """Return the shortest decimal that reads back as the same bits of the type (rule C4)."""
+    """Return the shortest decimal text that reads back as the same number of the type (rule C4).
+
+    The text is in the notation of repr. Raises ValueError if `value` is not a float32 but should
+    be.
+    """
     if number_type == "float64" or not math.isfinite(value):
         return repr(value)
     for digits in range(MAX_DECIMALS):
@@ -65,6 +73,7 @@ def shortest_decimal(value: float, number_type: NumberType) -> str:
 
 
 def _to_float64(value: Fraction) -> float:
+    """Return the double nearest to a fraction; overflow gives an infinity."""
     try:
         return value.numerator / value.denominator
     except OverflowError:
@@ -72,9 +81,10 @@ def _to_float64(value: Fraction) -> float:
 
 
 def _round_to_odd(value: Fraction) -> float:
-    """Return a double beside the value, the odd one of the two: rounding it again is harmless.
+    """Return the double equal to the value, or that neighbour of it whose significand is odd.
 
-    Rounding to odd: Boldo and Melquiond 2008, When double rounding is odd.
+    Rounding that double again to float32 gives the correctly rounded result (rounding to odd: Boldo
+    and Melquiond 2008, "When double rounding is odd").
     """
     near = _to_float64(value)
     if not math.isfinite(near) or Fraction(near) == value:

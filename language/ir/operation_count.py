@@ -1,7 +1,7 @@
-"""Longest: a bound of the work of a step - operations on the way through its blocks that has most.
+"""Operation count: an upper bound of the number of operations that one call of a block executes.
 
-Each loop is taken to its end, of each branch the side with more; what cannot happen together is
-counted together, so no step ever takes more.
+A loop counts with its full number of passes and a branch with its longer side. No execution exceeds
+the bound.
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ Blocks = Mapping[str, Block]
 
 
 def max_operations(blocks: Blocks, name: str) -> int:
-    """Return the most arithmetic, comparisons, calls, tests and stores of a block and its runs."""
+    """Return the largest number of operations that one run of the block `name` executes.
+
+    Arithmetic, comparisons, calls, tests and stores count as one each; blocks that it runs are
+    included. The body of a called function is not.
+    """
     counts: dict[str, int] = {}
 
     def count_block(name: str) -> int:
@@ -64,7 +68,10 @@ def max_operations(blocks: Blocks, name: str) -> int:
 
 
 def count_expr(value: Expr) -> int:
-    """Return the operations of an expression, both sides of a choice."""
+    """Return the number of operations of an expression.
+
+    Of a choice only the longer alternative counts.
+    """
     match value:
         case Unary(_, operand):
             return 1 + count_expr(operand)

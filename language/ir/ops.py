@@ -1,4 +1,7 @@
-"""Operation: expressions and operations of a Program; both back ends walk these and no others."""
+"""Operations: the expressions and operations of a Program, which interpreter and generator share.
+
+Both back ends handle exactly these classes (rule 17b).
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,16 @@ from language.ir.number_type import NumberType, round_to_type
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A literal; `exact` is what a real was rounded from, so that it is rounded once only."""
+    """A literal; `exact` is the unrounded value of a real, for one rounding to another type."""
 
     value: float | int | bool
     exact: Fraction | None = field(default=None, compare=False, repr=False)
 
     def round_to_type(self, number_type: NumberType) -> Value:
-        """Return the literal in a number type."""
+        """Return the literal rounded to a number type.
+
+        Whole numbers and truth values are returned unchanged.
+        """
         if not isinstance(self.value, float):
             return self
         return Value(round_to_type(self.value if self.exact is None else self.exact, number_type))
@@ -25,7 +31,7 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Ref:
-    """The value of a variable or constant; `whole` if that is a whole number."""
+    """The value of a variable or constant; `is_integer` is true for a whole number."""
 
     name: str
     is_integer: bool = False
@@ -33,7 +39,7 @@ class Ref:
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One element of an array variable; `whole` if that is a whole number."""
+    """One element of an array variable; `is_integer` is true for a whole number."""
 
     name: str
     index: Expr
@@ -42,7 +48,7 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Unary:
-    """`-` of a real, `not` of a truth value."""
+    """`-` of a real or whole number, or `not` of a truth value."""
 
     operator: Literal["-", "not"]
     operand: Expr
@@ -50,7 +56,10 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """`+ - * /` of two reals or two whole numbers, `and or` of truth values (both evaluated)."""
+    """`+ - * /` of two reals or two whole numbers, or `and or` of truth values.
+
+    Both sides are evaluated.
+    """
 
     operator: Literal["+", "-", "*", "/", "and", "or"]
     left: Expr
@@ -59,7 +68,7 @@ class Binary:
 
 @dataclass(frozen=True, slots=True)
 class Compare:
-    """A relation; with a NaN it is false, except `!=`."""
+    """A relation of two values; with a NaN it is false, except for `!=`."""
 
     operator: Literal["<", "<=", ">", ">=", "==", "!="]
     left: Expr
@@ -68,7 +77,7 @@ class Compare:
 
 @dataclass(frozen=True, slots=True)
 class Select:
-    """`then` if the condition holds, else `other`; only the chosen one is evaluated."""
+    """`then` if the condition is true, else `other`; only the selected expression is evaluated."""
 
     condition: Expr
     then: Expr
@@ -77,7 +86,7 @@ class Select:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """An elementary operation (abs sqrt min max clip sign pow2 floor real whole) or a function."""
+    """A call of an elementary operation (abs, sqrt, min, clip, ...) or of a function."""
 
     function: str
     arguments: tuple[Expr, ...]
@@ -88,7 +97,7 @@ Expr = Value | Ref | Item | Unary | Binary | Compare | Select | Call
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Set a variable; `key` cites the place in the spec."""
+    """Assignment of a value to a variable; `key` is the key path in the spec."""
 
     target: str
     value: Expr
@@ -97,7 +106,7 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Set one element of an array."""
+    """Assignment of a value to one element of an array."""
 
     array: str
     index: Expr
@@ -106,7 +115,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Run one of two blocks."""
+    """Execution of one of two blocks, depending on a condition."""
 
     condition: Expr
     then: Block
@@ -115,7 +124,7 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """Run the block of the case that a whole-number variable has."""
+    """Execution of the block whose case equals the value of a whole-number variable."""
 
     selector: str
     cases: tuple[tuple[int, Block], ...]
@@ -123,7 +132,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Run a block a fixed number of times; the index counts from 0."""
+    """Execution of a block a fixed number of times; the variable `index` counts from 0."""
 
     count: int
     index: str
@@ -132,7 +141,10 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """Count one up to `limit` (saturating) while the condition holds, else back to 0."""
+    """Increment of a counter, saturating at `limit`, if the condition is true.
+
+    Else reset to 0 (rule 4b).
+    """
 
     timer: str
     condition: Expr
@@ -142,7 +154,10 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class FaultBit:
-    """Set a fault bit, for the range of a `signal`; or clear one that is not latched."""
+    """Setting of a fault bit, or clearing of it if `value` is false.
+
+    `signal` names the variable whose range check sets the bit.
+    """
 
     fault: str
     signal: str = ""
@@ -151,7 +166,7 @@ class FaultBit:
 
 @dataclass(frozen=True, slots=True)
 class RunBlock:
-    """Run a named block."""
+    """Execution of a named block of the Program."""
 
     block: str
 
@@ -161,7 +176,7 @@ Block = tuple[Op, ...]
 
 
 def real(value: float | Fraction) -> Value:
-    """Return a real literal; give the exact value where it is known."""
+    """Return a real literal in float64; a Fraction is stored as the exact value, too."""
     if isinstance(value, Fraction):
         return Value(round_to_type(value), value)
     return Value(float(value))
@@ -173,27 +188,27 @@ def integer(value: int) -> Value:
 
 
 def add(left: Expr, right: Expr) -> Binary:
-    """Return left + right."""
+    """Return the expression left + right."""
     return Binary("+", left, right)
 
 
 def subtract(left: Expr, right: Expr) -> Binary:
-    """Return left - right."""
+    """Return the expression left - right."""
     return Binary("-", left, right)
 
 
 def multiply(left: Expr, right: Expr) -> Binary:
-    """Return left * right."""
+    """Return the expression left * right."""
     return Binary("*", left, right)
 
 
 def divide(left: Expr, right: Expr) -> Binary:
-    """Return left / right."""
+    """Return the expression left / right."""
     return Binary("/", left, right)
 
 
 def sum_of(parts: list[Expr]) -> Expr:
-    """Return the sum from left to right, 0 for no parts."""
+    """Return the sum of the parts, added from left to right; the real 0 for an empty list."""
     if not parts:
         return real(0.0)
     result = parts[0]

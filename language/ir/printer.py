@@ -1,4 +1,4 @@
-"""Printing: the canonical text of a Program, read by golden tests and hashed into its digest."""
+"""Printer: the canonical text of a Program, for golden tests and for its digest."""
 
 from __future__ import annotations
 
@@ -31,19 +31,28 @@ from language.ir.program import Program
 
 INDENT = "    "
 MAX_CACHED_DIGESTS = 16
-"""Programs whose digests are kept, the latest ones: they are asked for before each run."""
+"""Number of Programs whose digests are cached."""
 
 _digest_cache: OrderedDict[int, tuple[Program, str]] = OrderedDict()
-"""By identity: what is kept holds its Program, so no other one has it meanwhile."""
+"""Digest by identity of a Program.
+
+An entry holds its Program, so that the identity stays unique.
+"""
 
 
 def format_program(program: Program) -> str:
-    """Return the whole program as text, one operation a line."""
+    """Return a Program as text, one operation per line.
+
+    The order is header, constants, variables, functions, blocks.
+    """
     return "\n".join(_program_lines(program)) + "\n"
 
 
 def digest(program: Program) -> str:
-    """Return the first 16 hexadecimal digits of the SHA-256 of the program's text."""
+    """Return the first 16 hexadecimal digits of the SHA-256 of the text of a Program.
+
+    The digests of the Programs used last are cached.
+    """
     cached = _digest_cache.pop(id(program), None) or (program, _compute_digest(program))
     _digest_cache[id(program)] = cached
     if len(_digest_cache) > MAX_CACHED_DIGESTS:
@@ -52,11 +61,12 @@ def digest(program: Program) -> str:
 
 
 def _compute_digest(program: Program) -> str:
+    """Return the digest of a Program without the cache."""
     return hashlib.sha256(format_program(program).encode()).hexdigest()[:16]
 
 
 def format_expr(expr: Expr) -> str:
-    """Return an expression with every operation in parentheses."""
+    """Return an expression as text with every operation in parentheses."""
     match expr:
         case Value(value):
             return repr(value)
@@ -76,12 +86,13 @@ def format_expr(expr: Expr) -> str:
 
 
 def block_lines(block: Block, depth: int = 0) -> Iterator[str]:
-    """Yield the lines of a block."""
+    """Yield the lines of a block, indented by `depth` levels."""
     for op in block:
         yield from (INDENT * depth + line for line in _op_lines(op))
 
 
 def _op_lines(op: Op) -> Iterator[str]:
+    """Yield the lines of one operation; inner blocks are indented by one level."""
     match op:
         case Assign(target, value, key):
             yield f"{target} := {format_expr(value)}{_format_citation(key)}"
@@ -101,7 +112,8 @@ def _op_lines(op: Op) -> Iterator[str]:
             yield f"repeat {count} times as {index}"
             yield from block_lines(body, 1)
         case Count(timer, condition, limit, key):
-            yield f"count {timer} up to {limit} while {format_expr(condition)}{_format_citation(key)}"
+            head = f"count {timer} up to {limit} while {format_expr(condition)}"
+            yield head + _format_citation(key)
         case FaultBit(fault, signal, value):
             yield f"{'fault' if value else 'no fault'} {fault}{f' of {signal}' if signal else ''}"
         case RunBlock(name):
@@ -109,10 +121,12 @@ def _op_lines(op: Op) -> Iterator[str]:
 
 
 def _format_citation(key: str) -> str:
+    """Return the comment with the key path of an operation, or an empty text without a key."""
     return f"    # {key}" if key else ""
 
 
 def _program_lines(program: Program) -> Iterator[str]:
+    """Yield the lines of a Program: header, names, functions, blocks."""
     yield from _mode_lines(program)
     yield from _event_lines(program)
     yield from _name_lines(program)
@@ -126,6 +140,7 @@ def _program_lines(program: Program) -> Iterator[str]:
 
 
 def _mode_lines(program: Program) -> Iterator[str]:
+    """Yield the lines of the name, the number type, the period and the modes."""
     yield f"program {program.name}"
     yield f"numbers {program.number_type}"
     yield f"period {program.period}" if program.period else f"major step {program.major_step}"
@@ -139,6 +154,7 @@ def _mode_lines(program: Program) -> Iterator[str]:
 
 
 def _event_lines(program: Program) -> Iterator[str]:
+    """Yield the lines of transitions, alarms, invariants and faults."""
     for t in program.transitions:
         waited = t.tunable_wait or (f"{t.wait} s" if t.wait else "")
         wait = f" wait {waited} = {t.ticks} ticks" if waited else ""
@@ -155,6 +171,7 @@ def _event_lines(program: Program) -> Iterator[str]:
 
 
 def _name_lines(program: Program) -> Iterator[str]:
+    """Yield the lines of constants, variables, default inputs and outputs."""
     for constant in program.constants:
         stamps = f" from {', '.join(constant.depends_on)}" if constant.depends_on else ""
         limits = f" in {constant.range[0]!r} .. {constant.range[1]!r}" if constant.range else ""

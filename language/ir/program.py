@@ -1,15 +1,16 @@
-"""Program: ordered scalar operations, the one thing that the engine runs and codegen prints.
+"""Program: named blocks of scalar operations that the engine interprets and the generator prints.
 
-Names are `group.name`; the group says what a variable is and where a back end keeps it:
+A variable is called `group.name`. The group gives its meaning and its storage:
 
-    constant  a fixed parameter          calibration  a tunable parameter
-    derived   follows from calibrations  solved       computed at check time, carries stamps
-    input     of this tick               before       the inputs of the tick before
-    state     carried over               equation     evaluated each tick
-    discrete  carried over, frozen while the states flow
-    latched   inputs of this tick within their ranges
-    check     whether an invariant holds; for the engine alone
-    memory    mode, fired, counters ...  work         lives within one call only
+    constant  a fixed parameter            calibration  a tunable parameter
+    derived   computed from calibrations   solved       computed at check time, with stamps
+    input     input of this tick           before       input of the tick before
+    state     retained between steps       equation     evaluated in each tick
+    discrete  retained; constant while the states flow
+    latched   input of this tick, saturated to its range
+    check     truth of an invariant, for the engine only
+    memory    mode, fired transition, counters and other retained variables
+    work      local variable of one call
 """
 
 from __future__ import annotations
@@ -24,23 +25,26 @@ from language.ir.ops import Block
 from language.ir.regions import CHART
 
 MODE_VARIABLE = "memory.mode"
-"""The variable of the chart's mode; a run keeps its own."""
+"""Variable of the chart's mode; a run of a model has its own."""
 LOG_VARIABLE = "memory.log"
 LOG_COUNT_VARIABLE = "memory.count_of_log"
-"""The transitions of a tick with several micro-steps, a 0 after each step, and how many entries."""
+"""Number of entries of LOG_VARIABLE, the array of the transitions fired in a tick.
+
+The array exists if a tick may have several micro-steps; a 0 ends each micro-step.
+"""
 ValueType = Literal["real", "truth", "whole"]
 TICK_UNIT = "tick"
-"""The unit of a tunable wait on a calibration page."""
+"""Unit of a tunable wait on a calibration page."""
 MAX_TIMER_TICKS = 65535
-"""What a counter of ticks goes up to (rule 4)."""
+"""Largest value of a tick counter (rule 4)."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable with its type; `size` is the length of an array, 0 for a scalar.
+    """A variable with its type and unit; `size` is the length of an array, 0 for a scalar.
 
-    `values` are the names of the numbers 0, 1, ... of a whole one that is an enumeration; `range`
-    is what an engine reports the leaving of (SI).
+    `values` are the names of the numbers 0, 1, ... of an enumeration. `range` is the declared range
+    [SI] whose violation the engine reports.
     """
 
     name: str
@@ -54,9 +58,9 @@ class Variable:
 
 @dataclass(frozen=True)
 class Constant:
-    """A value that no operation writes; solved ones list the tunables that they came from.
+    """A value that no operation writes; `items` are the values of an array, empty for a scalar.
 
-    `items` are the values of an array, empty for a scalar.
+    `depends_on` lists the tunable parameters from which a solved number was computed.
     """
 
     name: str
@@ -74,7 +78,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class ModeInfo:
-    """A mode and its number."""
+    """A mode: its name and its number."""
 
     name: str
     number: int
@@ -82,7 +86,7 @@ class ModeInfo:
 
 @dataclass(frozen=True)
 class RegionInfo:
-    """A region beside the chart with its modes."""
+    """A region beside the root chart, with its modes."""
 
     name: str
     modes: tuple[ModeInfo, ...]
@@ -90,11 +94,12 @@ class RegionInfo:
 
 @dataclass(frozen=True)
 class TransitionInfo:
-    """A transition: number (from 1), modes, wait in seconds (exact) and in ticks.
+    """A transition: number (from 1), source and target modes, wait in seconds (exact) and in ticks.
 
-    `slot` is the ending of the variables of its guard, see language/model/region_queries.py; `rewind` are the
-    ticks that it looks back; `between` are the paths of source and target in a chart, "" for none.
-    `tunable` is the constant that holds the ticks of a tunable wait.
+    `slot` is the suffix of the variables of its guard (language/model/region_queries.py).
+    `rewind_ticks` is the largest number of ticks that the transition goes back. `chart_endpoints`
+    are the paths of source and target in a chart, "" for none. `tunable_wait` is the constant that
+    holds a tunable wait in ticks.
     """
 
     number: int
@@ -113,7 +118,10 @@ class TransitionInfo:
 
     @property
     def timer_limit(self) -> int:
-        """What the timer counts to: one more than the wait, or than the longest tunable one."""
+        """The value at which the wait counter saturates.
+
+        It is ticks + 1, or MAX_TIMER_TICKS for a tunable wait.
+        """
         return MAX_TIMER_TICKS if self.tunable_wait else self.ticks + 1
 
 
@@ -121,7 +129,8 @@ class TransitionInfo:
 class Alarm:
     """A time [s] after the entry of a mode at which a variable becomes true (rule 8).
 
-    Where it `repeats` the variable is true for that instant, and again each time [s] after it.
+    If `repeats` is set, the variable is true at that instant only, and again after each further
+    period of `time`.
     """
 
     variable: str
@@ -133,7 +142,10 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Function:
-    """An elementary function as operations: parameters `work.x` ..., result in `work.y`."""
+    """An elementary function as a list of operations.
+
+    Parameters are `work.<name>`, the result is `work.y`.
+    """
 
     name: str
     body: Block
@@ -144,7 +156,7 @@ class Function:
 
 @dataclass(frozen=True)
 class OutputWire:
-    """An output: its name and the variable that holds it."""
+    """An output of the automaton: its name, the variable with its value, its type and its unit."""
 
     name: str
     source: str
@@ -154,7 +166,11 @@ class OutputWire:
 
 @dataclass(frozen=True)
 class ObserverInfo:
-    """Numbers from which an observer's solved constants came (for reference back ends)."""
+    """The matrices from which the solved constants of an observer come, for reference solvers.
+
+    `a` (n, n), `b` (n, inputs), `c` (m, n), `process_noise` (n, n), `measurement_noise` (m, m);
+    `period` in s.
+    """
 
     mode: str
     states: tuple[str, ...]
@@ -172,7 +188,10 @@ class ObserverInfo:
 
 @dataclass(frozen=True)
 class StabilityLimit:
-    """The largest stable step [s] of a mode, and the eigenvalue [1/s] and term that set it."""
+    """The largest stable step [s] of a mode.
+
+    `eigenvalue` [1/s], `term` and `state` say which part of the flow sets the limit.
+    """
 
     mode: str
     step: float
@@ -183,7 +202,10 @@ class StabilityLimit:
 
 @dataclass(frozen=True)
 class IntegrationInfo:
-    """How states move: method, step [s], terms of its polynomial, |A h| and limits by mode."""
+    """The integration of the states: method, step [s] and number of terms of its series.
+
+    `norms` (|A h|) and `stability_limits` are given by mode.
+    """
 
     method: str
     step: float
@@ -196,7 +218,7 @@ class IntegrationInfo:
 
 @dataclass(frozen=True)
 class InvariantInfo:
-    """An assertion about a mode: the variable that says whether it holds, and what is told."""
+    """An assertion about a mode: the variable with its truth, and the message on its violation."""
 
     name: str
     mode: int
@@ -207,10 +229,11 @@ class InvariantInfo:
 
 @dataclass(frozen=True)
 class Program:
-    """A checked automaton as operations. `blocks` are named; the order is that of printing.
+    """A checked automaton as named blocks of operations.
 
-    A sampled program is entered at `init` and `step`; a continuous one at `init`, `equations`,
-    `watch`, `jump` and `flow` (see language/programs/continuous_program.py).
+    The order of the blocks is the order of printing. A sampled Program is entered at `init` and
+    `step`; a continuous one at `init` and `step`, or by the engine at its parts (see
+    language/programs/continuous_program.py).
     """
 
     name: str
@@ -235,57 +258,69 @@ class Program:
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
-        """The variables that come from outside."""
+        """The variables of the group `input`."""
         return tuple(v for v in self.variables if v.name.startswith("input."))
 
     def modes_of(self, region: str) -> tuple[ModeInfo, ...]:
-        """Return the modes of a region."""
+        """Return the modes of a region; "chart" is the root.
+
+        Raises StopIteration for an unknown region.
+        """
         if region == CHART:
             return self.modes
         return next(info.modes for info in self.regions if info.name == region)
 
     def mode_name(self, number: int, region: str = CHART) -> str:
-        """Return the name of the mode of a region with a number."""
+        """Return the name of the mode with a number in a region."""
         return next(mode.name for mode in self.modes_of(region) if mode.number == number)
 
     @property
     def has_log(self) -> bool:
-        """Tell whether a tick may have several micro-steps, so that it keeps their transitions."""
+        """Return whether a tick may have several micro-steps, whose transitions are then logged."""
         return any(variable.name == LOG_VARIABLE for variable in self.variables)
 
     def endpoint_names(self, info: TransitionInfo) -> tuple[str, str]:
-        """Return the names of source and target of a transition: paths in a chart, "" for none."""
+        """Return the names of source and target of a transition.
+
+        In a chart these are paths, "" for none; else names of modes.
+        """
         return info.chart_endpoints or (
             self.mode_name(info.source, info.region),
             self.mode_name(info.target, info.region),
         )
 
     def mode_variables(self) -> dict[str, str]:
-        """Return the variable that holds the mode of each region, the chart first."""
+        """Return the variable with the mode number of each region, keyed by region, chart first."""
         names = (CHART, *(region.name for region in self.regions))
         return {name: mode_variable(MODE_VARIABLE, name) for name in names}
 
     def fired_variables(self) -> tuple[str, ...]:
-        """Return the variables that hold the transition of each region, the chart first."""
+        """Return the variables with the fired transition of each region, chart first."""
         return tuple(fired_variable(region) for region in self.mode_variables())
 
 
 def mode_variable(base: str, region: str) -> str:
-    """Return the variable that holds a region's mode; `base` is that of the chart."""
+    """Return the variable with the mode number of a region; `base` is the variable of the chart."""
     return base if region == CHART else f"{base}_{region.replace('.', '_')}"
 
 
 def fired_variable(region: str) -> str:
-    """Return the variable that holds the transition of a region in a micro-step, 0 for none."""
+    """Return the variable with the number of the transition that a region fires in a micro-step.
+
+    Its value is 0 if the region fires none.
+    """
     return mode_variable("memory.fired", region)
 
 
 def value_type(type_name: str) -> ValueType:
-    """Return what a declared type (real, int, bool, enum) is in a Program."""
+    """Return the type in a Program of a declared type.
+
+    real -> real, bool -> truth, int and enum -> whole.
+    """
     types: dict[str, ValueType] = {"real": "real", "bool": "truth"}
     return types.get(type_name, "whole")
 
 
 def unqualified_name(name: str) -> str:
-    """Return a variable's name without its group."""
+    """Return a variable name without its group; empty if the name has no group."""
     return name.partition(".")[2]

@@ -1,6 +1,6 @@
-"""The name of the region that an automaton without regions has."""
+"""Regions: the name of the root region, which is the only region of most automata."""
 
 from __future__ import annotations
 
 CHART = "chart"
-"""The region of the modes at the root."""
+"""Name of the region of the modes at the root."""

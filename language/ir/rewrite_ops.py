@@ -1,4 +1,7 @@
-"""Substitution: the expressions of a block replaced by others, whatever operation holds them."""
+"""Rewriting: replacement of the expressions in the operations of a block.
+
+target := e  ->  target := transform(e)        (likewise in every kind of operation)
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ ExprTransform = Callable[[Expr], Expr]
 
 
 def operands(expr: Expr) -> tuple[Expr, ...]:
-    """Return the direct operands of an expression."""
+    """Return the direct operands of an expression from left to right; a leaf has none."""
     if isinstance(expr, (Binary, Compare)):
         return expr.left, expr.right
     if isinstance(expr, Call):
@@ -39,7 +42,10 @@ def operands(expr: Expr) -> tuple[Expr, ...]:
 
 
 def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
-    """Return an expression with its direct operands changed: itself where none is another one."""
+    """Return an expression with `transform` applied to its direct operands.
+
+    The same object is returned if `transform` returns every operand unchanged (by identity).
+    """
     if isinstance(expr, (Binary, Compare)):
         left, right = transform(expr.left), transform(expr.right)
         is_same = left is expr.left and right is expr.right
@@ -67,12 +73,15 @@ def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
 
 
 def map_expressions(block: Block, transform: ExprTransform) -> Block:
-    """Return a block with every expression that an operation reads changed."""
+    """Return a block with `transform` applied to each expression that an operation of it reads.
+
+    Inner blocks are included; `transform` gets whole expressions, not their parts.
+    """
     return tuple(_map_op(op, transform) for op in block)
 
 
 def direct_expressions(op: Op) -> tuple[Expr, ...]:
-    """Return the expressions that an operation reads itself, not those of blocks inside it."""
+    """Return the expressions that an operation reads itself, without those of its inner blocks."""
     match op:
         case Assign(_, value, _):
             return (value,)
@@ -85,13 +94,14 @@ def direct_expressions(op: Op) -> tuple[Expr, ...]:
 
 
 def walk_post_order(expr: Expr) -> Iterator[Expr]:
-    """Yield an expression and all inside it, the innermost first."""
+    """Yield all parts of an expression, operands before the expression that contains them."""
     for part in operands(expr):
         yield from walk_post_order(part)
     yield expr
 
 
 def _map_op(op: Op, transform: ExprTransform) -> Op:
+    """Return an operation with `transform` applied to its expressions, inner blocks included."""
     match op:
         case Assign(target, value, key):
             return Assign(target, transform(value), key)

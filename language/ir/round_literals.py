@@ -1,6 +1,9 @@
-"""Working: every real of a Program rounded to the type that it computes in, once.
+"""Literal rounding: the pass that rounds all reals of a Program to its number type (rule 17a).
 
-Whoever lowers writes `real(value)` with an exact or a double value and need not think of the type.
+    numbers float32:  x := 0.1  ->  x := 0.10000000149011612
+
+Each literal is rounded once. Lowering creates literals with `real(value)` from exact or double
+values and ignores the type.
 """
 
 from __future__ import annotations
@@ -16,7 +19,10 @@ NodeT = TypeVar("NodeT")
 
 
 def round_program(program: Program) -> Program:
-    """Return the program with literals and constants in its number type."""
+    """Return a Program with its literals and constants rounded to its number type.
+
+    A Program in float64 is returned unchanged. Functions are not changed: they exist for each type.
+    """
     number = program.number_type
     if number == "float64":
         return program
@@ -28,12 +34,15 @@ def round_program(program: Program) -> Program:
 
 
 def round_block(block: Block, number_type: NumberType) -> Block:
-    """Return a block with its literals in a number type."""
+    """Return a block with its literals rounded to a number type.
+
+    Float64 leaves the block unchanged.
+    """
     return block if number_type == "float64" else _round_node(block, number_type)
 
 
 def _round_constant(constant: Constant, number_type: NumberType) -> Constant:
-    """What was computed at check time in double is rounded here, once."""
+    """Return a constant with its real value, its array items and its range rounded to a type."""
     limits = constant.range
     return dataclasses.replace(
         constant,
@@ -48,7 +57,10 @@ def _round_constant(constant: Constant, number_type: NumberType) -> Constant:
 
 
 def _round_node(part: NodeT, number_type: NumberType) -> NodeT:
-    """Return an operation, an expression or a tuple of them, whatever kinds there may be."""
+    """Return an operation, an expression or a tuple of them with all literals rounded.
+
+    Parts without a change are returned as the same objects.
+    """
     if isinstance(part, Value):
         return part.round_to_type(number_type)  # type: ignore[return-value]
     if isinstance(part, tuple):

@@ -1,6 +1,6 @@
-"""Traversal: every operation of a block, and the names that blocks read and write.
+"""Traversal: the operations of a block, and the names that blocks and expressions read and write.
 
-Every pass asks for these again and again: a kind of operation is asked for after the other.
+The functions are called often by all passes; they use explicit stacks instead of recursion.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ from language.ir.ops import (
 
 
 def walk_ops(block: Block) -> Iterator[Op]:
-    """Yield every operation of a block, those inside others too."""
+    """Yield every operation of a block in the order of the text, inner blocks included.
+
+    An operation comes before the operations of its inner blocks.
+    """
     stack = list(reversed(block))
     while stack:
         op = stack.pop()
@@ -47,12 +50,19 @@ def walk_ops(block: Block) -> Iterator[Op]:
 
 
 def block_names(block: Block) -> list[str]:
-    """Return the variables and constants that a block reads or writes, and `call <function>`."""
+    """Return the names that a block reads, then those that it writes, with repetitions.
+
+    A call counts as the name `call <function>`.
+    """
     return block_reads(block) + block_writes(block)
 
 
 def block_reads(block: Block) -> list[str]:
-    """Return the variables that a block reads."""
+    """Return the variables and constants that a block reads, with repetitions.
+
+    A call counts as the name `call <function>`. Inner blocks are included, blocks of RunBlock are
+    not. A counter is not among the reads of its own operation.
+    """
     names: list[str] = []
     for op in walk_ops(block):
         if isinstance(op, Assign):
@@ -68,7 +78,10 @@ def block_reads(block: Block) -> list[str]:
 
 
 def block_writes(block: Block) -> list[str]:
-    """Return the variables that a block writes."""
+    """Return the variables that a block writes, with repetitions.
+
+    Inner blocks are included, blocks of RunBlock are not. A fault bit writes `memory.faults`.
+    """
     names: list[str] = []
     for op in walk_ops(block):
         if isinstance(op, Assign):
@@ -85,7 +98,10 @@ def block_writes(block: Block) -> list[str]:
 
 
 def expr_names(expr: Expr) -> list[str]:
-    """Return the variables and constants that an expression reads, and `call <function>`."""
+    """Return the variables and constants that an expression reads, and `call <function>` per call.
+
+    The names are in the order of the text, with repetitions.
+    """
     names: list[str] = []
     for part in subexpressions(expr):
         if isinstance(part, (Ref, Item)):
@@ -96,7 +112,7 @@ def expr_names(expr: Expr) -> list[str]:
 
 
 def subexpressions(expr: Expr) -> Sequence[Expr]:
-    """Return every part of an expression, parents first."""
+    """Return every part of an expression, parents first, operands from left to right."""
     stack: list[Expr] = [expr]
     result: list[Expr] = []
     while stack:
@@ -116,12 +132,15 @@ def subexpressions(expr: Expr) -> Sequence[Expr]:
 
 
 def names_used(blocks: Iterable[Block]) -> set[str]:
-    """Return every name that some blocks read or write."""
+    """Return the set of the names that some blocks read or write.
+
+    A call counts as the name `call <function>`.
+    """
     return {name for block in blocks for name in block_names(block)}
 
 
 def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
-    """Return a block's name and those of all that it runs."""
+    """Return the name of a block and the names of all blocks that it runs, even indirectly."""
     result, stack = set[str](), [name]
     while stack:
         block_name = stack.pop()
@@ -132,7 +151,10 @@ def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
 
 
 def substitute_variable(block: Block, name: str, constant: int) -> Block:
-    """Return assignments and stores in which a whole-number variable has a value."""
+    """Return a block with a literal in place of each read of a whole-number variable.
+
+    The block may hold assignments and stores only. Raises TypeError for another operation.
+    """
     ops: list[Op] = []
     for op in block:
         match op:
@@ -147,6 +169,8 @@ def substitute_variable(block: Block, name: str, constant: int) -> Block:
 
 
 def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
+    """Return an expression with a literal in place of each read of the variable `name`."""
+
     def part(inner: Expr) -> Expr:
         return _substitute_in_expr(inner, name, constant)
 
@@ -170,7 +194,10 @@ def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
 
 
 def negate_condition(condition: Expr) -> Expr:
-    """Return what is true where a condition is false; of an order, which NaN fails, by `not`."""
+    """Return the negation of a condition: `not a -> a`, `a == b -> a != b`, else `not condition`.
+
+    An order relation is not reversed, because it is false for a NaN.
+    """
     match condition:
         case Unary("not", operand):
             return operand
