@@ -1,1 +1,3 @@
-"""Prints a Program as C and builds it."""
+"""C code generation: prints a Program as C99, compiles it and measures, tests and proves the
+result.
+"""

@@ -1,1 +1,1 @@
-"""Runs the engine and the compiled code side by side, bit for bit."""
+"""Lock-step: runs the engine and the compiled C on the same inputs and compares every bit."""

@@ -1,1 +1,1 @@
-"""MC/DC coverage of generated C: counters of clang, inputs found by libFuzzer, boundary values."""
+"""Coverage of generated C: MC/DC counters of clang, inputs found by libFuzzer, boundary values."""

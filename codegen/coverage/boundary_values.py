@@ -1,9 +1,9 @@
-"""Border: an input of a tick, moved to where another mode follows: the numbers on both sides.
+"""Boundary value tests: inputs on both sides of the value at which the next mode changes.
 
-Boundary values (ISO 26262-6:2018, table 8) of what a sequence does: where a mode changes or a wait
-begins, each real input of that tick and of the one before is bisected between what it was and an
-end of its range, until two neighbours among the numbers are followed by different modes. Where
-rounding decides, it does there.
+The module implements boundary value analysis (ISO 26262-6:2018, table 8) around given input
+sequences. At each tick in which a mode changes or a wait begins, it bisects each real input of that
+tick, and of the tick before, between its value and an end of its range. The bisection stops at two
+adjacent floating-point numbers that lead to different modes.
 """
 
 from __future__ import annotations
@@ -23,23 +23,27 @@ from language.ir.program import Program, unqualified_name
 from language.programs.model_run import RUN_MODE
 
 NEIGHBOUR_COUNT = 8
-"""Numbers on each side of a border."""
+"""Number of test values on each side of a boundary."""
 MAX_PER_CHANGE = 3
-"""Borders of the same input for the same change of a mode or a wait."""
+"""Maximum number of boundaries of one input for the same change of a mode or wait."""
 MAX_TOTAL_TICKS = 200_000
-"""Ticks of all sequences that are looked at: some seconds."""
+"""Maximum number of ticks of all sequences that are searched; they take some seconds."""
 MAX_BISECTIONS = 200
+"""Maximum number of halvings of one interval."""
 CAST = {"real": float, "truth": bool, "whole": int}
+"""The Python type of a value by the type of a variable."""
 Modes = tuple[Any, ...]
 Values = tuple[float, ...]
 Change = tuple[int, Any, Any]
-"""Which of the modes changes, from what to what."""
+"""The index of the mode variable that changes, its old value and its new value."""
 
 
 @dataclass(frozen=True)
 class Boundary:
-    """An input (its place in a record) of a tick, and two neighbouring values of it that are
-    followed by different modes until the tick `last`.
+    """Two adjacent values of a real input that lead to different modes.
+
+    `input_index` is the position of the input in an input record. The input takes the value `near`
+    or `far` at `tick`; the modes differ at the end of tick `last`.
     """
 
     tick: int
@@ -52,10 +56,13 @@ class Boundary:
 def generate_boundary_sequences(
     program: Program, sequences: Sequence[Sequence[bytes]], ranges: Mapping[str, Range]
 ) -> Iterator[list[bytes]]:
-    """Yield sequences that end at a border of one of some `sequences`, or beside it.
+    """Yield input sequences that reach a boundary of one of the given sequences, or pass close to
+    it.
 
-    Records are those of a `Tape`; a sequence is looked at until its page changes, all of them for
-    `MOST_TICKS`. `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    Each boundary gives 2 * NEIGHBOUR_COUNT sequences that end at its last tick. The records are
+    those of a `TickLog`. A sequence is searched up to the first change of its calibration page; the
+    search ends after MAX_TOTAL_TICKS ticks of all sequences. `ranges` gives ranges of inputs by
+    name; an input without one has DEFAULT_INPUT_RANGE. Raises MissingToolError, BuildError.
     """
     record = struct.Struct(f"<{len(tick_inputs(program)) + 1}d")
     search = _BoundarySearch(program, ranges)
@@ -73,7 +80,9 @@ def generate_boundary_sequences(
 
 
 def _neighbouring_values(boundary: Boundary, program: Program) -> Iterator[float]:
-    """Yield the numbers at a border: so many on each side."""
+    """Yield the test values in steps of `far - near`: NEIGHBOUR_COUNT on each side of a
+    boundary.
+    """
     step, cast = boundary.far - boundary.near, ROUNDING_FUNCTIONS[program.number_type]
     yield from (
         cast(boundary.near + k * step) for k in range(1 - NEIGHBOUR_COUNT, NEIGHBOUR_COUNT + 1)
@@ -81,10 +90,12 @@ def _neighbouring_values(boundary: Boundary, program: Program) -> Iterator[float
 
 
 class _BoundarySearch:
-    """The C of a Program along sequences, and beside them."""
+    """A search for boundaries with the compiled C of a Program, restarted from snapshots of its
+    state.
+    """
 
     def __init__(self, program: Program, ranges: Mapping[str, Range]) -> None:
-        """Compile. Raises ToolMissing, BuildError."""
+        """Compile the Program. Raises MissingToolError, BuildError."""
         self._stepper, self._ranges = CompiledStepper(program), ranges
         self._initial = self._stepper.snapshot()
         self._inputs, self._cast = tick_inputs(program), ROUNDING_FUNCTIONS[program.number_type]
@@ -94,7 +105,7 @@ class _BoundarySearch:
         self._counts: Counter[tuple[Change, int, int]] = Counter()
 
     def find_boundaries(self, inputs: Sequence[Values]) -> Iterator[Boundary]:
-        """Yield borders of a sequence of inputs."""
+        """Yield the boundaries of one sequence of input values, in the order of its ticks."""
         self._stepper.restore(self._initial)
         past = now = self._stepper.snapshot()
         before = self._current_modes()
@@ -118,7 +129,11 @@ class _BoundarySearch:
         snapshot: bytes,
         changes: set[Change],
     ) -> Iterator[Boundary]:
-        """Yield borders of each real input of a tick, where what follows until `last` is other."""
+        """Yield at most one boundary for each real input of `tick`.
+
+        `snapshot` is the state before `tick`; the modes are compared at the end of tick `last`. An
+        input is skipped if it has MAX_PER_CHANGE boundaries for each of the changes already.
+        """
         for place, variable in enumerate(self._inputs):
             kinds = [(change, place, last - tick) for change in changes]
             if variable.type != "real" or all(
@@ -134,7 +149,11 @@ class _BoundarySearch:
     def _bisect(
         self, snapshot: bytes, inputs: Sequence[Values], place: int, ends: Range
     ) -> tuple[float, float] | None:
-        """Return two neighbours between the first value of an input and an end of its range."""
+        """Return two adjacent values (near, far) of an input that lead to different modes.
+
+        The search runs from the value in the first of `inputs` to the first end of the range that
+        leads to other modes. Returns None if neither end does, or if the value is not finite.
+        """
         (first, *rest), cast = inputs, self._cast
 
         def modes(value: float) -> Modes:
@@ -156,7 +175,9 @@ class _BoundarySearch:
         return None
 
     def _run_ticks(self, snapshot: bytes, inputs: Sequence[Values]) -> Modes:
-        """Do some ticks from what was kept; return the modes that follow."""
+        """Restore a snapshot, execute one tick for each record of inputs, and return the modes
+        then.
+        """
         self._stepper.restore(snapshot)
         for values in inputs:
             for variable, value in zip(self._inputs, values, strict=False):
@@ -165,6 +186,8 @@ class _BoundarySearch:
         return self._current_modes()
 
     def _current_modes(self) -> Modes:
-        """Return the modes, and which waits have begun."""
+        """Return the values of the mode variables, then a truth value for each wait: whether it
+        has begun.
+        """
         get = self._stepper.get
         return (*(get(name) for name in self._modes), *(get(name) > 0 for name in self._waits))

@@ -1,7 +1,9 @@
-"""Exploring: ways through generated C that libFuzzer finds, with any page and inputs that are held.
+"""Coverage exploration: inputs and calibration pages for generated C that libFuzzer finds.
 
-A way is bytes: three for each number of the page that is another one, then groups of ticks - how
-many, and the word of each input (`words`). MC/DC counts what they show (`mcdc.py`).
+A corpus entry is a byte string. It begins with three bytes for each changed number of the
+calibration page. Groups of ticks follow: one byte for the number of ticks, and one byte for each
+input, which is an index into a table of values (`word_table`). `mcdc.py` measures the coverage that
+a corpus reaches.
 """
 
 from __future__ import annotations
@@ -34,25 +36,30 @@ from language.ir.traversal import walk_ops
 
 MAIN = HarnessMain("coverage/explore_main.c.jinja")
 MAX_PAGE_CHANGES, MAX_TICK_GROUPS = 4, 96
-"""Most numbers of a page that are others, and most groups of ticks."""
+"""Maximum number of changed numbers of the page, and of groups of ticks."""
 FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)
+"""Factors by which a number of the page is changed."""
 HOLD_TICKS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
-"""Ticks of a group: mostly one, and as many as a wait takes."""
+"""Numbers of ticks of a group: mostly one, up to the length of a typical wait."""
 LARGE_PROGRAM, MAX_LARGE_TICKS = 1000, 1000
-"""Operations of a Program that is large, and most ticks of a way through it: else its ways, of
-thousands of ticks each, take most of the time and show nothing more.
+"""Number of operations from which on a Program is large, and the maximum number of ticks of an
+entry
+
+then. Longer entries of a large Program take most of the time and raise the coverage no further.
 """
 UNBOUNDED_RANGE = (-1e30, 1e30)
+"""The range of a number of the page that declares none."""
 SEED_FILE, WORDS_HEADER = "known", "words.h"
 
 
 def generate_corpus(
     program: Program, ranges: Mapping[str, Range], runs: int, seeds: Sequence[int]
 ) -> tuple[bytes, ...]:
-    """Return ways that together show all that libFuzzer found in so many runs from each seed.
+    """Return corpus entries that together reach the coverage that libFuzzer found.
 
-    Later seeds go on from what earlier ones found; what they are given has one order, so that they
-    find the same each time. `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    libFuzzer makes `runs` executions from each seed. A later seed starts from the entries of the
+    earlier ones, in an order that makes the result reproducible. `ranges` gives ranges of inputs by
+    name. Raises MissingToolError; BuildError also if an execution fails.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -85,7 +92,11 @@ def generate_corpus(
 def corpus_records(
     program: Program, ranges: Mapping[str, Range], corpus: Sequence[bytes]
 ) -> Iterator[list[bytes]]:
-    """Yield the records of ways that are gone with the page of the spec, as a `Tape` has them."""
+    """Yield for each corpus entry its input records in the layout of a `TickLog`.
+
+    The records use the calibration page of the spec: the changes of the page in an entry are
+    ignored.
+    """
     most = max_entry_ticks(program)
     table, size = word_table(program, ranges), 1 + len(tick_inputs(program))
     record, first = struct.Struct(f"<{size}d"), 3 * MAX_PAGE_CHANGES if page_scalars(program) else 0
@@ -101,18 +112,20 @@ def corpus_records(
 
 
 def max_entry_bytes(program: Program) -> int:
-    """Return the size of the longest way [bytes]."""
+    """Return the length [bytes] of the longest corpus entry."""
     return 3 * MAX_PAGE_CHANGES + MAX_TICK_GROUPS * (1 + len(tick_inputs(program)))
 
 
 def max_entry_ticks(program: Program) -> int:
-    """Return the most ticks of a way."""
+    """Return the maximum number of ticks of a corpus entry; it is smaller for a large Program."""
     count = sum(1 for block in program.blocks.values() for _ in walk_ops(block))
     return MAX_LARGE_TICKS if count > LARGE_PROGRAM else MAX_TICK_GROUPS * max(HOLD_TICKS)
 
 
 def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
-    """Write the C of a program and what goes its ways; return the sources to compile."""
+    """Write the C of a Program and the main that executes corpus entries; return the C files to
+    compile.
+    """
     sources = write_harness(
         program, folder, main=MAIN, extra_context={"page": page_scalars(program)}
     )
@@ -135,7 +148,10 @@ def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) 
 
 
 def page_scalars(program: Program) -> list[dict[str, Any]]:
-    """Return the single numbers of a page: their members, types and ranges."""
+    """Return template contexts of the scalar numbers of the page: member, C type, low and high end.
+
+    Tables and truth values are left out.
+    """
     program = restrict_to_step(program)
     c_names = CNames(program, solved_prefix=SOLVED_PREFIX_ON_PAGE)
     scalars = []
@@ -148,11 +164,15 @@ def page_scalars(program: Program) -> list[dict[str, Any]]:
 
 
 def _constant_range(constant: Constant) -> Range:
-    """Return the range of a number of a page: one without may be any, a word one of its list."""
+    """Return the range of a number of the page.
+
+    A number without a range has UNBOUNDED_RANGE; an enumeration has the indices of its values.
+    """
     if constant.range:
         return float(constant.range[0]), float(constant.range[1])
     return (0.0, float(len(constant.values) - 1)) if constant.values else UNBOUNDED_RANGE
 
 
 def _format_array(kind: str, name: str, numbers: Sequence[float]) -> str:
+    """Return the C definition of a constant array."""
     return f"static const {kind} {name}[] = {{{', '.join(map(repr, numbers))}}};"

@@ -1,7 +1,8 @@
-"""Fuzzing: sequences of inputs by which libFuzzer looks for every way through generated C.
+"""libFuzzer: input sequences that reach as many branches of generated C as possible.
 
-A sequence is bytes, one for each input of each tick: the place of its value in a table (`words`).
-The C runs under sanitizers and writes down each sequence with a sum of all that it carried.
+A sequence is a byte string with one byte for each input of each tick. The byte is an index into a
+table of values of that input (`word_table`). The C runs under sanitizers and writes each sequence
+to a file, with a CRC-32 of all its retained values.
 """
 
 from __future__ import annotations
@@ -22,25 +23,35 @@ from language.ir.program import Program, Variable, unqualified_name
 
 FUZZER_COMPILER = "clang-19"
 WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
-"""Words of an input; those that are values, and how many of these are spread over its range. The
-others are changes: half of them small and smaller steps, as many none."""
+"""Number of words of an input, how many of them are values, and how many of the values are spread
+over
+
+the range of the input. The other words are differences from the last value: 80 of decreasing size,
+and the rest 0.
+"""
 DEFAULT_INPUT_RANGE = (-1000.0, 1000.0)
+"""The range of a real input that declares none."""
 MAIN = HarnessMain("coverage/fuzz_main.c.jinja")
 MAX_SEQUENCE_TICKS = 64
-"""Most ticks of a sequence that the C reads."""
+"""Maximum number of ticks of a sequence that the C executes."""
 FUZZER_TIMEOUT = 60
-"""Seconds of one sequence after which libFuzzer takes it for one without end."""
+"""Time limit [s] of one sequence; libFuzzer reports a sequence that takes longer as a hang."""
 SEQUENCES_FILE = "sequences.bin"
+"""The file to which the C writes the sequences."""
 COVERAGE_LINE = re.compile(r"cov: (\d+)")
+"""The number of covered edges in the output of libFuzzer."""
 SEQUENCE_HEADER = struct.Struct("<II")
+"""The header of a sequence in its file: length [bytes] and CRC-32."""
 Range = tuple[float, float]
 WordValues = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class FuzzerRun:
-    """What libFuzzer tried: each sequence with the CRC-32 of its records, `edges` of the C that it
-    came along, and what sanitizers said.
+    """The result of a run of libFuzzer.
+
+    `sequences` pairs each executed sequence with the CRC-32 of its records. `edges` is the number
+    of edges of the C that were covered. `findings` are the errors that the sanitizers reported.
     """
 
     sequences: tuple[tuple[bytes, int], ...]
@@ -51,9 +62,9 @@ class FuzzerRun:
 def run_fuzzer(
     program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
 ) -> FuzzerRun:
-    """Run libFuzzer on the C of a Program; `ranges` are those of inputs by name.
+    """Run libFuzzer on the C of a Program for `runs` executions of at most `ticks` ticks.
 
-    Raises ToolMissing, BuildError.
+    `ranges` gives ranges of inputs by name. Raises MissingToolError, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -66,7 +77,9 @@ def run_fuzzer(
 
 
 def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues]:
-    """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
+    """Return for each input of a tick the value, or the difference, that each byte 0 to 255
+    means.
+    """
     return [
         _input_words(v, program, ranges.get(unqualified_name(v.name))) for v in tick_inputs(program)
     ]
@@ -75,12 +88,19 @@ def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues
 def decode_sequence(
     program: Program, table: list[WordValues], sequence: bytes
 ) -> Iterator[WordValues]:
-    """Yield the inputs of each tick of a sequence, as the C reads them."""
+    """Yield the input values of each tick of a sequence, at most MAX_SEQUENCE_TICKS, as the C
+    reads them.
+    """
     yield from decode_inputs(program, table, sequence[: MAX_SEQUENCE_TICKS * len(table)])
 
 
 def decode_inputs(program: Program, table: list[WordValues], data: bytes) -> Iterator[WordValues]:
-    """Yield the inputs that bytes choose, one for each, in turn: values, or changes of the last."""
+    """Yield the input values of each tick, given one byte for each input and tick.
+
+    A byte selects a value of the table. For a real input, a byte from ABSOLUTE_WORDS on selects a
+    difference, which is added to the last value of that input. Bytes of an incomplete tick are
+    ignored.
+    """
     real = [variable.type == "real" for variable in tick_inputs(program)]
     last = [own[SPREAD_WORDS // 2] for own in table]
     for at in range(0, len(data) - len(table) + 1, len(table)):
@@ -91,7 +111,12 @@ def decode_inputs(program: Program, table: list[WordValues], data: bytes) -> Ite
 
 
 def _input_words(variable: Variable, program: Program, value_range: Range | None) -> WordValues:
-    """Return the words of an input: values first, then changes of a real."""
+    """Return the WORDS_PER_INPUT words of an input.
+
+    A truth value has 0 and 1 in turn. A whole number has its values in turn, then a few invalid
+    ones. A real number has values over its range, values at and beyond the ends, special values
+    (signed zeros, subnormals, infinities, NaN), then differences.
+    """
     if variable.type == "truth":
         return (0.0, 1.0) * (WORDS_PER_INPUT // 2)
     if variable.type == "whole":
@@ -112,17 +137,21 @@ def _input_words(variable: Variable, program: Program, value_range: Range | None
 
 
 def _run_libfuzzer(app: Path, runs: int, most: int, seed: int) -> FuzzerRun:
+    """Run a fuzzer built by `build_sanitised` and return its sequences, covered edges and
+    findings.
+    """
     options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={FUZZER_TIMEOUT}"]
     done = run_sanitised(app, [*options, "-len_control=0", "corpus"])
     edges = max(
         (int(found) for line in done.lines for found in COVERAGE_LINE.findall(line)), default=0
     )
     kept = app.parent / SEQUENCES_FILE
-    data = kept.read_bytes() if kept.exists() else b""  # none where the first one did not end
+    data = kept.read_bytes() if kept.exists() else b""  # absent if the first sequence fails
     return FuzzerRun(tuple(_read_sequences(data)), edges, done.findings)
 
 
 def _read_sequences(data: bytes) -> Iterator[tuple[bytes, int]]:
+    """Yield the sequences in the contents of a sequence file, each with its CRC-32."""
     at = 0
     while at < len(data):
         size, checksum = SEQUENCE_HEADER.unpack_from(data, at)
@@ -132,17 +161,24 @@ def _read_sequences(data: bytes) -> Iterator[tuple[bytes, int]]:
 
 
 def _format_header(table: list[WordValues]) -> str:
-    sizes = f"#define ABSOLUTE {ABSOLUTE_WORDS}\n#define FIRST {SPREAD_WORDS // 2}\n#define LONGEST {MAX_SEQUENCE_TICKS}\n"
-    return sizes + format_word_table(table)
+    """Return the header `words.h`: the sizes and the word table."""
+    sizes = {
+        "ABSOLUTE": ABSOLUTE_WORDS,
+        "FIRST": SPREAD_WORDS // 2,
+        "LONGEST": MAX_SEQUENCE_TICKS,
+    }
+    defines = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
+    return defines + format_word_table(table)
 
 
 def format_word_table(table: list[WordValues]) -> str:
-    """Return the table as C: hexadecimal digits of each double."""
+    """Return the C definition of the word table; each double is written in hexadecimal."""
     rows = ",\n".join(f"    {{{', '.join(_format_double(word) for word in own)}}}" for own in table)
     return f"static const double word[{len(table)}][{WORDS_PER_INPUT}] = {{\n{rows}\n}};\n"
 
 
 def _format_double(value: float) -> str:
+    """Return a C literal of a double, with the macros NAN and INFINITY for special values."""
     if math.isnan(value):
         return "NAN"
     return value.hex() if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"

@@ -1,8 +1,8 @@
-"""MC/DC: which conditions of generated C were shown to matter, as clang counts them.
+"""MC/DC coverage of generated C, measured by clang, with proofs for infeasible conditions.
 
-A condition of a decision is shown where two runs of it are known that differ in that condition, as
-far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-6 2001; clang's
--fcoverage-mcdc). A decision of one condition is shown where it was true once and false once.
+A condition of a decision is covered if two evaluations are known that differ in that condition, as
+far as conditions were evaluated, and in the outcome (masking MC/DC, FAA CAST-6, 2001; clang's
+-fcoverage-mcdc). A decision with one condition is covered if it was both true and false.
 """
 
 from __future__ import annotations
@@ -40,13 +40,17 @@ APP, EXPLORER, RAW_PROFILE, MERGED_PROFILE = (
     "counts.profdata",
 )
 FUNCTION = re.compile(rf"(?:{STATIC_PATTERN})?void (\w+)\(")
+"""The first line of a function in generated C."""
 CASE = re.compile(r"case\b|default\b")
+"""The source text of a `case` label, which clang counts as a branch."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A decision of the C: the block and line in which it is, its text, of each condition whether
-    it was `shown`, and the one outcome that it can `never` have, where that is proven.
+    """A decision of the C: its block, line and text, with one entry for each of its conditions.
+
+    `shown` tells whether the condition is covered. `never` is the outcome that the condition is
+    proven never to have; None without a proof.
     """
 
     block: str
@@ -57,7 +61,7 @@ class Decision:
 
     @property
     def open(self) -> int:
-        """How many conditions are neither shown nor proven to be infeasible."""
+        """The number of conditions that are neither covered nor proven infeasible."""
         pairs = zip(self.shown, self.never, strict=True)
         return sum(not shown and outcome is None for shown, outcome in pairs)
 
@@ -67,7 +71,9 @@ T = TypeVar("T", Decision, DecisionSite)
 
 @dataclass(frozen=True)
 class McdcCoverage:
-    """What `sequences` of inputs have shown of the C of a Program, over so many `steps`."""
+    """The MC/DC coverage of a C file after `sequences` input sequences with `steps` steps in
+    total.
+    """
 
     file: str
     sequences: int
@@ -76,31 +82,33 @@ class McdcCoverage:
 
     @property
     def conditions(self) -> int:
-        """How many conditions there are."""
+        """The number of conditions of all decisions."""
         return sum(len(decision.shown) for decision in self.decisions)
 
     @property
     def shown(self) -> int:
-        """How many of them were shown to matter."""
+        """The number of covered conditions."""
         return sum(sum(decision.shown) for decision in self.decisions)
 
     @property
     def open(self) -> int:
-        """How many of them are neither shown nor proven to be infeasible."""
+        """The number of conditions that are neither covered nor proven infeasible."""
         return sum(decision.open for decision in self.decisions)
 
     @property
     def uncovered(self) -> tuple[Decision, ...]:
-        """The decisions of which a condition was not shown."""
+        """The decisions with at least one condition that is not covered."""
         return tuple(decision for decision in self.decisions if not all(decision.shown))
 
 
 def add_infeasibility_proofs(
     coverage: McdcCoverage, program: Program, ranges: Mapping[str, Range]
 ) -> McdcCoverage:
-    """Return what was covered with a proof of what no input can show of a sampled Program.
+    """Return the coverage with proofs for the conditions of a sampled Program that no input can
+    cover.
 
-    `ranges` are those of its variables between two steps, as far as they stay in them.
+    The proven outcomes are stored in `Decision.never`. `ranges` gives the ranges in which variables
+    stay between two steps.
     """
     c_program = unshare_expressions(run_c_passes(program))
     sites = _group_by_block(decision_sites(c_program))
@@ -116,7 +124,9 @@ def add_infeasibility_proofs(
 
 
 def _uncovered_conditions(matched: Iterable[tuple[Decision, list[DecisionSite]]]) -> Iterator[int]:
-    """Yield the numbers of the conditions that were not shown, at all places where they may be."""
+    """Yield the numbers of the uncovered conditions at all sites that may be those of a
+    decision.
+    """
     for decision, places in matched:
         for place in places:
             if len(place.conditions) == len(decision.shown):
@@ -125,6 +135,7 @@ def _uncovered_conditions(matched: Iterable[tuple[Decision, list[DecisionSite]]]
 
 
 def _group_by_block(items: Iterable[T]) -> dict[str, list[T]]:
+    """Return the items by the block in which they are, in their order."""
     groups: dict[str, list[T]] = {}
     for thing in items:
         groups.setdefault(thing.block, []).append(thing)
@@ -134,8 +145,11 @@ def _group_by_block(items: Iterable[T]) -> dict[str, list[T]]:
 def _match_sites(
     decisions: Sequence[Decision], sites: Sequence[DecisionSite]
 ) -> Iterator[tuple[Decision, list[DecisionSite]]]:
-    """Yield the decisions of a block with their places: where both are the same in the same order,
-    each has one, else all that have its text, unless there are fewer of these than of decisions.
+    """Yield each decision of a block with the decision sites of the Program that may correspond to
+    it.
+
+    If both lists have the same texts in the same order, each decision has one site. Otherwise a
+    decision has all sites with its text, or none if there are fewer of them than such decisions.
     """
     if [d.text for d in decisions] == [place.text for place in sites]:
         yield from ((d, [place]) for d, place in zip(decisions, sites, strict=True))
@@ -149,7 +163,11 @@ def _match_sites(
 def _proven_outcomes(
     sites: Sequence[DecisionSite], proven: Mapping[int, bool], decision: Decision
 ) -> tuple[bool | None, ...]:
-    """Return what is proven of each condition at all places where it may stand."""
+    """Return for each condition the outcome that it never has; None without a proof or if it is
+    covered.
+
+    An outcome counts only if it is proven at all sites of the decision.
+    """
     found: list[bool | None] = []
     for position, shown in enumerate(decision.shown):
         of = [place.conditions for place in sites if len(place.conditions) == len(decision.shown)]
@@ -164,18 +182,16 @@ def measure_mcdc(
     corpus: Sequence[bytes] = (),
     ranges: Mapping[str, Range] | None = None,
 ) -> McdcCoverage:
-    """Run the C of a Program on sequences of input records, and on ways through it, and tell what
-    they show of it.
+    """Run the instrumented C of a Program and return its MC/DC coverage.
 
-    Records are those of a `Tape`, ways those of `explored` with the same `ranges` of inputs.
-    Raises ToolMissing, BuildError.
+    `sequences` holds input records of a `TickLog`. `corpus` holds entries of `generate_corpus` for
+    the same `ranges` of inputs. Raises MissingToolError, BuildError.
     """
     file = f"{program.name}.c"
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        environment = {
-            "LLVM_PROFILE_FILE": str(folder / RAW_PROFILE)
-        }  # a run adds to what is there
+        # Each run adds its counters to the profile.
+        environment = {"LLVM_PROFILE_FILE": str(folder / RAW_PROFILE)}
         app = _build(write_harness(program, folder), folder, HOST.link(folder))
         for sequence in sequences:
             run_executable(app, b"".join(sequence), environment)
@@ -193,6 +209,7 @@ def measure_mcdc(
 
 
 def _build(sources: Sequence[Path], folder: Path, link: Sequence[str], app: str = APP) -> Path:
+    """Compile C files with coverage counters; return the executable."""
     flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERAGE_FLAGS]
     output_of([COMPILER, *flags, *map(str, sources), "-o", app, *link], folder)
     return folder / app
@@ -205,7 +222,7 @@ def _run_corpus(
     folder: Path,
     environment: Mapping[str, str],
 ) -> int:
-    """Go some ways through the C of a Program; return how many steps these are."""
+    """Execute corpus entries with the coverage counters; return the number of steps."""
     sources = write_explorer(program, ranges, folder)
     app = _build(sources, folder, ("-DALONE", "-lm"), EXPLORER)
     names = []
@@ -219,7 +236,11 @@ def _run_corpus(
 def _parse_decisions(
     name: str, coverage: dict[str, Any], text: Sequence[str]
 ) -> Iterator[Decision]:
-    """Yield decisions in the order of the file: several conditions, then one alone."""
+    """Yield the decisions of clang's coverage report in the order of the file.
+
+    The records of MC/DC are decisions with several conditions; branches outside of these are
+    decisions with one. Labels of a `switch` are left out.
+    """
     found = []
     spans = []
     for record in coverage["mcdc_records"]:
@@ -237,13 +258,13 @@ def _parse_decisions(
 
 
 def _enclosing_block(name: str, lines: Sequence[str]) -> str:
-    """Return the block whose function begins last in some lines."""
+    """Return the name of the block whose function begins last in the given lines."""
     begun = next(found[1] for line in reversed(lines) if (found := FUNCTION.match(line)))
     return begun.removeprefix(f"{name}_").lower() if begun.startswith(f"{name}_") else begun
 
 
 def _source_text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:
-    """Return the text from one place to another, lines and columns counted from 1."""
+    """Return the source text between two positions on one line; lines and columns count from 1."""
     inside = list(lines[begin[0] - 1 : end[0]])
     inside[-1] = inside[-1][: end[1] - 1]
     inside[0] = inside[0][begin[1] - 1 :]

@@ -1,1 +1,1 @@
-"""Printing of a Program as C: names, expressions, statements, structures, modules."""
+"""Printing of a Program as C99: names, expressions, statements, structures, modules."""

@@ -1,4 +1,4 @@
-"""Comment: any text inside `/* ... */`: ASCII, one line, nothing that ends or continues it."""
+"""C comments: any text as one line of ASCII that cannot end or continue a comment (rule C21)."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ import re
 from language.text.sanitise import escape_invisible, truncate
 
 MAX_COMMENT_LENGTH = 120
-"""Longest text of a comment [characters]; `about` of a spec may be a paragraph."""
+"""Maximum length of the text of a comment [characters]; `about` of a spec may be a paragraph."""
 
 
 def sanitise_comment(text: str) -> str:
-    """Return a text that is safe in a C comment, whatever it holds (rule C21).
+    """Return a text as one line of printable ASCII that is safe between `/*` and `*/` (rule C21).
 
-    Without `*/` and `/*`, without trigraphs (`??/` is a backslash: C99 5.2.1.1), without a
-    backslash at its end, without line ends; other alphabets are written as escapes.
+    White space is collapsed, other alphabets become escapes, and the text is cut at
+    MAX_COMMENT_LENGTH. Blanks separate `*/`, `/*`, `//` and `??` (`??/` is the trigraph of a
+    backslash, C99 5.2.1.1). Backslashes at the end are removed.
     """
     line = " ".join(escape_invisible(" ".join(text.split())).split())
     ascii_line = line.encode("ascii", "backslashreplace").decode("ascii")

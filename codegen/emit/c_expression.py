@@ -1,4 +1,4 @@
-"""Expression: an expression of a Program as C99, in the same order of operations (rule C2)."""
+"""C expressions: prints an expression of a Program in the same order of operations (rule C2)."""
 
 from __future__ import annotations
 
@@ -11,36 +11,42 @@ from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unar
 
 
 class CNameMap(Protocol):
-    """Where the variables of a Program live in C, and the type of its reals."""
+    """A mapping from names of a Program to C text, with the number type of its reals."""
 
     @property
     def number(self) -> NumberType:
-        """The type of the reals."""
+        """The number type of the reals."""
 
     def __call__(self, name: str) -> str:
-        """Return the C text for a variable or constant."""
+        """Return the C text of a variable or constant."""
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a number as it is written beside a whole-number variable: a mode by its name."""
+        """Return the C text of a number that stands beside a whole-number variable: a mode by
+        its name.
+        """
 
     def is_unsigned(self, name: str) -> bool:
-        """Tell whether a variable is a whole number without a sign."""
+        """Tell whether a variable is an unsigned integer in C."""
 
 
 LIBM_FUNCTIONS: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
-"""Operations that C gives exactly; all others are in ha_math."""
+"""Functions of the C library that are exact; all others come from ha_math."""
 MATH_SUFFIX: Mapping[NumberType, str] = {"float64": "", "float32": "f"}
-"""What C adds to the name of a function for its form in a type: sqrt, sqrtf."""
+"""The suffix of a C function for a number type: sqrt, sqrtf."""
 LOGICAL_OPERATORS: Mapping[str, str] = {"and": "&&", "or": "||"}
+"""Logical operators of a Program in C."""
 LEFT_ASSOCIATIVE: Mapping[str, str] = {
     **{"+": "+-", "-": "+-", "*": "*/", "/": "*/"},
     **{"and": "and", "or": "or"},
 }
-"""Operators of the left operand that C evaluates first without parentheses: (a + b) - c."""
+"""Operators of a left operand that need no parentheses, by the outer operator: (a + b) - c."""
 
 
 def emit_expression(expr: Expr, c_names: CNameMap) -> str:
-    """Return the C text: parentheses around every operand but those that C takes first anyway."""
+    """Return the C text of an expression.
+
+    Every compound operand is in parentheses, except a left operand that C evaluates first anyway.
+    """
     match expr:
         case Value(value):
             return format_literal(value, c_names.number)
@@ -58,7 +64,8 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
             )
         case Compare(operator, left, right):
             if isinstance(left, Ref) and isinstance(right, Value) and type(right.value) is int:
-                return f"{c_names(left.name)} {operator} {c_names.integer_constant(left.name, right.value)}"
+                constant = c_names.integer_constant(left.name, right.value)
+                return f"{c_names(left.name)} {operator} {constant}"
             if isinstance(left, Ref) and isinstance(right, Ref):
                 first, second = _match_signedness(left.name, right.name, c_names)
                 return f"{first} {operator} {second}"
@@ -72,7 +79,13 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
 
 
 def format_literal(value: float | int | bool, number: NumberType) -> str:
-    """Return a literal: the shortest decimal that reads back as the same bits (rule C4)."""
+    """Return a C literal: `true`, `false`, an integer, or the shortest decimal with the same bits
+    (rule
+
+    C4).
+
+    A float32 literal ends with F.
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -81,8 +94,9 @@ def format_literal(value: float | int | bool, number: NumberType) -> str:
 
 
 def _match_signedness(left: str, right: str, c_names: CNameMap) -> list[str]:
-    """Return two variables for a comparison: one without a sign as a number with one, beside such
-    a one.
+    """Return the C text of two compared variables.
+
+    If exactly one of them is unsigned, it is cast to int32_t.
     """
     names = (left, right)
     unsigned = [c_names.is_unsigned(name) for name in names]
@@ -94,12 +108,16 @@ def _match_signedness(left: str, right: str, c_names: CNameMap) -> list[str]:
 
 
 def _emit_operand(expr: Expr, c_names: CNameMap) -> str:
+    """Return the C text of an operand, in parentheses unless it is a name, a call or a literal
+    >= 0.
+    """
     text = emit_expression(expr, c_names)
     simple = isinstance(expr, Ref | Item | Call) or (isinstance(expr, Value) and text[0] != "-")
     return text if simple else f"({text})"
 
 
 def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names: CNameMap) -> str:
+    """Return the C text of a binary operation; `operator` is its operator in C."""
     chained = isinstance(left, Binary) and left.operator in LEFT_ASSOCIATIVE.get(
         binary.operator, ""
     )
@@ -108,6 +126,7 @@ def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names
 
 
 def _emit_call(function: str, arguments: list[str], number: NumberType) -> str:
+    """Return the C text of a function call; `real` becomes a cast."""
     if function == "real":
         return f"({C_REAL_TYPE[number]})({arguments[0]})"
     name = LIBM_FUNCTIONS.get(function, f"ha_{function}") + MATH_SUFFIX[number]

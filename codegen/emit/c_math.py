@@ -1,4 +1,4 @@
-"""Mathematics: ha_math as C99 - functions whose bits do not depend on a library (rule C6)."""
+"""ha_math: elementary functions as C99 whose bits do not depend on a C library (rule C6)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ from language.numerics.function_table import FUNCTIONS_BY_TYPE
 
 @dataclass(frozen=True)
 class FloatFormat:
-    """How IEEE 754 keeps a real: `bits` in all, `digits` after the point, exponents of 2."""
+    """A binary format of IEEE 754: total bits, bits of the fraction, lowest and highest normal
+    exponent.
+    """
 
     bits: int
     digits: int
@@ -39,7 +41,7 @@ FLOAT_FORMATS: Mapping[NumberType, FloatFormat] = {
 
 
 def emit_math_files(number: NumberType) -> dict[str, str]:
-    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule C6)."""
+    """Return the header and source of ha_math by file name; of ha_mathf for float32 (rule C6)."""
     suffix = MATH_SUFFIX[number]
     context = {
         "functions": [
@@ -62,7 +64,7 @@ def emit_math_files(number: NumberType) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class _LocalNameMap:
-    """Inside a function of ha_math every variable is a local."""
+    """The names inside a function of ha_math, where every variable is a local."""
 
     number: NumberType
 
@@ -77,6 +79,7 @@ class _LocalNameMap:
 
 
 def _function_context(function: Function, number: NumberType) -> dict[str, Any]:
+    """Return the template context of one function: its name, parameters, comment and lines."""
     c_names = _LocalNameMap(number)
     lines: list[str] = []
     for op in function.body:

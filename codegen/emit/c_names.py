@@ -1,4 +1,4 @@
-"""Names: where each variable and constant of a Program lives in C, and as what type."""
+"""C names: the C text and the C type of each variable and constant of a Program."""
 
 from __future__ import annotations
 
@@ -21,19 +21,26 @@ from language.ir.program import (
 from language.ir.regions import CHART
 
 C_REAL_TYPE: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
+"""The C type of a real by the number type."""
 MODE_PREFIXES = ("memory.mode", "memory.run_mode")
+"""Prefixes of variables that hold the number of a mode."""
 TRANSITION_PREFIXES = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
-"""Variables that hold the number of a transition."""
+"""Prefixes of variables that hold the number of a transition."""
 UNSIGNED_PREFIXES = ("timer.", "memory.faults", *TRANSITION_PREFIXES)
+"""Prefixes of variables beside which a number is written with the suffix U."""
 SOLVED_PREFIX_CONSTANT, SOLVED_PREFIX_ON_PAGE = "solved_", "cal->solved."
-"""What stands before solved numbers: constants of their own, or a part of the calibration page."""
+"""The prefixes of solved numbers in C: as constants of the file, and as members of the calibration
+
+page.
+"""
 
 
 @dataclass(frozen=True)
 class CNames:
-    """The C text of names inside one function: locals by their own name, the rest by group.
+    """The C text of names inside one function: locals by their own name, all others by their
+    structure.
 
-    `solved` is what stands before solved numbers.
+    `local` holds the names of the local variables. `solved_prefix` stands before solved numbers.
     """
 
     program: Program
@@ -42,11 +49,13 @@ class CNames:
 
     @property
     def number(self) -> NumberType:
-        """The type of the reals (rule C1)."""
+        """The number type of the reals (rule C1)."""
         return self.program.number_type
 
     def __call__(self, name: str) -> str:
-        """Return the C text for a variable or constant."""
+        """Return the C text of a variable or constant, for example `self->state.w_em` for
+        `state.w_em`.
+        """
         group, _, rest = name.partition(".")
         member = c_member(name)
         if name in self.local:
@@ -72,7 +81,11 @@ class CNames:
                 return f"self->{group}.{rest}"
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a number as it is written beside a variable: a mode by its name."""
+        """Return the C text of a number that stands beside a whole-number variable.
+
+        Modes, transitions and enumeration values have named constants. Any other number is decimal,
+        with the suffix U beside an unsigned counter.
+        """
         if name == "memory.mode":
             return mode_constant(self.program, number)
         if name == "memory.run_mode":
@@ -88,7 +101,7 @@ class CNames:
         return f"{number}U" if name.startswith(UNSIGNED_PREFIXES) else str(number)
 
     def is_unsigned(self, name: str) -> bool:
-        """Tell whether a variable is a whole number without a sign."""
+        """Tell whether a variable or constant is an unsigned integer in C."""
         return name in self._unsigned_variables
 
     @cached_property
@@ -102,15 +115,20 @@ class CNames:
         return transition_constants(self.program)
 
     def _enumeration_values(self, name: str) -> tuple[str, ...]:
+        """Return the enumeration values of a variable or constant; an empty tuple for all
+        others.
+        """
         return next(
             (values for known, values in _enumeration_lists(self.program) if known == name), ()
         )
 
 
 def c_member(name: str) -> str:
-    """Return the name of a struct member or local: the name without its group.
+    """Return the name of a structure member or local: the name without its group, dots as
+    underscores.
 
-    Row and column of a solved matrix are apart by two underscores: `drive_L_w_em__y_w`.
+    In the name of a solved matrix entry two underscores separate row and column:
+    `drive_L_w_em__y_w`.
     """
     matrix, *entry = unqualified_name(name).split(".")
     apart = "__" if name.startswith("solved.") else "_"
@@ -118,7 +136,9 @@ def c_member(name: str) -> str:
 
 
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
-    """Return the C type of a variable or constant; reals are of a number type (rule C10)."""
+    """Return the C type of a variable or constant; reals have the type of the number type (rule
+    C10).
+    """
     if variable.type == "real":
         return C_REAL_TYPE[number]
     if variable.type == "truth":
@@ -135,14 +155,16 @@ def c_type(variable: Variable | Constant, number: NumberType) -> str:
 
 
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:
-    """Return the name of a mode in C (rule C9)."""
+    """Return the name of the C constant of a mode (rule C9)."""
     where = "MODE" if region == CHART else region
     return f"{program.name}_{where}_{program.mode_name(number, region)}".replace(".", "_")
 
 
 def transition_constants(program: Program) -> dict[int, str]:
-    """Return the names of transitions in C by their numbers: source and name, with the number where
-    several are called like that.
+    """Return the names of the C constants of all transitions by number.
+
+    A name consists of the source and the name of the transition. If several transitions have the
+    same name, the number is appended.
     """
     names = {info.number: _transition_constant(program, info) for info in program.transitions}
     count = Counter(names.values())
@@ -150,6 +172,7 @@ def transition_constants(program: Program) -> dict[int, str]:
 
 
 def _transition_constant(program: Program, info: TransitionInfo) -> str:
+    """Return the name of the C constant of a transition; it may not be unique."""
     source = program.mode_name(info.source, info.region)
     if info.chart_endpoints:
         source = info.chart_endpoints[0]
@@ -159,13 +182,13 @@ def _transition_constant(program: Program, info: TransitionInfo) -> str:
 
 
 def run_mode_constant(program: Program, number: int) -> str:
-    """Return the name of a mode of the run in C."""
+    """Return the name of the C constant of a mode of the model that a run integrates."""
     name = next(mode.name for mode in program.run_modes if mode.number == number)
     return f"{program.name}_RUN_{name}"
 
 
 def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the lists of names that variables have, each with the first that has it."""
+    """Return each list of enumeration values once, with the member name of the first owner."""
     owner_by_values: dict[tuple[str, ...], str] = {}
     for name, values in _enumeration_lists(program):
         if values:
@@ -174,11 +197,14 @@ def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def value_constant(program: Program, values: tuple[str, ...], number: int) -> str:
-    """Return the name of a value of an enumeration in C."""
+    """Return the name of the C constant of an enumeration value."""
     owner = next(name for name, known in enumerations(program) if known == values)
     return f"{program.name}_{owner}_{values[number]}"
 
 
 def _enumeration_lists(program: Program) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the names of all constants and variables with their enumeration values, which may
+    be empty.
+    """
     constants = [(constant.name, constant.values) for constant in program.constants]
     return constants + [(variable.name, variable.values) for variable in program.variables]

@@ -1,4 +1,4 @@
-"""Statement: the operations of a block as lines of C99 (rules C19 and C20)."""
+"""C statements: prints the operations of a block as lines of C99 (rules C19 and C20)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.emit.c_comment import sanitise_comment as safe
+from codegen.emit.c_comment import sanitise_comment
 from codegen.emit.c_expression import CNameMap, emit_expression
 from codegen.passes.block_usage import Usage
 from language.ir.ops import (
@@ -32,17 +32,24 @@ from language.ir.traversal import expr_names, negate_condition
 INDENT = "    "
 
 EMPTY_BODY = f"{INDENT}/* nothing to do */"
+"""The body of a block without operations."""
 
 EMPTY_ELSE = ("} else {", EMPTY_BODY)
-"""The end of a chain of conditions none of which has to be true (MISRA C:2012, rule 15.7)."""
+"""The `else` that ends a chain of `else if` (MISRA C:2012, rule 15.7)."""
 
 MAX_LINE_WIDTH = 100
-"""Longest line of generated C; longer expressions are broken at a sum or a blank."""
+"""Maximum length of a line of generated C; longer expressions are broken at an operator or a
+blank.
+"""
 
 
 @dataclass(frozen=True)
 class StatementEmitter:
-    """What is needed to print one block."""
+    """Prints the operations of one block.
+
+    `local` holds the variables that are declared where they are assigned, `types` the C types of
+    all variables, `width` the maximum length of a line.
+    """
 
     program: Program
     usages: Mapping[str, Usage]
@@ -52,7 +59,7 @@ class StatementEmitter:
     width: int = MAX_LINE_WIDTH
 
     def emit_block(self, block: Block) -> Iterator[str]:
-        """Yield the lines of a block, no longer than there is `room`."""
+        """Yield the indented lines of a block; a comment if it has no operations."""
         inner = dataclasses.replace(self, width=self.width - len(INDENT))
         if not block:
             yield EMPTY_BODY
@@ -61,6 +68,7 @@ class StatementEmitter:
                 yield (INDENT + line) if line else ""
 
     def _emit_op(self, op: Op) -> Iterator[str]:
+        """Yield the lines of one operation."""
         match op:
             case Assign(target, value, key):
                 yield from self._emit_assign(
@@ -89,6 +97,10 @@ class StatementEmitter:
                 yield f"{name}({', '.join(self.usages[name].parameters)});"
 
     def _emit_assign(self, target: str, text: str, value: object, key: str) -> Iterator[str]:
+        """Yield the lines of an assignment; `text` is the C text of its value.
+
+        A nested choice becomes a chain of `if`.
+        """
         if isinstance(value, Value) and type(value.value) is int:
             text = self.c_names.integer_constant(target, value.value)
         kind = self.types[target] if target in self.local else ""
@@ -102,6 +114,7 @@ class StatementEmitter:
             )
 
     def _emit_branch(self, condition: Expr, then: Block, other: Block) -> Iterator[str]:
+        """Yield the lines of an `if`; a branch alone in the other arm becomes `else if`."""
         yield from emit_condition("if", emit_expression(condition, self.c_names), "", self.width)
         yield from self.emit_block(then)
         chained = len(other) == 1 and isinstance(other[0], Branch)
@@ -120,6 +133,7 @@ class StatementEmitter:
         yield "}"
 
     def _emit_choose(self, selector: str, cases: tuple[tuple[int, Block], ...]) -> Iterator[str]:
+        """Yield the lines of a `switch` with an empty default."""
         yield f"switch ({self.c_names(selector)}) {{"
         for number, block in cases:
             yield f"case {self.c_names.integer_constant(selector, number)}:"
@@ -131,6 +145,11 @@ class StatementEmitter:
         yield "}"
 
     def _emit_loop(self, count: int, index: str, body: Block) -> Iterator[str]:
+        """Yield the lines of a `for` loop.
+
+        If the body has one condition that does not depend on the index, the loop ends early where
+        that is false.
+        """
         name = unqualified_name(index)
         yield f"for (int32_t {name} = 0; {name} < {count}; {name}++) {{"
         condition, inner = split_loop_guard(index, body)
@@ -145,7 +164,9 @@ class StatementEmitter:
         yield "}"
 
     def _wait_comment(self, timer: str) -> str:
-        """Return when the transition of a timer is due; nothing for other counters."""
+        """Return the comment that tells when the transition of a timer is due; empty for other
+        counters.
+        """
         return next(
             (_format_due(info) for info in self.program.transitions if info.timer == timer), ""
         )
@@ -153,6 +174,9 @@ class StatementEmitter:
     def _emit_count(
         self, timer: str, condition: Expr, limit: int, key: str, wait_comment: str
     ) -> Iterator[str]:
+        """Yield the lines of a counter: 0 where the condition is false, else counted up to
+        `limit` (rule 4b).
+        """
         yield from emit_condition(
             "if", emit_expression(negate_condition(condition), self.c_names), key, self.width
         )
@@ -165,16 +189,19 @@ class StatementEmitter:
 
 
 def _format_due(info: TransitionInfo) -> str:
-    """Return when a transition is due, with the key of its wait."""
+    """Return the text that tells when a transition is due, with the key of its wait."""
     if info.tunable_wait:
         return f"due after more in a row than {info.key}.wait"
     return f"due at {info.ticks + 1} in a row: {info.key}.wait, {float(1000 * info.wait):g} ms"
 
 
 def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
-    """Return the condition under which a body does anything, where it has one, and what it does.
+    """Return the condition of a loop body that consists of one branch, and the operations inside
+    it.
 
-    Once that is false it stays so, for nothing else is done: the loop may end.
+    The condition must not depend on `index`. A body of any other form is returned as it is, with
+    None. If the condition is false once, it stays false, because nothing else is executed: the loop
+    may end.
     """
     if len(body) == 1 and isinstance(body[0], Branch) and not body[0].other:
         inner = body[0]
@@ -184,14 +211,20 @@ def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
 
 
 def is_nested(choice: Select) -> bool:
-    """Tell whether a choice leads to another one: it is read better as a chain of `if`."""
+    """Tell whether an arm of a choice is itself a choice; a chain of `if` is then easier to
+    read.
+    """
     return isinstance(choice.then, Select) or isinstance(choice.other, Select)
 
 
 def emit_select(
     declared_type: str, target: str, value: Expr, c_names: CNameMap, width: int = MAX_LINE_WIDTH
 ) -> Iterator[str]:
-    """Yield what sets a target, of a `declared_type` if it is declared here, to the one chosen of many."""
+    """Yield a chain of `if` that assigns the chosen value to `target`.
+
+    If `declared_type` is not empty, the target is declared first. A value that is no choice becomes
+    one assignment.
+    """
     if declared_type:
         yield f"{declared_type} {target};"
     if not isinstance(value, Select):
@@ -212,24 +245,30 @@ def emit_select(
 
 
 def _emit_key_comment(key: str) -> Iterator[str]:
+    """Yield a comment line with a key path, or nothing if it is empty."""
     if key:
-        yield f"/* {safe(key)} */"
+        yield f"/* {sanitise_comment(key)} */"
 
 
 def _key_comment(key: str) -> str:
-    return f" /* {safe(key)} */" if key else ""
+    """Return a comment with a key path that follows a statement, or an empty text."""
+    return f" /* {sanitise_comment(key)} */" if key else ""
 
 
 def emit_wrapped_statement(
     left: str, text: str, key: str, width: int = MAX_LINE_WIDTH
 ) -> Iterator[str]:
-    """Yield `left text;` with the key path cited, broken before operators where it is too long."""
+    """Yield the lines of `left text;` with a comment `key`.
+
+    A comment that does not fit into the line stands above it. A statement longer than `width` is
+    broken before an operator.
+    """
     comment = _key_comment(key)
     if len(left) + len(text) + len(comment) < width:
         yield f"{left}{text};{comment}"
         return
     if key:
-        yield f"/* {safe(key)} */"
+        yield f"/* {sanitise_comment(key)} */"
     if len(left) + len(text) < width:
         yield f"{left}{text};"
         return
@@ -253,13 +292,17 @@ def emit_wrapped_statement(
 
 
 def emit_condition(opening: str, test: str, key: str, width: int) -> Iterator[str]:
-    """Yield `opening (test) {` with the key path cited, broken before `&&` where it is too long."""
+    """Yield the lines of `opening (test) {` with a comment `key`, broken before `&&` or `||` if it
+    is
+
+    longer than `width`.
+    """
     line, comment = f"{opening} ({test}) {{", _key_comment(key)
     if len(line) + len(comment) <= width:
         yield line + comment
         return
     if key:
-        yield f"/* {safe(key)} */"
+        yield f"/* {sanitise_comment(key)} */"
     glued = re.sub("\1(&&|\\|\\|)\1", " \\1\1", line.replace(" ", "\1"))
     pieces = textwrap.wrap(
         glued,

@@ -1,11 +1,13 @@
-"""Member: the members of the structures of a module, with what is told of each (rule C11)."""
+"""C structures: the members of the structures of a module, with their comments (rules C11 and
+C14).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Any
 
-from codegen.emit.c_comment import sanitise_comment as safe
+from codegen.emit.c_comment import sanitise_comment
 from codegen.emit.c_expression import format_literal
 from codegen.emit.c_names import CNames, c_member, c_type
 from codegen.passes.block_usage import PAGE_GROUPS
@@ -25,7 +27,7 @@ SOLVED_MATRICES = {
     "C": "measurements by states",
     "L": "the gain of the correction",
 }
-"""Matrices of solved numbers, by their letter."""
+"""Meaning of the matrices of solved numbers, by their letter."""
 STRUCT_GROUPS = {
     "state": "",
     "discrete": "discrete variables",
@@ -36,31 +38,41 @@ STRUCT_GROUPS = {
     "timer": "ticks that a guard was true",
     "check": "invariants that hold",
 }
-"""Nested structs of the instance, in order, with what is in them."""
+"""Nested structures of the instance in their order, with comments."""
 
 
 @dataclass(frozen=True)
 class PageLayout:
-    """A calibration page: the `qualifiers` of what points to it, and the constants it `holds`."""
+    """The layout of a calibration page.
+
+    `qualifiers` are the C qualifiers of a pointer to it. `groups` are the groups of constants on
+    it.
+    """
 
     qualifiers: str
     groups: frozenset[str]
 
     @property
     def holds_solved(self) -> bool:
-        """Tell whether solved numbers are calibrated with what they were solved for."""
+        """Tell whether solved numbers are on the page."""
         return "solved" in self.groups
 
 
 HOST_PAGE = PageLayout("const", PAGE_GROUPS)
-"""Nobody writes to it while it is read, and solved numbers are constants: on this machine."""
+"""The page on this machine: nobody writes to it during a step, and solved numbers are constants."""
 ECU_PAGE = PageLayout("const volatile", PAGE_GROUPS | {"solved"})
-"""On an ECU: a tool may write to it, the solved numbers included (rule C14)."""
+"""The page on an ECU: a tool may write to it at any time; it holds solved numbers too (rule
+C14).
+"""
 
 
 @dataclass(frozen=True)
 class StructMember:
-    """A member of a struct with its comment."""
+    """A member of a structure: C type, name and comment.
+
+    `value` is the C text of its default, `size` the length of an array (0 for a scalar), `title` a
+    comment above it.
+    """
 
     type: str
     name: str
@@ -71,14 +83,14 @@ class StructMember:
 
 
 def calibration_members(program: Program) -> list[StructMember]:
-    """Return the members of the calibration page, tables among them, with their defaults."""
+    """Return the tunable parameters as members of the calibration page, with their defaults."""
     return [
         _constant_member(c, program.number_type) for c in program.constants if c.kind == "tunable"
     ]
 
 
 def struct_members(program: Program, layout: PageLayout) -> dict[str, Any]:
-    """The members of the structures."""
+    """Return the template context with the members of all structures of a module."""
     number, constants, variables = program.number_type, program.constants, program.variables
     solved = _solved_members([c for c in constants if c.kind == "solved"], number)
     return {
@@ -100,24 +112,28 @@ def struct_members(program: Program, layout: PageLayout) -> dict[str, Any]:
 
 
 def member_of(variable: Variable, number: NumberType) -> StructMember:
-    """Return a variable as a member."""
+    """Return a variable as a member; the comment holds the unit of a real, and `about`."""
     comment = display_unit(variable.unit) if variable.type == "real" else variable.about
     if variable.type == "real" and variable.about:
         comment = f"{display_unit(variable.unit)}; {variable.about}"
     member = c_member(variable.name)
-    return StructMember(c_type(variable, number), member, safe(comment), size=variable.size)
+    return StructMember(
+        c_type(variable, number), member, sanitise_comment(comment), size=variable.size
+    )
 
 
 def _solved_members(constants: list[Constant], number: NumberType) -> list[StructMember]:
-    """Return solved numbers, `solved.<mode>_<letter>.<row>.<column>` where they are of a matrix,
-    the first of each with its title.
+    """Return solved numbers as members.
+
+    Entries of a matrix have names `solved.<mode>_<letter>.<row>.<column>`. The first entry of each
+    matrix has a title.
     """
     titled = {""}
     members = []
     for constant in constants:
         group, *entry = constant.name.split(".")[1:]
         about = SOLVED_MATRICES.get(group.rpartition("_")[2], "") if entry else ""
-        title = safe(f"{group}_row__column: {about}") if about else ""
+        title = sanitise_comment(f"{group}_row__column: {about}") if about else ""
         members.append(
             replace(_constant_member(constant, number), title="" if title in titled else title)
         )
@@ -126,6 +142,7 @@ def _solved_members(constants: list[Constant], number: NumberType) -> list[Struc
 
 
 def _constant_member(constant: Constant, number: NumberType) -> StructMember:
+    """Return a constant as a member; the comment holds unit, key path, range and `about`."""
     comment = "; ".join(text for text in (display_unit(constant.unit), constant.key) if text)
     if constant.range:
         low, high = (
@@ -138,10 +155,15 @@ def _constant_member(constant: Constant, number: NumberType) -> StructMember:
         value = f"{{{', '.join(format_literal(item, number) for item in constant.items)}}}"
     kind = c_type(constant, number)
     comment = "; ".join(text for text in (comment, constant.about) if text)
-    return StructMember(kind, c_member(constant.name), safe(comment), value, len(constant.items))
+    return StructMember(
+        kind, c_member(constant.name), sanitise_comment(comment), value, len(constant.items)
+    )
 
 
 def _group_members(program: Program) -> list[tuple[str, str, list[StructMember]]]:
+    """Return name, comment and members of each nested structure of the instance that is not
+    empty.
+    """
     found = []
     for group, about in STRUCT_GROUPS.items():
         inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
@@ -152,6 +174,7 @@ def _group_members(program: Program) -> list[tuple[str, str, list[StructMember]]
 
 
 def _output_members(program: Program) -> list[dict[str, str]]:
+    """Return the template contexts of the outputs: type, name, comment and source in C."""
     types = {v.name: c_type(v, program.number_type) for v in program.variables}
     known = {v.name: v for v in program.variables}
     c_names = CNames(program)
@@ -167,7 +190,7 @@ def _output_members(program: Program) -> list[dict[str, str]]:
 
 
 def _output_comment(program: Program, source: Variable, unit: str) -> str:
-    """Return what an output is in: its unit, or what its numbers stand for."""
+    """Return the comment of an output: the unit of a real, or the meaning of a number."""
     if source.name == MODE_VARIABLE:
         return f"{program.name}_MODE_*"
     return display_unit(unit) if source.type == "real" else source.about

@@ -1,4 +1,6 @@
-"""Purpose: what a function of C is for, as the comment above it says."""
+"""Function comments: the purpose of each generated C function, from the name of its block (rule
+C21).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from collections.abc import Iterable
 PURPOSES = {
     "back": "Goes back to the tick in which `until` turned true[, for transition {}]",
     "bound": "Keeps the covariance within its limits[, those of mode {}], else sets a fault bit",
-    "choose": "The transition that mode[ {}] wishes for",
+    "choose": "The transition that mode[ {}] requests",
     "commit": "Leaves, resets and enters what the chosen transitions say",
     "columns": "P = T Phi' + Qd, the covariance over one period, through T = Phi P[: {}]",
     "compare_stamps": "Sets a fault where solved numbers belong to another calibration",
@@ -21,13 +23,13 @@ PURPOSES = {
     "equations": "Equations[ of mode {}]",
     "guards": "Guards[ of mode {}]",
     "half": "States halfway through the whole step[, in mode {}]: Eh x + Fh pull",
-    "hear": "Decides between the wishes of regions[: {}]",
+    "hear": "Resolves conflicts between the requests of regions[: {}]",
     "hold": "Holds the states that the model has moved within their ranges",
     "jump": "Transitions[ of mode {}]: the first one that is due is taken",
     "keep": "Keeps the values that are read later: delays, and ticks that are looked back to",
     "latch": "Takes the inputs of now, each within its range",
     "latch_each": "Inputs one by one: a fault bit for each that is not within its range",
-    "leap": "The whole step[ in mode {}], if nothing happens in it",
+    "leap": "The whole step[ in mode {}], if no guard changes in it",
     "leave": "What is forgotten where[ {}] is left",
     "limit": "The next piece of the step: it ends where a wait does",
     "load": "Waits whose guard is false begin anew",
@@ -55,22 +57,26 @@ PURPOSES = {
     "step": "One step of the method[ in mode {}]: from the states to work->end_*",
     "store": "What updates[ of mode {}] found, stored together",
     "switch": "The transition of the model out of mode {}",
-    "through_events": "The step from event to event: taken where something happens in it",
+    "through_events": "The step from event to event: taken if a guard changes in it",
     "until": "Whether `until` holds[, for transition {}]",
     "update": "Updates[ of mode {}], from the values of this tick",
-    "watch": "What each guard is now",
+    "watch": "The truth of each guard now",
     "whole": "States at the end of the whole step[, in mode {}]: E x + F pull",
 }
-"""By the words that the name of a block begins with; `{}` is what follows them, and what stands in
-brackets is said where something does.
+"""Comments by the first words of the name of a block. `{}` stands for the rest of the name. A part
+in
+
+brackets is left out if there is no rest.
 """
 OPTIONAL = re.compile(r"\[(.*?)\]")
+"""A part of a comment in brackets."""
 
 
 def describe_function(block: str, modes: Iterable[str] = (), run_modes: Iterable[str] = ()) -> str:
-    """Return what a block is for; nothing where its name begins with no such words.
+    """Return the comment of the function of a block; an empty text for an unknown name.
 
-    What is for a mode while the model inside is in one of its `run_modes` names both.
+    The entry of PURPOSES with the most words wins. If the rest of the name is a mode and a run
+    mode, separated by `_`, the comment names both.
     """
     both = {f"{m}_{r}": f"{m} with the model in {r}" for m in modes for r in run_modes}
     words = block.split("_")

@@ -1,7 +1,8 @@
-"""Scratch: the block of a module in which the values live that are there within one step only.
+"""Work variables of a step: the block in whose function they live, and their storage (rule C22).
 
-That is `step`, unless all of them are for one block that it runs, once, on some ways only: an
-observer's run of a model. Then the steps that do not take that way have no part in it.
+Usually the function is `step`. If only one block that `step` runs uses them, and runs once, such as
+the run of a model by an observer, they live there. A step that does not run that block then needs
+no storage for them.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ from language.ir.program import Program, Variable
 from language.ir.traversal import names_used, reachable_blocks, walk_ops
 
 STEP = "step"
+"""The block that executes one step."""
 MAX_STACK_BYTES = 128
-"""Bytes; more is kept in the instance, whose place the caller knows."""
+"""Maximum size [bytes] of work variables on the stack; larger ones are a part of the instance."""
 
 
 @dataclass(frozen=True)
 class Scratch:
-    """The block that has it, its size [bytes], and which of its values are set `early`: when it
-    begins.
+    """The storage of work variables: the `block` that owns them and their `size` [bytes].
+
+    `initialised` holds the variables that are set to 0 when the block begins, because they may be
+    read before they are assigned.
     """
 
     block: str
@@ -32,12 +36,14 @@ class Scratch:
 
     @property
     def is_zeroed(self) -> bool:
-        """Tell whether all of it is 0 when the block begins: there are arrays among the early."""
+        """Tell whether the whole structure is set to 0 at the start: an initialised variable is
+        an array.
+        """
         return any(variable.size for variable in self.initialised)
 
     @property
     def is_in_instance(self) -> bool:
-        """Tell whether it is a part of the instance, not of the stack."""
+        """Tell whether the storage is a part of the instance instead of the stack."""
         return self.size > MAX_STACK_BYTES
 
 
@@ -47,9 +53,10 @@ def scratch_of(
     usage_by_block: Mapping[str, Usage],
     allow_inner_block: bool,
 ) -> Scratch | None:
-    """Return where the `shared` values of a step live; None where there are none (rule C22).
+    """Return the storage of the `shared` work variables of a step (rule C22).
 
-    `allow_inner_block` allows for a block that `step` runs.
+    Returns None if there are none, or no block `step`. With `allow_inner_block` the owner may be a
+    block that `step` runs.
     """
     if not shared or STEP not in program.blocks:
         return None
@@ -64,7 +71,11 @@ def scratch_of(
 def _innermost_block(
     program: Program, shared: frozenset[str], usage_by_block: Mapping[str, Usage]
 ) -> str:
-    """Return the innermost block that `step` runs, once, and that has all of the values."""
+    """Return the innermost block from `step` down that contains all uses of the shared variables.
+
+    The search goes down while a block uses none of them itself, has no loop, and runs exactly one
+    block that needs them.
+    """
     name = STEP
     while True:
         block = program.blocks[name]
@@ -81,8 +92,10 @@ def _innermost_block(
 def adjust_usages(
     program: Program, usage_by_block: Mapping[str, Usage], scratch: Scratch
 ) -> dict[str, Usage]:
-    """Return what blocks need from outside, where one has the values of a step itself: of all else
-    the instance, if they are a part of that.
+    """Return the usages of blocks for an owner other than `step`.
+
+    The owner and its callers no longer need a pointer to the work variables; they need the instance
+    if the variables are a part of it.
     """
     instance = frozenset({"self"} if scratch.is_in_instance else ())
     adjusted = dict(usage_by_block)

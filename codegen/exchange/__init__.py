@@ -1,1 +1,1 @@
-"""Formats of exchange: A2L, calibration pages, CAN databases, CMake projects and FMUs."""
+"""Exchange formats: A2L, calibration pages, CAN databases, CMake projects and FMUs."""

@@ -1,4 +1,6 @@
-"""CMake: a file by which CMake builds the C of a Program as a library, with the flags it needs."""
+"""CMake: a project file that builds the C of a Program as a static library with the flags it
+needs.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,15 @@ from language.ir.printer import digest
 from language.ir.program import Program
 
 SET_BY_CMAKE = ("-std=c99", "-O2")
-"""What CMake sets by its own properties, and by the kind of a build."""
+"""Flags that CMake sets from its own properties and from the build type."""
 FILE = "CMakeLists.txt"
+"""The name of the file."""
 
 
 def emit_cmake_file(program: Program) -> dict[str, str]:
-    """Return the file by its name: a static library, and its header to install.
+    """Return the CMake file by its name; it builds a static library and installs its header.
 
-    Raises ValueError where a Program has no C.
+    Raises ValueError for a Program that has no C.
     """
     files = sorted(emit_c_files(program))
     context = {

@@ -1,4 +1,4 @@
-"""CAN database: inputs and outputs of an automaton as messages of a bus, in a DBC."""
+"""CAN database: the inputs and outputs of an automaton as CAN messages, in a DBC file."""
 
 from __future__ import annotations
 
@@ -18,15 +18,19 @@ BIT_LENGTH = {
     "bool": 1, "uint8_t": 8, "int16_t": 16, "uint16_t": 16, "int32_t": 32, "uint32_t": 32,
     "float": 32, "double": 64,
 }  # fmt: skip
+"""The length of a signal [bits] by its C type."""
 REAL_TYPES, UNSIGNED_TYPES = ("float", "double"), ("bool", "uint8_t", "uint16_t", "uint32_t")
+"""C types of floating-point and of unsigned signals."""
 CAN_BYTES, CAN_FD_BYTES = 8, 64
-"""Bytes of a frame, of CAN and of CAN FD."""
+"""Capacity of a CAN and of a CAN FD frame [bytes]."""
 FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)
+"""Frame lengths of CAN FD [bytes]."""
 FIRST_IDENTIFIER = 0x100
+"""The identifier of the first message by default."""
 MAX_STANDARD_ID, MAX_EXTENDED_ID = 0x7FF, 0x1FFFFFFF
-"""Highest identifiers of 11 and of 29 bits."""
+"""Largest identifiers of 11 and of 29 bits."""
 MS_PER_SECOND = 1000
-"""In a second: what a DBC counts cycles in."""
+"""Milliseconds in a second: a DBC gives cycle times in ms."""
 Range = tuple[float, float]
 EMPTY_DBC = """\
 VERSION "{digest}"
@@ -37,14 +41,17 @@ BA_DEF_ "BusType" STRING ;
 BA_DEF_DEF_ "BusType" "CAN";
 BA_ "BusType" "{bus}";
 """
-"""A DBC without messages: what tools read of the bus decides how frames are written."""
+"""A DBC without messages. The tool reads the type of the bus from it, which decides how frames are
+
+written.
+"""
 UNNAMED_NODE = "Vector__XXX"
-"""What a DBC calls a node that it does not name."""
+"""The name in a DBC of a node that has none."""
 
 
 @dataclass(frozen=True)
 class BusSignal:
-    """A value on the bus: its name, C type and how it is shown; `about` it, and its `range`."""
+    """A signal on the bus: its name, C type (`kind`), conversion, comment and range."""
 
     name: str
     kind: str
@@ -59,11 +66,12 @@ def emit_dbc(
     first: int = FIRST_IDENTIFIER,
     is_fd: bool = False,
 ) -> str:
-    """Return a DBC: messages `X_In` that the automaton receives and `X_Out` that it sends.
+    """Return a DBC file with messages `X_In` that the automaton receives and `X_Out` that it sends.
 
-    Each value has the bits that it has in C, least significant byte first; frames follow each other
-    from the identifier `first`. `ranges` [SI] are those of inputs by name. Raises
-    ValueError where identifiers run out, ToolMissing.
+    Each signal has the bits of its C type in little-endian order. Signals that do not fit into one
+    frame are split over numbered messages, with consecutive identifiers from `first`. `ranges`
+    gives ranges [SI] of inputs by name. Raises ValueError if an identifier is invalid;
+    MissingToolError if cantools is missing.
     """
     try:
         from cantools.database import Database, load_string
@@ -93,12 +101,14 @@ def emit_dbc(
 
 
 def _input_signals(program: Program, ranges: Mapping[str, Range]) -> Iterator[BusSignal]:
+    """Yield the signals of the inputs."""
     for variable in program.inputs:
         name = unqualified_name(variable.name)
         yield _bus_signal(name, variable, program, ranges.get(name))
 
 
 def _output_signals(program: Program) -> Iterator[BusSignal]:
+    """Yield the signals of the outputs, which have no range."""
     variables = {variable.name: variable for variable in program.variables}
     for wire in program.outputs:
         variable = variables.get(wire.source) or Variable(wire.source, wire.type, wire.unit)
@@ -108,6 +118,7 @@ def _output_signals(program: Program) -> Iterator[BusSignal]:
 def _bus_signal(
     name: str, variable: Variable, program: Program, value_range: Range | None
 ) -> BusSignal:
+    """Return a signal with the type, conversion and comment of a variable."""
     kind = c_type(variable, program.number_type)
     return BusSignal(
         name, kind, conversion_of(variable, program), sanitise_string(variable.about), value_range
@@ -115,7 +126,7 @@ def _bus_signal(
 
 
 def _pack_frames(values: Sequence[BusSignal], capacity: int) -> list[list[BusSignal]]:
-    """Return values frame by frame, in their order, as many as there is room for [bits]."""
+    """Return the signals of each frame, in their order, with at most `capacity` bits in a frame."""
     frames: list[list[BusSignal]] = []
     for value in values:
         if not frames or sum(BIT_LENGTH[v.kind] for v in (*frames[-1], value)) > capacity:
@@ -132,6 +143,7 @@ def _make_message(
     is_sent: bool,
     is_fd: bool,
 ) -> Any:
+    """Return a message of cantools; the signals follow each other without gaps."""
     from cantools.database import Message
 
     signals, at = [], 0
@@ -153,12 +165,13 @@ def _make_message(
 
 
 def _cycle_time(program: Program) -> int | None:
-    """Return the period [ms] of an automaton; None where it has none, or a part of one."""
+    """Return the period of an automaton [ms]; None if it has none or if it is no whole number."""
     period = (program.period or 0) * MS_PER_SECOND
     return int(period) if period and period.denominator == 1 else None
 
 
 def _make_signal(value: BusSignal, start: int, receiver: str) -> Any:
+    """Return a signal of cantools that begins at bit `start`."""
     from cantools.database import Signal
     from cantools.database.conversion import BaseConversion
 

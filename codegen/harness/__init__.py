@@ -1,1 +1,1 @@
-"""Executables around generated C: lock-step records, sanitizers, instruction counts, size."""
+"""Executables around generated C: lock-step records, sanitizers, instruction counts, code size."""

@@ -1,4 +1,4 @@
-"""Disassembly: the machine code of generated C for a Cortex-M4F, with the loops it comes from."""
+"""Disassembly: the machine code of generated C for a Cortex-M4F, with the C loops around it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ from codegen.toolchain.external_tools import ARM_COMPILER, ARM_LINES, ARM_OBJECT
 from codegen.toolchain.machine import CORTEX_FLAGS, CORTEX_LINK_FLAGS
 
 IMAGE_FILE = "image.elf"
+"""The name of the linked program."""
 FUNCTION = re.compile(r"^[0-9a-f]+ <(?P<name>[^>]+)>:$")
+"""The first line of a function in the output of objdump."""
 INSTRUCTION = re.compile(r"^ *(?P<at>[0-9a-f]+):\t(?P<name>[^.\s]\S*)(?:\t(?P<operands>[^;@]*))?")
+"""The line of an instruction in the output of objdump."""
 LOOP = re.compile(r"^(?P<margin> *)for \(int32_t \w+ = 0; \w+ < (?P<turns>\d+); \w+\+\+\) \{")
-"""How generated C writes a loop, whose end has the margin of its head."""
+"""The first line of a loop in generated C; the end of the loop has the same indentation."""
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """`loops` are those of C around it, each with its turns, around what it was inlined into too;
-    `target` is the address that its operands name.
+    """A machine instruction.
+
+    `loops` maps each C loop around it, also around functions that it was inlined into, to its
+    number of iterations.
     """
 
     address: str
@@ -32,17 +37,17 @@ class Instruction:
 
     @property
     def target(self) -> str:
-        """The address of a branch or call; empty if there is none."""
-        found = re.search(r"\b([0-9a-f]+) <", self.operands)
-        return found[1] if found else ""
+        """The target address of a branch or call; empty if its operands name none."""
+        match = re.search(r"\b([0-9a-f]+) <", self.operands)
+        return match[1] if match else ""
 
 
 def disassemble(
     folder: Path, sources: Sequence[str], entry: str
 ) -> Mapping[str, tuple[Instruction, ...]]:
-    """Compile and link sources; return what an entry needs: its function and others, by name.
+    """Compile and link C files for a Cortex-M4F; return the instructions of each function by name.
 
-    Raises ToolMissing, BuildError.
+    Only functions that `entry` needs are linked. Raises MissingToolError, BuildError.
     """
     words = [
         *CORTEX_FLAGS,
@@ -70,7 +75,10 @@ def disassemble(
 
 
 def _parse_functions(text: str) -> dict[str, list[re.Match[str]]]:
-    """Return the lines of instructions by function; constants between them begin with a dot."""
+    """Return the matched lines of instructions by function.
+
+    Data between instructions have a name that begins with a dot and are left out.
+    """
     lines_by_function: dict[str, list[re.Match[str]]] = {}
     own: list[re.Match[str]] = []
     for line in text.splitlines():
@@ -82,7 +90,7 @@ def _parse_functions(text: str) -> dict[str, list[re.Match[str]]]:
 
 
 def _find_loops(text: str) -> list[tuple[range, int]]:
-    """Return the lines of each loop of generated C and how often it turns."""
+    """Return the lines and the number of iterations of each loop of generated C."""
     lines = text.splitlines()
     loops = []
     for first, line in enumerate(lines, start=1):
@@ -95,7 +103,9 @@ def _find_loops(text: str) -> list[tuple[range, int]]:
 def _enclosing_loops(
     folder: Path, addresses: Sequence[str], loops: Mapping[str, list[tuple[range, int]]]
 ) -> dict[str, dict[str, int]]:
-    """Return the loops around each address, along all functions that it is inlined into."""
+    """Return for each address the C loops around it, through all functions that it is inlined
+    into.
+    """
     (folder / "addresses").write_text("\n".join(f"0x{one}" for one in addresses) + "\n")
     text = output_of([ARM_LINES, "-e", IMAGE_FILE, "-i", "-a", "@addresses"], folder)
     loops_by_address: dict[str, dict[str, int]] = {}

@@ -1,4 +1,4 @@
-"""Harness: a main around the C of a Program - records of inputs in, all that it carries out."""
+"""Harness: a main function around the C of a Program that reads input records and writes values."""
 
 from __future__ import annotations
 
@@ -19,32 +19,33 @@ from codegen.toolchain.templates import render
 from language.ir.program import Constant, Program, Variable
 
 HARNESS_HEADERS = ("harness.h", "cortex_m4f.h")
+"""Headers of the harness that every main needs."""
 
 
 @dataclass(frozen=True)
 class HarnessMain:
-    """A main around a program: its template, and the files of the harness that only it needs."""
+    """A main function: its template, and files of the harness that only it needs."""
 
     template: str
     files: tuple[str, ...] = ()
 
 
 LOCKSTEP = HarnessMain("harness/lockstep_main.c.jinja")
-"""Writes all that the program carries after each tick."""
+"""The main that writes all compared variables after each tick."""
 
 
 @dataclass(frozen=True)
 class ComparedVariable:
-    """A variable that the executable writes after each tick: its name and its kind."""
+    """A variable that the executable writes after each tick; `kind` is `real` or `whole`."""
 
     name: str
     kind: str
 
 
 def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
-    """Return what is compared after a tick: all that the instance carries in C.
+    """Return the variables of the instance that are compared after each tick.
 
-    What is in a ring is compared when it comes out of it.
+    Arrays are left out: the values of a ring buffer are compared when they are read from it.
     """
     program = restrict_to_step(program)
     kinds = {"real": "real", "truth": "whole", "whole": "whole"}
@@ -57,7 +58,9 @@ def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
 
 
 def tick_inputs(program: Program) -> tuple[Variable, ...]:
-    """Return the inputs of a tick, the flags of new values among them."""
+    """Return the inputs of a tick, including the flags for new values, in the order of the
+    Program.
+    """
     return tuple(
         variable
         for variable in program.variables
@@ -66,7 +69,9 @@ def tick_inputs(program: Program) -> tuple[Variable, ...]:
 
 
 def tunable_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the parameters that a calibration page may change, in the order of its members."""
+    """Return the real scalar parameters that a calibration page may change, in the order of its
+    members.
+    """
     program = restrict_to_step(program)
     return tuple(
         constant
@@ -82,9 +87,9 @@ def write_harness(
     main: HarnessMain = LOCKSTEP,
     extra_context: Mapping[str, object] | None = None,
 ) -> list[Path]:
-    """Write the C files of a program and a main around them; return the sources to compile.
+    """Write the C files of a Program and a main around them; return the C files to compile.
 
-    `extra_context` is what the template of that main reads beside what each one does.
+    `extra_context` extends the context that the template of every main reads.
     """
     (folder / "harness").mkdir(exist_ok=True)
     own = (*machine.files, *main.files)
@@ -106,7 +111,10 @@ def build_executable(
     machine: Machine = HOST,
     main: HarnessMain = LOCKSTEP,
 ) -> Iterator[Path]:
-    """Give the compiled harness of a program, kept from an earlier run if there was one."""
+    """Yield the path of the compiled harness of a Program, from the cache if it was built before.
+
+    Raises MissingToolError, BuildError.
+    """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         sources = write_harness(program, folder, machine, main)
@@ -123,7 +131,7 @@ def build_executable(
 
 
 def _main_context(program: Program) -> Mapping[str, object]:
-    """Return what a main around a program needs to know: inputs, tunables and what is compared."""
+    """Return the template context of a main: inputs, tunable parameters and compared variables."""
     program = restrict_to_step(program)
     c_names, real = CNames(program), C_REAL_TYPE[program.number_type]
     inputs = [

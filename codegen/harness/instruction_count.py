@@ -1,4 +1,4 @@
-"""Instructions: how many a step of generated C takes on an emulated Cortex-M4F."""
+"""Instruction count: the number of instructions of each step on an emulated Cortex-M4F."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.program import Program
 
 MAIN = HarnessMain("harness/instructions_main.c.jinja", ("instructions.h", "instructions.c"))
+"""The main that counts instructions."""
 ICOUNT_OPTIONS = ("-icount", "shift=0")
-"""Of the emulator: one instruction takes 1 ns."""
+"""Options of QEMU under which one instruction takes 1 ns."""
 
 
 @dataclass(frozen=True)
 class InstructionCounts:
-    """What each step took, the call included."""
+    """The number of instructions of each step, including its call."""
 
     steps: tuple[int, ...]
 
     @cached_property
     def mean(self) -> float:
-        """The mean of all steps, 0 if there are none."""
+        """The mean over all steps; 0 if there are none."""
         return sum(self.steps) / max(len(self.steps), 1)
 
     def __str__(self) -> str:
-        """Return the mean and the range."""
+        """Return the mean and the range as text."""
         if not self.steps:
             return "no steps"
         return f"{self.mean:.0f} ({min(self.steps)} to {max(self.steps)})"
@@ -40,7 +41,7 @@ def count_instructions(
 ) -> InstructionCounts:
     """Count the instructions of each step on input records of a harness.
 
-    QEMU tells what a step executes, not what it waits for. Raises ToolMissing, BuildError.
+    QEMU counts executed instructions, without wait states. Raises MissingToolError, BuildError.
     """
     with build_executable(program, flags, machine=CORTEX_M4F, main=MAIN) as steps:
         output = run_in_qemu(steps, records, ICOUNT_OPTIONS)

@@ -1,4 +1,4 @@
-"""Metrics: what generated C takes of a Cortex-M4F - ROM, RAM, stack, the longest step."""
+"""Code metrics: ROM, RAM, stack and worst-case instructions of generated C on a Cortex-M4F."""
 
 from __future__ import annotations
 
@@ -18,19 +18,23 @@ from codegen.toolchain.machine import CORTEX_FLAGS
 from language.ir.program import Program
 
 STRUCTURES = ("Self", "In", "Out")
+"""The structures whose sizes are measured."""
 SIZE_PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
+"""A C array whose section has the size of a structure."""
 SECTION = re.compile(r"^(\.[\w.]+)\s+(\d+)\s+\d+", re.MULTILINE)
+"""The line of a section in the output of size: name and size [bytes]."""
 SECTION_KINDS = {".text": "code", ".rodata": "constants", ".data": "data", ".bss": "data"}
-"""What a section holds, by the first word of its name."""
+"""The contents of a section by the first part of its name."""
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """Bytes: of `code` and its `constants`, of the calibration `page` (both ROM), of `data` that
-    is no one's instance, of one `instance` (RAM), of the structures of inputs and outputs, and of
-    the `stack` of a step; `beside` are functions whose stack the compiler does not tell.
+    """Sizes [bytes] and worst-case instructions of generated C.
 
-    `longest` are the most instructions of a step; where there is no bound, `unbounded` says why.
+    ROM: `code`, its `constants`, and the calibration `page`. RAM: `data` outside of instances, one
+    `instance`, and the structures of `inputs` and `outputs`. `stack` is the stack of a step;
+    `beside` names called functions whose stack is unknown. `longest` is the maximum number of
+    instructions of a step, or None; `unbounded` then tells why there is no bound.
     """
 
     name: str
@@ -49,14 +53,14 @@ class Metrics:
 
     @property
     def rom(self) -> int:
-        """Code, constants and the default page."""
+        """The sum of code, constants and the default page."""
         return self.code + self.constants + self.page
 
 
 def measure_code(program: Program) -> Metrics:
-    """Compile the C of a Program for a Cortex-M4F, `-O2`, and measure it.
+    """Compile the C of a Program for a Cortex-M4F with `-O2` and measure it.
 
-    Raises ToolMissing, BuildError.
+    Raises MissingToolError, BuildError.
     """
     name = program.name
     with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:
@@ -90,7 +94,9 @@ def measure_code(program: Program) -> Metrics:
 
 
 def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
-    """Return the most instructions of a step, or None and why there is no bound."""
+    """Return the maximum number of instructions of a step, or None and the reason why there is
+    no bound.
+    """
     try:
         return worst_case_instructions(folder, sources, entry), ""
     except Unbounded as error:
@@ -98,7 +104,7 @@ def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int |
 
 
 def _section_sizes(folder: Path, sources: Sequence[str]) -> Counter[str]:
-    """Return the bytes of each section of all sources together."""
+    """Return the size [bytes] of each section, summed over the compiled C files."""
     output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fdata-sections", "-c", *sources], folder)
     objects = [f"{Path(source).stem}.o" for source in sources]
     sizes: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""Sanitizers: compilers' own checks of addresses and of what C leaves undefined, while C runs."""
+"""Sanitizers: builds and runs programs with checks for memory errors and undefined behaviour."""
 
 from __future__ import annotations
 
@@ -12,22 +12,27 @@ from codegen.toolchain.compiler import FLAGS, BuildError
 from codegen.toolchain.external_tools import output_of
 
 SANITIZERS = "address,undefined,float-divide-by-zero,float-cast-overflow"
+"""The sanitizers of gcc and clang that are enabled."""
 ERROR_MARKERS = ("runtime error", "ERROR: AddressSanitizer")
+"""Texts that mark an error in the output of a sanitizer."""
 APP = "app"
+"""The name of the executable."""
 
 
 @dataclass(frozen=True)
 class SanitizerReport:
-    """What a program under sanitizers said: its `lines`, and the first thing that was `found`."""
+    """The error output of a program under sanitizers, and the first error in it, if any
+    (`findings`).
+    """
 
     lines: tuple[str, ...]
     findings: tuple[str, ...]
 
 
 def build_sanitised(compiler: str, sources: Sequence[Path], folder: Path, extra: str = "") -> Path:
-    """Return the program made of sources, with the sanitizers `extra` the usual ones.
+    """Compile C files with sanitizers; return the executable in `folder`.
 
-    Raises ToolMissing, BuildError.
+    `extra` is prepended to the list of sanitizers. Raises MissingToolError, BuildError.
     """
     flags = [flag for flag in FLAGS if flag != "-O2"]
     sanitizers = [f"-fsanitize={extra}{SANITIZERS}", "-fno-sanitize-recover=all"]
@@ -39,7 +44,11 @@ def build_sanitised(compiler: str, sources: Sequence[Path], folder: Path, extra:
 def run_sanitised(
     app: Path, arguments: Sequence[str] = (), stdin: bytes = b"", timeout: float | None = None
 ) -> SanitizerReport:
-    """Run a program in its folder, for so many seconds at most. Raises BuildError."""
+    """Run a sanitised program in its folder and return its report.
+
+    A nonzero exit code without a reported error is a finding too. Raises BuildError after `timeout`
+    seconds.
+    """
     options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
     try:
         done = subprocess.run(

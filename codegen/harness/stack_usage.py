@@ -1,4 +1,6 @@
-"""Stack: the most that a step takes of it, along the calls that the compiler reports."""
+"""Stack usage: the stack bound of a function over all call chains that the compiler reports
+(rule C23).
+"""
 
 from __future__ import annotations
 
@@ -13,37 +15,43 @@ from codegen.toolchain.machine import CORTEX_FLAGS
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 
 LIMIT = 256
-"""Bytes that a step may take."""
+"""Maximum stack of a step [bytes]."""
 NODE = re.compile(
     r'node: \{ title: "(?P<name>[^"]+)" '
     r'label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<kind>[^)]+)\)'
 )
+"""A function in the call graph of gcc: name, frame size [bytes] and kind."""
 EDGE = re.compile(r'edge: \{ sourcename: "(?P<caller>[^"]+)" targetname: "(?P<called>[^"]+)"')
+"""A call in the call graph of gcc."""
 
 
 @dataclass(frozen=True)
 class _Calls:
-    """What functions take [bytes], which of them have no fixed size, and whom they call."""
+    """A call graph: frame sizes [bytes], functions with a variable frame size, and callees by
+    function.
+    """
 
     sizes: Mapping[str, int]
     growing: frozenset[str]
     called: Mapping[str, frozenset[str]]
 
-    def ways(self, name: str, above: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-        """Return all ways down from a function; one that recurs ends where it does."""
-        way = (*above, name)
-        if name in above or name not in self.called:
-            return [way]
-        return [longer for one in sorted(self.called[name]) for longer in self.ways(one, way)]
+    def chains(self, name: str, callers: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+        """Return all call chains from a function; a recursive chain ends at the repeated name."""
+        chain = (*callers, name)
+        if name in callers or name not in self.called:
+            return [chain]
+        return [
+            longer for callee in sorted(self.called[name]) for longer in self.chains(callee, chain)
+        ]
 
 
 @dataclass(frozen=True)
 class StackUsage:
-    """The `most` bytes that a function takes with all that it calls, as far as that is known.
+    """The stack bound of a function: `most` bytes over all call chains, as far as frames are known.
 
-    `beside` are functions that are not among the sources (memset, arithmetic in software): the
-    compiler does not tell what they take. `recurring` call themselves, `growing` have no fixed
-    size.
+    `beside` names functions outside of the sources (memset, software arithmetic) whose frames the
+    compiler does not report. `recurring` names recursive functions, `growing` functions with a
+    variable frame size.
     """
 
     most: int
@@ -53,37 +61,45 @@ class StackUsage:
 
 
 def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
-    """Compile for a Cortex-M4F and add up what a function takes. Raises ToolMissing, BuildError."""
+    """Compile C files for a Cortex-M4F and return the stack usage of a function.
+
+    Raises MissingToolError; BuildError also if `entry` is not in the compiled code.
+    """
     output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
     calls = _read("\n".join((folder / f"{Path(s).stem}.ci").read_text() for s in sources))
     if entry not in calls.sizes:
         raise BuildError(f"{entry} is not in the compiled code")
-    ways = calls.ways(entry)
-    met = {name for way in ways for name in way}
+    chains = calls.chains(entry)
+    reached = {name for chain in chains for name in chain}
     return StackUsage(
-        max(sum(calls.sizes.get(name, 0) for name in way) for way in ways),
-        tuple(sorted(met - set(calls.sizes))),
-        tuple(sorted({way[-1] for way in ways if way[-1] in way[:-1]})),
-        tuple(sorted(met & calls.growing)),
+        max(sum(calls.sizes.get(name, 0) for name in chain) for chain in chains),
+        tuple(sorted(reached - set(calls.sizes))),
+        tuple(sorted({chain[-1] for chain in chains if chain[-1] in chain[:-1]})),
+        tuple(sorted(reached & calls.growing)),
     )
 
 
 def check_stack(folder: Path, sources: Sequence[str], entry: str) -> ToolVerdict:
-    """Say whether a step takes no more than the limit, and a fixed number. Raises ToolMissing."""
+    """Return the verdict on the stack of a step: at most LIMIT bytes, no recursion, fixed frame
+    sizes.
+
+    Raises MissingToolError.
+    """
     tool = f"{ARM_COMPILER} {tool_version(ARM_COMPILER, folder)}"
     try:
-        took = stack_usage(folder, sources, entry)
+        usage = stack_usage(folder, sources, entry)
     except BuildError as error:
         return ToolVerdict("stack", tool, "no result", (str(error).partition("\n")[0],))
-    found = [f"{name} calls itself" for name in took.recurring]
-    found += [f"{name} takes more or less each time" for name in took.growing]
-    if took.most > LIMIT:
-        found.append(f"{entry} takes {took.most} bytes, {LIMIT} are allowed")
-    beside = f", beside what these take: {', '.join(took.beside)}" if took.beside else ""
-    return ToolVerdict("stack", tool, f"{entry}: {took.most} bytes{beside}", tuple(found))
+    findings = [f"{name} calls itself" for name in usage.recurring]
+    findings += [f"{name} takes more or less each time" for name in usage.growing]
+    if usage.most > LIMIT:
+        findings.append(f"{entry} takes {usage.most} bytes, {LIMIT} are allowed")
+    beside = f", beside what these take: {', '.join(usage.beside)}" if usage.beside else ""
+    return ToolVerdict("stack", tool, f"{entry}: {usage.most} bytes{beside}", tuple(findings))
 
 
 def _read(text: str) -> _Calls:
+    """Return the call graph in the output of gcc's -fcallgraph-info."""
     nodes = {_own(m["name"]): m for m in NODE.finditer(text)}
     called: dict[str, frozenset[str]] = {}
     for match in EDGE.finditer(text):
@@ -95,5 +111,7 @@ def _read(text: str) -> _Calls:
 
 
 def _own(name: str) -> str:
-    """Static functions have their file before their name."""
+    """Return the name of a function without the file that stands before the name of a static
+    one.
+    """
     return name.rpartition(":")[2]

@@ -1,8 +1,8 @@
-"""Longest step: the most instructions of a step on a Cortex-M4F, read from its machine code.
+"""Worst-case instructions: an upper bound on the instructions of a step, from its machine code.
 
-Loops run to their end, of each branch the longer side is taken: no step ever takes more. How often
-a loop turns is known from the `for` of C that most of its instructions come from, as the line table
-of the compiler tells.
+The bound is the longest path through the control-flow graph of a Cortex-M4F, in which each loop
+runs all its iterations. The number of iterations of a loop is that of the `for` loop in C that most
+of its instructions come from, according to the line table of the compiler.
 """
 
 from __future__ import annotations
@@ -19,30 +19,33 @@ from codegen.harness.disassembly import Instruction, disassemble
 from language.model.graphs import strongly_connected_components
 
 CONDITION = re.compile("(eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?")
+"""A condition code of ARM, or none."""
 Function = tuple[Instruction, ...]
 LoopCounts = Mapping[str, int]
-"""Loops of C with how often each turns."""
+"""The number of iterations by C loop."""
 
 
 class Unbounded(Exception):
-    """Machine code of which no bound is known; the message says what of it."""
+    """No bound is known for some machine code; the message tells why."""
 
 
 def worst_case_instructions(folder: Path, sources: Sequence[str], entry: str) -> int:
-    """Return the most instructions from the call of a function until it returns.
+    """Return the maximum number of instructions from the call of a function until it returns.
 
-    Raises ToolMissing, BuildError, Unbounded.
+    Raises MissingToolError, BuildError, Unbounded.
     """
     return longest_path(disassemble(folder, sources, entry), entry)
 
 
 def longest_path(functions: Mapping[str, Function], entry: str) -> int:
-    """Return the most instructions of a function and of all that it calls. Raises Unbounded."""
+    """Return the maximum number of instructions of a function with all its callees. Raises
+    Unbounded.
+    """
     return _LongestPaths(functions).instructions_of(entry)
 
 
 class _LongestPaths:
-    """The longest ways through some functions, each found once."""
+    """The longest paths of functions, each computed once."""
 
     def __init__(self, functions: Mapping[str, Function]) -> None:
         self.functions = functions
@@ -50,12 +53,13 @@ class _LongestPaths:
         self.known: dict[str, int] = {}
 
     def instructions_of(self, name: str) -> int:
-        """Return the most instructions of a function and of what it calls."""
+        """Return the maximum number of instructions of a function with its callees."""
         if name not in self.known:
             self.known[name] = self._compute(name)
         return self.known[name]
 
     def _compute(self, name: str) -> int:
+        """Return the maximum number of instructions of a function from its control-flow graph."""
         code = self.functions[name]
         inside = {one.address for one in code}
         edges: dict[str, list[str]] = {}
@@ -72,6 +76,10 @@ class _LongestPaths:
         )
 
     def _callee_instructions(self, instruction: Instruction) -> int:
+        """Return the maximum number of instructions of the callee of a call.
+
+        Raises Unbounded if the callee is not known.
+        """
         if instruction.target not in self.names:
             raise Unbounded(f"{instruction.name} {instruction.operands} calls what is not known")
         return self.instructions_of(self.names[instruction.target])
@@ -79,8 +87,11 @@ class _LongestPaths:
 
 @dataclass(frozen=True)
 class _ControlFlowGraph:
-    """The instructions of a function: what follows each, how many it stands for, what loops of C
-    are around it.
+    """The control-flow graph of a function.
+
+    Nodes are addresses of instructions. `edges` maps a node to its successors, `weights` to the
+    number of instructions that it stands for (a call includes its callee), `loops` to the C loops
+    around it.
     """
 
     function: str
@@ -91,49 +102,52 @@ class _ControlFlowGraph:
     def longest_path(
         self, nodes: Sequence[str], entry: str, outer_loops: LoopCounts, loop_head: str = ""
     ) -> int:
-        """Return the most instructions on a way from an entry through some instructions.
+        """Return the maximum number of instructions on a path from `entry` through `nodes`.
 
-        `outer_loops` are the loops around them, `loop_head` is where a turn of the innermost one begins.
+        `outer_loops` are the loops around the nodes. `loop_head` is the first node of an iteration
+        of the innermost one; edges to it are not followed.
         """
         after = self._successors_within(nodes, loop_head)
         most: dict[str, int] = {}
-        for group in strongly_connected_components(after):  # each after those that it leads to
+        for group in strongly_connected_components(after):  # successors come first
             members = set(group)
-            left = [most[one] for node in group for one in after[node] if one not in members]
-            own = self.weights[group[0]]
+            exits = [most[one] for node in group for one in after[node] if one not in members]
+            inside = self.weights[group[0]]
             if len(group) > 1 or group[0] in after[group[0]]:
-                begun = {one for node in after if node not in members for one in after[node]}
-                own = self._loop_instructions(group, (begun | {entry}) & members, outer_loops)
-            most.update(dict.fromkeys(group, own + max(left, default=0)))
+                entered = {one for node in after if node not in members for one in after[node]}
+                inside = self._loop_instructions(group, (entered | {entry}) & members, outer_loops)
+            most.update(dict.fromkeys(group, inside + max(exits, default=0)))
         return most[entry]
 
     def _loop_instructions(
         self, nodes: Sequence[str], heads: Set[str], outer_loops: LoopCounts
     ) -> int:
-        """Return the most instructions of all turns of a loop, and of the last look at its end.
+        """Return the maximum number of instructions of all iterations of a loop and of its last
+        test.
 
-        Where it is entered at several places, a turn begins at one of them, and the others lead
-        there once.
+        If a loop is entered at several nodes (`heads`), each is tried as the begin of an iteration,
+        and the path from another head is added once. Raises Unbounded if no C loop tells the number
+        of iterations.
         """
-        found: list[int] = []
+        bounds: list[int] = []
         for head in sorted(heads):
             with suppress(Unbounded):
                 known = {**outer_loops, **self._loop_counts(nodes, head)}
-                turns = prod(known[name] for name in known if name not in outer_loops)
-                turn, *first = (
+                iterations = prod(known[name] for name in known if name not in outer_loops)
+                longest, *first = (
                     self.longest_path(nodes, one, known, head) for one in (head, *(heads - {head}))
                 )
-                if turns > 1:
-                    found.append(
-                        turns * turn + max(first, default=0) + self._head_instructions(head)
+                if iterations > 1:
+                    bounds.append(
+                        iterations * longest + max(first, default=0) + self._head_instructions(head)
                     )
-        if not found:
+        if not bounds:
             raise Unbounded(f"{self.function} has a loop of which no end is known")
-        return min(found)
+        return min(bounds)
 
     def _loop_counts(self, nodes: Sequence[str], head: str) -> LoopCounts:
-        """Return the loops of C that most instructions of a loop are in, but for those of inner
-        ones.
+        """Return the C loops that contain more than half of the instructions of a loop, without
+        inner loops.
         """
         groups = strongly_connected_components(self._successors_within(nodes, head))
         own = [group[0] for group in groups if len(group) == 1]
@@ -141,12 +155,12 @@ class _ControlFlowGraph:
         return {name: turns for (name, turns), count in met.items() if 2 * count > len(own)}
 
     def _successors_within(self, nodes: Sequence[str], loop_head: str) -> dict[str, list[str]]:
-        """Return what follows each of some instructions among them, but for a new turn."""
+        """Return the successors of each node among the nodes, without the head of the loop."""
         known = set(nodes) - {loop_head}
         return {node: [one for one in self.edges[node] if one in known] for node in nodes}
 
     def _head_instructions(self, head: str) -> int:
-        """Return the instructions from the head of a loop to its first branch."""
+        """Return the number of instructions from the head of a loop through its first branch."""
         count, node = self.weights[head], head
         while len(self.edges[node]) == 1:
             node = self.edges[node][0]
@@ -155,13 +169,16 @@ class _ControlFlowGraph:
 
 
 def is_branch(instruction: Instruction) -> bool:
-    """Tell whether an instruction goes on elsewhere, or may."""
+    """Tell whether an instruction may continue at another address."""
     name = instruction.name.partition(".")[0]
     return name in ("cbz", "cbnz") or (name[:1] == "b" and bool(CONDITION.fullmatch(name[1:])))
 
 
 def is_call(instruction: Instruction, is_local_target: bool) -> bool:
-    """Tell whether an instruction calls a function, or ends with one that does the rest."""
+    """Tell whether an instruction calls a function, or continues in another function (tail call).
+
+    Raises Unbounded for a branch table.
+    """
     name = instruction.name.partition(".")[0]
     if name in ("tbb", "tbh"):
         raise Unbounded("a table of branches is not followed")
@@ -169,6 +186,6 @@ def is_call(instruction: Instruction, is_local_target: bool) -> bool:
 
 
 def has_no_fall_through(instruction: Instruction) -> bool:
-    """Tell whether what stands behind an instruction does not follow it."""
+    """Tell whether the next instruction in memory never follows an instruction."""
     name = instruction.name.partition(".")[0]
     return name in ("b", "bx") or (name in ("pop", "ldmia") and "pc" in instruction.operands)

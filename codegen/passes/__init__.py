@@ -1,1 +1,1 @@
-"""Passes over a Program, and analyses of it, that only the C needs."""
+"""Passes over a Program, and analyses of it, that only the C generator uses."""

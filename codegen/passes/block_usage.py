@@ -1,4 +1,7 @@
-"""Usage: what each block of a Program reads and writes, directly and through the blocks it runs."""
+"""Block usage: the pointers that the C function of each block needs, and its local variables.
+
+The analysis follows reads and writes of a block, directly and through the blocks that it runs.
+"""
 
 from __future__ import annotations
 
@@ -27,28 +30,33 @@ POINTER_OF_GROUP = {
     "memory": "self",
     "derived": "self",
 }
+"""The pointer parameter through which a function accesses a group of variables."""
 PAGE_GROUPS = frozenset({"calibration"})
+"""Groups of constants that are on the calibration page by default."""
 POINTER_ORDER = ("self", "cal", "in", "work")
+"""The order of pointer parameters."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """The pointers that a block needs, and those through which it writes."""
+    """The pointers that the function of a block needs, and those through which it writes."""
 
     needs: frozenset[str]
     writes: frozenset[str]
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """The pointers in the order in which functions take them."""
+        """The needed pointers in the order of the parameters of a function."""
         return tuple(name for name in POINTER_ORDER if name in self.needs)
 
 
 def block_usages(
     program: Program, local: Mapping[str, frozenset[str]], page_groups: frozenset[str] = PAGE_GROUPS
 ) -> dict[str, Usage]:
-    """Return the usage of every block; `local` are the variables that live inside a block,
-    `page_groups` the groups of constants that the calibration page has.
+    """Return the usage of every block by name.
+
+    `local` holds the local variables of each block, which need no pointer. `page_groups` are the
+    groups of constants on the calibration page.
     """
     groups = {**POINTER_OF_GROUP, **dict.fromkeys(page_groups, "cal")}
     usage_by_block: dict[str, Usage] = {}
@@ -75,10 +83,11 @@ def block_usages(
 def locals_of(
     program: Program, loop_variables: Mapping[str, frozenset[str]] | None = None
 ) -> dict[str, frozenset[str]]:
-    """Return, per block, the work variables that live inside it: set once, then read there, or
-    those that have `loop_variables` (see `turning`).
+    """Return for each block the work variables that are local to its function.
 
-    A variable that some block reads without having set it is shared by the blocks.
+    These are variables that the block assigns once and reads in the same list of operations,
+    indices of its loops, and `loop_variables` (those of `loop_locals` if None). Arrays are never
+    local, nor is a variable that some block reads without that assignment.
     """
     assigned_once = {name: _assigned_once(block) for name, block in program.blocks.items()}
     shared = {variable.name for variable in program.variables if variable.size}
@@ -98,9 +107,11 @@ def locals_of(
 
 
 def loop_locals(program: Program) -> dict[str, frozenset[str]]:
-    """Return, per block, the work variables that live inside it, and that its loops set.
+    """Return for each block the work variables that are local to its function and assigned in its
+    loops.
 
-    Every block that has one sets it before it reads it, and runs none that has it too.
+    Such a variable is assigned before it is read in every block that uses it, and no block that it
+    runs uses it too. Arrays, loop indices and the interface of a step are excluded.
     """
     loops = [
         op for block in program.blocks.values() for op in walk_ops(block) if isinstance(op, Loop)
@@ -130,7 +141,11 @@ def loop_locals(program: Program) -> dict[str, frozenset[str]]:
 
 
 def _assigned_once(block: Block) -> set[str]:
-    """Work variables assigned exactly once, and read only in the same list of operations."""
+    """Return the work variables that are assigned once in a block and read only later in the same
+    list of
+
+    operations.
+    """
     counts = Counter(op.target for op in walk_ops(block) if isinstance(op, Assign))
     outside = Counter(block_reads(block))
     names: set[str] = set()
@@ -147,6 +162,7 @@ def _assigned_once(block: Block) -> set[str]:
 
 
 def _nested_blocks(block: Block) -> Iterator[Block]:
+    """Yield a block, then all blocks inside its operations."""
     yield block
     for op in block:
         match op:

@@ -1,4 +1,10 @@
-"""Unread: a Program without the values that nothing reads."""
+"""Dead store elimination: a pass that removes assignments to variables that nothing reads.
+
+  before: work.a = x + y; work.b = work.a * 2; state.x = x
+  after:  state.x = x
+
+Variables without a remaining assignment are removed from the Program.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +18,10 @@ from language.ir.traversal import block_reads, block_writes
 
 
 def remove_dead_stores(program: Program, groups: tuple[str, ...]) -> Program:
-    """Return a Program less those of its variables in some groups that neither it nor an output
-    reads, as far as they are assigned outside of other operations.
+    """Return a Program without assignments to variables in `groups` (prefixes) that nothing reads.
+
+    The pass repeats until no assignment is removed. Sources of outputs count as read. Assignments
+    inside branches, switches and loops stay.
     """
     output_sources = {wire.source for wire in program.outputs}
     reads_by_block = {
@@ -37,21 +45,28 @@ def remove_dead_stores(program: Program, groups: tuple[str, ...]) -> Program:
 
 @dataclass(frozen=True)
 class _OpReads:
-    """An operation of a block with what it reads; `target` where it sets what may go."""
+    """An operation of a block with the names that it reads.
+
+    `target` is the assigned variable if the operation may be removed, else empty.
+    """
 
     op: Op
     reads: frozenset[str]
     target: str
 
     def is_live(self, read: set[str]) -> bool:
-        """Tell whether it has to stay where so much is read."""
+        """Tell whether the operation must stay, given the set of all names that are read."""
         return not self.target or self.target in read
 
 
 def _op_reads(op: Op, groups: tuple[str, ...]) -> _OpReads:
+    """Return an operation with its reads; a removable one is an assignment to a variable in
+    `groups`.
+    """
     target = op.target if isinstance(op, Assign) and op.target.startswith(groups) else ""
     return _OpReads(op, frozenset(block_reads((op,))), target)
 
 
 def _written_names(blocks: Mapping[str, Block]) -> set[str]:
+    """Return the names that any of the blocks writes."""
     return {name for block in blocks.values() for name in block_writes(block)}

@@ -1,6 +1,7 @@
-"""Unassigned: what a tick or step may read of its work values before it has set them.
+"""Definite assignment: the work variables that a step may read before it assigns them (rule C22).
 
-Only these are set when X_Step begins; all others are set on every way to where they are read.
+Only these are set to 0 when a step begins. All others are assigned on every path that leads to a
+read.
 """
 
 from __future__ import annotations
@@ -30,14 +31,18 @@ NameSet = frozenset[str]
 
 
 def find_unassigned_reads(program: Program, entry: str, shared: frozenset[str]) -> frozenset[str]:
-    """Return the shared work variables that an entry may read before it sets them."""
+    """Return the shared work variables that the block `entry` may read before it assigns them."""
     analysis = _AssignmentAnalysis(program, shared)
     analysis.analyse_block(program.blocks[entry], frozenset())
     return frozenset(analysis.unassigned_reads)
 
 
 class _AssignmentAnalysis:
-    """A way through the blocks of a Program, with what is set on every branch of it."""
+    """A forward data-flow analysis: the names that are assigned on every path to an operation.
+
+    An element of an array has the name `array[index]`. A block is analysed once for each set of
+    assigned names and loop indices with which it runs.
+    """
 
     def __init__(self, program: Program, shared: frozenset[str]) -> None:
         self.program = program
@@ -49,7 +54,11 @@ class _AssignmentAnalysis:
         self.unassigned_reads: set[str] = set()
 
     def analyse_block(self, block: Block, assigned: NameSet) -> NameSet:
-        """Return what is set behind a block, of which `assigned` is set before it."""
+        """Return the names that are assigned after a block, given those that are assigned before
+        it.
+
+        Reads of unassigned shared variables are added to `unassigned_reads`.
+        """
         for op in block:
             for expr in direct_expressions(op):
                 self._check_reads(expr, assigned)
@@ -57,6 +66,11 @@ class _AssignmentAnalysis:
         return assigned
 
     def _analyse_op(self, op: Op, assigned: NameSet) -> NameSet:
+        """Return the names that are assigned after an operation.
+
+        A branch gives the intersection of its arms. A switch does so only if its cases cover all
+        modes.
+        """
         match op:
             case Assign(target, _, _):
                 return assigned | {target}
@@ -71,7 +85,7 @@ class _AssignmentAnalysis:
                 every = self.modes if selector == MODE_VARIABLE else set()
                 if every and {number for number, _ in cases} >= every:
                     return frozenset.intersection(*ends)
-                return assigned  # none of them may be taken
+                return assigned  # possibly no case is taken
             case Loop(count, index, body) if count:
                 return self._analyse_loop(count, index, body, assigned | {index})
             case RunBlock(name):
@@ -83,7 +97,11 @@ class _AssignmentAnalysis:
                 return assigned
 
     def _analyse_loop(self, count: int, index: str, body: Block, assigned: NameSet) -> NameSet:
-        """Follow each turn of a loop that fills arrays, and the first of any other."""
+        """Return the names that are assigned after a loop.
+
+        Every iteration of a loop that stores into an array is followed, with a known index; of any
+        other loop only the first.
+        """
         if not any(isinstance(op, Store) for op in body):
             return self.analyse_block(body, assigned)
         for turn in range(count):
@@ -93,6 +111,7 @@ class _AssignmentAnalysis:
         return assigned
 
     def _check_reads(self, expr: Expr, assigned: NameSet) -> None:
+        """Record the shared variables and arrays of an expression that are not assigned."""
         for part in walk_post_order(expr):
             if isinstance(part, Ref):
                 if part.name in self.shared and part.name not in assigned:
@@ -103,13 +122,18 @@ class _AssignmentAnalysis:
 
 
 def _elements(item: Item, size: int, loop_indices: Mapping[str, int]) -> Iterator[str]:
+    """Yield the names of the array elements that a read may access: one if the index is known,
+    else all.
+    """
     place = _index_value(item.index, loop_indices)
     places = range(size) if place is None else (place,)
     yield from (f"{item.name}[{k}]" for k in places)
 
 
 def _index_value(index: Expr, loop_indices: Mapping[str, int]) -> int | None:
-    """Return what an index is in a turn of loops; None if that hangs on something else."""
+    """Return the value of an index in the current loop iterations; None if it depends on
+    anything else.
+    """
     match index:
         case Value(value):
             return int(value)

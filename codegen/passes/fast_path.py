@@ -1,10 +1,17 @@
-"""Leap: a step in which nothing happens, as one block of C; bits stay (rule C18).
+"""Fast path: a pass that adds a straight-line block for a step without an event (rule C18).
 
-In nearly all steps of a continuous automaton no guard changes, nor in nearly all ticks that run
-one. `leap_<mode>` is what is done then, followed with all that is known of such a step: its length,
-its mode, that it is one piece. Each value has a name of its own, so that a compiler keeps it in a
-register, and what the equations were when the step before ended is not computed again. Where a
-guard changed, the step is gone through from where it began.
+  before: step = if started { flow; ... } else enter
+  after:  step = if started { leap } ; if not is_leapt { through_events }
+          leap = switch mode { m: leap_m }
+          leap_m = <values up to the guards> if <no guard changed> { <end of the step>; is_leapt }
+          through_events = <the step as it was before>
+
+In most steps of a continuous automaton no guard changes; the same holds for most ticks that run a
+model. Block `leap_<mode>` executes such a step. It is specialised to what is known of it: its
+length, its mode, and that it has no inner event. Each value has its own name, so a compiler keeps
+it in a register. Equations whose values at the end of the step before are still valid are not
+computed again. If a guard changed, `through_events` executes the step from its beginning. The bits
+of all results stay the same.
 """
 
 from __future__ import annotations
@@ -43,9 +50,13 @@ from language.lowering.program_builder import finalise_program
 from language.programs.model_run import RUN_MODE
 
 FastPathMode = Literal["on", "anew", "off"]
-"""Whether there are leaps; `anew` computes all equations, for one whose states are set between its
-steps, as those of a predictor are: what they were when the step before ended does not count."""
+"""Whether fast paths are added. `anew` computes all equations in each step; it is needed where
+states
+
+are set between steps, as in a predictor, so that values of the step before are not valid.
+"""
 ENTRIES = ("init", "derive", "step")
+"""The blocks that are entry points of a module."""
 FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
     "leap",
     "memory.is_leapt",
@@ -53,17 +64,22 @@ FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
     "memory.started",
 )
 EVENT_PATH = "through_events"
+"""The block that executes a step from event to event."""
 STEP_END_PREFIX = "work.end_"
+"""The prefix of work variables that hold the states at the end of a step."""
 ModeNumbers = tuple[tuple[str, int], ...]
+"""Pairs of a mode variable and the number of a mode."""
 MAX_CONFIGURATIONS = 12
-"""Modes of chart and regions together that have a leap each: more are too much C."""
+"""Maximum number of mode configurations with a fast path each; more would be too much code."""
 CLEAR_TAKEN = (Assign(FAST_PATH_TAKEN, Value(False)),)
+"""The operation that clears the flag of a taken fast path."""
 
 
 @dataclass(frozen=True)
 class ModeConfiguration:
-    """Where an automaton stays in a step: its modes, as the `numbers` of the variables that hold
-    them; `title` is the block of such a step.
+    """A mode configuration: the number of the active mode by mode variable.
+
+    `block_name` is the name of the block that executes an event-free step in it.
     """
 
     block_name: str
@@ -71,17 +87,18 @@ class ModeConfiguration:
 
     @property
     def known_values(self) -> dict[str, Expr]:
-        """What the variables are."""
+        """The values of the mode variables in this configuration, as expressions."""
         return {variable: Value(number) for variable, number in self.mode_numbers}
 
 
 def add_fast_path(program: Program, fast_path: FastPathMode = "on") -> Program:
-    """Return a Program that takes a whole step at once where nothing happens in it: its own one if
-    it is continuous, else that of a model that it runs; the Program itself where `fast_path` are off.
+    """Return a Program with a fast path for a step without an event.
 
-    Modes that wait take the general path always; modes without a guard never do. A run in float64,
-    which is software on an ECU that has float32 in hardware, stays as it is: its values would be
-    on the stack.
+    For a continuous Program the fast path is that of its own step, for a sampled one that of the
+    model that it runs. With "off" the Program is returned as it is. So is a sampled float64
+    Program: on an ECU with float32 hardware its values would be on the stack. A mode whose path
+    cannot be specialised, for example one with a wait, always takes the general path; a mode
+    without a guard never does.
     """
     if fast_path == "off":
         return program
@@ -91,6 +108,7 @@ def add_fast_path(program: Program, fast_path: FastPathMode = "on") -> Program:
 
 
 def _add_step_fast_path(program: Program, fast_path: FastPathMode) -> Program:
+    """Return a continuous Program with a fast path for its step; see the module for the rule."""
     match program.blocks["step"]:
         case (Branch(started, flow, enter), *rest):
             pass
@@ -114,7 +132,7 @@ def _add_step_fast_path(program: Program, fast_path: FastPathMode) -> Program:
 
 
 def _add_run_fast_path(program: Program) -> Program:
-    """Return a Program whose runs of a model take a whole tick at once where nothing happens."""
+    """Return a sampled Program in which each run of a model has a fast path over the whole tick."""
     made = program
     for name, block in program.blocks.items():
         if _is_event_loop(block):
@@ -131,11 +149,16 @@ def _add_run_fast_path(program: Program) -> Program:
 
 
 def _fallback(event_path: str) -> Block:
+    """Return the operation that runs `event_path` if the fast path was not taken."""
     return (Branch(Unary("not", Ref(FAST_PATH_TAKEN)), (RunBlock(event_path),)),)
 
 
 def mode_configurations(program: Program, prefix: str) -> Iterator[ModeConfiguration]:
-    """Yield the modes of a chart; with regions beside it each with each, unless these are many."""
+    """Yield the mode configurations of a Program: all combinations of the modes of its regions.
+
+    Yields nothing for a Program with regions and more than MAX_CONFIGURATIONS combinations. Names
+    of blocks begin with `prefix`.
+    """
     names = program.mode_variables()
     by_region = [
         _region_configurations(program.modes_of(region), "", names[region]) for region in names
@@ -154,6 +177,7 @@ def mode_configurations(program: Program, prefix: str) -> Iterator[ModeConfigura
 def _region_configurations(
     modes: Sequence[ModeInfo], prefix: str, variable: str = MODE_VARIABLE
 ) -> list[ModeConfiguration]:
+    """Return one configuration for each mode of a region; `variable` is its mode variable."""
     return [
         ModeConfiguration(f"{prefix}_{mode.name}", ((variable, mode.number),)) for mode in modes
     ]
@@ -162,12 +186,14 @@ def _region_configurations(
 def _are_unconditional(
     paths: Mapping[ModeConfiguration, ExecutionPath], configurations: Sequence[ModeConfiguration]
 ) -> bool:
-    """Tell whether nothing has a guard, wherever it stays."""
+    """Tell whether every configuration has a path without guards."""
     return all(stay in paths and paths[stay].is_unconditional for stay in configurations)
 
 
 def _is_event_loop(block: Block) -> bool:
-    """Tell whether a block goes through a tick from event to event."""
+    """Tell whether a block executes a tick from event to event: it sets the time left, then
+    loops.
+    """
     match block:
         case (Assign(target), Loop(), *_):
             return target == TIME_LEFT
@@ -177,9 +203,10 @@ def _is_event_loop(block: Block) -> bool:
 def _run_paths(
     program: Program, flow: Block, equations: Block, configurations: Sequence[ModeConfiguration]
 ) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
-    """Yield the way through a tick without a crossing of each mode of the model.
+    """Yield for each mode of the model that is run its specialised path through a tick.
 
-    What updates does not count yet when equations are made: then these are computed again.
+    Modes whose path cannot be specialised are left out. Equations are reused only if no update
+    assigns a state, because updates run after the equations were computed.
     """
     updates = [block for name, block in program.blocks.items() if name.startswith("update")]
     is_fixed = not any(name.startswith("state.") for b in updates for name in block_writes(b))
@@ -199,7 +226,10 @@ def _step_paths(
     fast_path: FastPathMode,
     configurations: Sequence[ModeConfiguration],
 ) -> Iterator[tuple[ModeConfiguration, ExecutionPath]]:
-    """Yield the way through a step without a crossing of each stay that has one."""
+    """Yield for each mode configuration its specialised path through a step.
+
+    Configurations whose path cannot be specialised are left out.
+    """
     for configuration in configurations:
         path = ExecutionPath(program, configuration.known_values | {STARTED: Value(True)})
         mode = configuration.block_name.removeprefix(f"{FAST_PATH}_")
@@ -219,9 +249,11 @@ def _insert_fast_path(
     paths: Mapping[ModeConfiguration, ExecutionPath],
     changed: Mapping[str, Block],
 ) -> Program:
-    """Return a Program with a block `block_name` by the modes that variables tell, and changed blocks.
+    """Return a Program with the blocks of the paths, a block that dispatches to them, and
+    `changed`.
 
-    The same Program where nothing has a way, or where a block is called like that already.
+    `block_name` is the name of the dispatching block. The Program is returned as it is if there are
+    no paths, or if one of the new names is taken.
     """
     if not paths or {block_name, *(stay.block_name for stay in paths)} & set(program.blocks):
         return program
@@ -251,7 +283,9 @@ def _insert_fast_path(
 
 
 def _dispatch_on_modes(titles: Sequence[tuple[ModeNumbers, str]]) -> Block:
-    """Return what runs the block of the modes that variables tell, one variable in another."""
+    """Return nested switches over the mode variables that run the block of the active
+    configuration.
+    """
     ((numbers, title), *_) = titles
     if not numbers:
         return (RunBlock(title),)
@@ -263,8 +297,9 @@ def _dispatch_on_modes(titles: Sequence[tuple[ModeNumbers, str]]) -> Block:
 
 
 def _fast_path_block(path: ExecutionPath, sets_taken: bool) -> Block:
-    """Return what is done on a way: what comes after the guards if none of them changed; the end
-    `sets_taken` that it is done.
+    """Return the block of a path: its prologue, then its operations if no guard changed.
+
+    With `sets_taken` the block sets the flag that the fast path was taken.
     """
     last = (*path.ops, Assign(FAST_PATH_TAKEN, Value(True))) if sets_taken else tuple(path.ops)
     return (
@@ -275,7 +310,10 @@ def _fast_path_block(path: ExecutionPath, sets_taken: bool) -> Block:
 
 
 def _value_names(path: ExecutionPath) -> dict[str, str]:
-    """Return what each value is called: as its variable is, with the point of the step."""
+    """Return the new name of each value of a path: its variable and the point of the step.
+
+    Names that would occur twice get the version number of the value.
+    """
     names = {}
     for name, made in path.values.items():
         variable, point = made.variable.name, made.point
@@ -290,14 +328,14 @@ def _value_names(path: ExecutionPath) -> dict[str, str]:
 
 
 def _point_name(point: int, points: int) -> str:
-    """Return what a point of a step is called: start, middle, end, or by its number."""
+    """Return the name of a point of the step: start, middle, end, or its number."""
     if point in (1, points):
         return "start" if point == 1 else "end"
     return "middle" if points == 3 else str(point)
 
 
 def _rename_values(block: Block, path: ExecutionPath) -> Block:
-    """Return a block whose values are called by their names."""
+    """Return a block in which the values of a path have the names of `_value_names`."""
     names = _value_names(path)
 
     def called(expr: Expr) -> Expr:
@@ -319,12 +357,15 @@ def _rename_values(block: Block, path: ExecutionPath) -> Block:
 
 
 def _remove_dead_assignments(block: Block) -> Block:
-    """Leave out the values of a step that nothing reads."""
+    """Return a block without assignments to work variables that no later operation reads."""
     return tuple(reversed(list(_live_operations(block, set()))))
 
 
 def _live_operations(block: Block, live_names: set[str]) -> Iterator[Op]:
-    """Yield, from the last to the first, the operations of a block whose values are read."""
+    """Yield, from the last to the first, the operations of a block whose values are read.
+
+    `live_names` holds the names that later operations read; it is extended in place.
+    """
     for op in reversed(block):
         kept = op
         if isinstance(op, Branch):

@@ -1,7 +1,8 @@
-"""Frame: which functions of C have a frame of their own on the stack, while they run only.
+"""Inline policy: selects the functions of C that are not inlined, to limit the stack (rule C23).
 
-Where an ECU computes in software, what a function computes is on its stack. A compiler puts
-functions that are called once into each other, and the frame of all is open while any of them runs.
+Where an ECU computes in software, the intermediate values of a function are on the stack. A
+compiler inlines functions that are called once, and the frame of the merged function is allocated
+as long as any part of it runs.
 """
 
 from __future__ import annotations
@@ -15,19 +16,29 @@ from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import walk_ops
 
 ARITHMETIC = ("+", "-", "*", "/")
+"""Operators whose floating-point operations are counted."""
 MIN_OPERATIONS = 3
-"""Operations from which on a call is little beside what is computed in software."""
+"""Number of floating-point operations from which on a call costs little in comparison."""
 ALWAYS_NOINLINE = ("hold", "rows_", "columns_")
-"""Blocks that are apart in any number type: a covariance is more than there are registers."""
+"""Prefixes of blocks that are never inlined, in any number type: a covariance does not fit into
+
+registers.
+"""
 
 NOINLINE_BESIDE = frozenset({"latch"})
-"""Blocks that are apart where one of those is: what holds the inputs compares in software, too; put
-into the step itself, what it saves of registers would lie below a covariance (decision 0026)."""
+"""Blocks that are not inlined if one of ALWAYS_NOINLINE exists. The comparison of inputs with their
+
+ranges is computed in software too. Inlined into the step, its saved registers would add to the
+stack below a covariance (decision 0026).
+"""
 
 
 def select_noinline_blocks(program: Program) -> frozenset[str]:
-    """Return the blocks of a sampled automaton that compute much; not those that one of these
-    alone runs, once. In float32 nearly all is in registers (rule C23).
+    """Return the names of the blocks whose functions are not inlined (rule C23).
+
+    A continuous automaton has none; in float32 only blocks of ALWAYS_NOINLINE are returned. In
+    float64 these are blocks with at least MIN_OPERATIONS floating-point operations, except those
+    with exactly one call site, in a block of the same kind.
     """
     if program.period is None:
         return frozenset()
@@ -48,7 +59,7 @@ def select_noinline_blocks(program: Program) -> frozenset[str]:
 
 
 def _call_sites(block: Block) -> Iterator[str]:
-    """Yield the blocks that a block runs: twice what its loops run."""
+    """Yield the name of each block that a block runs; a call inside a loop counts twice."""
     for op in walk_ops(block):
         if isinstance(op, RunBlock):
             yield op.block
@@ -57,6 +68,9 @@ def _call_sites(block: Block) -> Iterator[str]:
 
 
 def _count_float_operations(program: Program, name: str) -> int:
+    """Return the number of floating-point operations of one block, without the blocks that it
+    runs.
+    """
     return sum(
         isinstance(part, Binary) and part.operator in ARITHMETIC and not _is_integer(part)
         for op in walk_ops(program.blocks[name])
@@ -66,6 +80,7 @@ def _count_float_operations(program: Program, name: str) -> int:
 
 
 def _is_integer(expr: Expr) -> bool:
+    """Tell whether an arithmetic expression is one of whole numbers."""
     match expr:
         case Binary(_, left, right):
             return _is_integer(left) or _is_integer(right)

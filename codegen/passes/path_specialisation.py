@@ -1,4 +1,7 @@
-"""Way: one way through the blocks of a Program, with what is known on it."""
+"""Path specialisation: follows one execution path of a Program and folds what is known on it.
+
+`fast_path.py` uses it to obtain the straight-line block of an event-free step.
+"""
 
 from __future__ import annotations
 
@@ -30,28 +33,30 @@ from language.ir.traversal import block_reads, block_writes, expr_names, negate_
 from language.numerics.evaluate import evaluate
 
 WORK, TIME_LEFT, CROSSED = "work.", "work.left", "work.crossed"
+"""The prefix of work variables, the time left in a step, and the flag of a crossing."""
 EVALUATION_BLOCKS, POINT_STATE_PREFIX = ("rates_", "guards_"), "work.at_"
-"""Blocks that look at a point of the step, and how the states there are called."""
+"""Prefixes of blocks that are evaluated at a point of the step, and of the states at that point."""
 
 
 @dataclass(frozen=True)
 class PathValue:
-    """One value of a `variable` of the Program, at a point of the step."""
+    """A value of a variable of the Program at a point of the step."""
 
     variable: Variable
     point: int
 
 
 class NotSpecialisable(Exception):
-    """What happens hangs on more than the guards of the mode."""
+    """The control flow of a path depends on more than the guards of the mode."""
 
 
 class ExecutionPath:
-    """A way without a crossing: `known` are the values of variables, `ops` what is done on it.
+    """A path through a step without a crossing.
 
-    What comes before the guards is in `first`; `quiet` is whether none of these changed. In `made`
-    are the variables of its own: each is one value of a variable of the Program, at a `point` of
-    the step; rates and guards are looked at in each of these, from 1 to `points`.
+    `known` holds the known values of variables as expressions, and `ops` the operations on the
+    path. `prologue` holds the operations before the guards, and `is_event_free` the condition that
+    no guard changed. `values` maps each new variable to the variable of the Program and the point
+    of the step that it stands for. Rates and guards are evaluated at the points 1 to `points`.
     """
 
     def __init__(self, program: Program, known: dict[str, Expr]) -> None:
@@ -71,12 +76,15 @@ class ExecutionPath:
 
     @property
     def is_unconditional(self) -> bool:
-        """Tell whether there are no guards."""
+        """Tell whether the path has no guards."""
         return self.is_event_free == Value(True)
 
     def reuse_equations(self, equations: Block, constant_groups: tuple[str, ...]) -> None:
-        """Keep what equations were when the step before ended, if all that they read `constant_groups` until
-        this one begins: a page may turn between them.
+        """Record the values of equations that are still valid from the end of the step before.
+
+        An equation is reused if it reads only names in `constant_groups`, other reused equations
+        and functions. A calibration page may change between two steps, so its parameters are not
+        among them.
         """
         reused = set[str]()
         for op in equations:
@@ -92,7 +100,11 @@ class ExecutionPath:
                         self._name_by_number.setdefault(number, op.target)
 
     def follow(self, block: Block) -> None:
-        """Follow the operations of a block. Raises NotPlain."""
+        """Append the operations of a block to the path, with known values folded.
+
+        Raises NotSpecialisable if a switch, branch, loop or other operation depends on unknown
+        values.
+        """
         for op in block:
             match op:
                 case Assign(target, value, key):
@@ -113,7 +125,11 @@ class ExecutionPath:
                     raise NotSpecialisable
 
     def follow_step_end(self) -> None:
-        """Follow the end of a step: equations, unless what happened settles first."""
+        """Append the equations at the end of a step; transitions run before them if an event
+        occurred.
+
+        If the equations cannot be specialised, the block is run as it is.
+        """
         event, begin = self._resolve(Ref("work.event")), len(self.ops)
         try:
             self.follow(self.program.blocks["equations"])
@@ -124,6 +140,11 @@ class ExecutionPath:
             self.ops[begin:] = [Branch(event, (RunBlock("settle"), RunBlock("equations")), now)]
 
     def _assign(self, target: str, value: Expr, key: str) -> None:
+        """Append an assignment and record the value of its target.
+
+        A work variable gets a new name for each value. A value that was computed before is replaced
+        by its name. An assignment to the flag of a crossing ends the prologue.
+        """
         if self._has_evaluated and target.startswith(POINT_STATE_PREFIX):
             self._has_evaluated = False
             self.points += 1
@@ -150,8 +171,10 @@ class ExecutionPath:
             self.known[target] = value
 
     def _branch(self, condition: Expr, then: Block, other: Block) -> None:
-        """Follow the branch that is taken; where that is not known both have to do the same, or set
-        what stays when the step ends.
+        """Follow the taken arm of a branch.
+
+        If the condition is unknown, a branch that assigns only persistent variables is kept.
+        Otherwise both arms must have the same effect, or NotSpecialisable is raised.
         """
         if isinstance(condition, Value):
             return self.follow(then if condition.value else other)
@@ -169,7 +192,10 @@ class ExecutionPath:
             raise NotSpecialisable
 
     def _loop(self, count: int, body: Block) -> None:
-        """Follow each turn of a loop until one does nothing, and so all after it."""
+        """Follow the iterations of a loop until one has no effect.
+
+        Raises NotSpecialisable if all `count` iterations have an effect.
+        """
         for _ in range(count):
             before, done = dict(self.known), len(self.ops)
             self.follow(body)
@@ -178,7 +204,10 @@ class ExecutionPath:
         raise NotSpecialisable
 
     def _resolve(self, expr: Expr) -> Expr:
-        """Return an expression of what is known. Raises NotPlain for a value that is not."""
+        """Return an expression with known values inserted and folded.
+
+        Raises NotSpecialisable if it reads a work variable whose value is unknown.
+        """
         if isinstance(expr, Ref):
             if expr.name not in self.known and expr.name.startswith(WORK):
                 raise NotSpecialisable
@@ -186,14 +215,16 @@ class ExecutionPath:
         return _simplify(map_operands(expr, self._resolve), self.program)
 
     def _fold_constants(self, expr: Expr) -> Expr:
-        """Return an expression with the numbers that are known."""
+        """Return an expression with known literals inserted and folded; other names stay."""
         if isinstance(expr, Ref):
             known = self.known.get(expr.name)
             return known if isinstance(known, Value) else expr
         return _simplify(map_operands(expr, self._fold_constants), self.program)
 
     def _invalidate(self, name: str) -> None:
-        """A variable is another value from here."""
+        """Forget what is known of a variable, and of variables that equal it: its value changes
+        here.
+        """
         self._versions[name] += 1
         self._number_by_name.pop(name, None)
         self._name_by_number = {
@@ -205,13 +236,19 @@ class ExecutionPath:
             del self.known[other]
 
     def _record_name(self, name: str, number: int | None) -> None:
+        """Record that a name holds the value with a number; the first name of a value is used
+        for it.
+        """
         self._number_by_name[name] = number
         if number is not None:
             self._name_by_number.setdefault(number, name)
 
     def _value_number(self, value: Expr) -> int | None:
-        """Return the number of a value; equal operations on equal numbers have equal ones, as in
-        language/passes/common_subexpressions.py, and a name has that of its value.
+        """Return the value number of an expression; None if it has none (a choice or an array
+        element).
+
+        Equal operations on equal numbers have equal numbers, as in
+        language/passes/common_subexpressions.py. A name has the number of its value.
         """
         key: Hashable = None
         match value:
@@ -233,8 +270,8 @@ class ExecutionPath:
 
 
 def _writes_only_persistent(block: Block) -> bool:
-    """Tell whether all that a block does is to set what stays when the step ends, from other
-    values.
+    """Tell whether a block only assigns variables that outlive the step and that it does not
+    read.
     """
     writes = set(block_writes(block))
     is_plain = all(isinstance(op, Assign | FaultBit) for op in block)
@@ -242,7 +279,11 @@ def _writes_only_persistent(block: Block) -> bool:
 
 
 def _simplify(expr: Expr, program: Program) -> Expr:
-    """Return an expression whose parts are simple as a simple one."""
+    """Return an expression folded: choices, `and` and `or` with a known condition, operations on
+    literals.
+
+    The operands must be simple already.
+    """
     match expr:
         case Select(Value(condition), then, other):
             return then if condition else other

@@ -1,7 +1,13 @@
-"""Gate: inputs within their ranges are taken all at once in C, by few comparisons; bits stay.
+"""Range check merging: a pass that checks all inputs of a step with one condition (rule C17).
 
-A Program holds its inputs in their ranges one by one (rule 18). Nothing that it does with one reads
-another, so where all of them are inside, which is nearly always, one branch takes them.
+  before: latch = if a >= 0 and a <= 5 { latched.a = a } else { ... }; if b - b >= 0 { ... } ...
+  after:  latch = if within(a, 0, 5) and abs(b) <= MAX { latched.a = a; latched.b = b }
+                  else latch_each
+          latch_each = <latch as it was before>
+
+A Program saturates its inputs one by one (rule 18), and these operations are independent of each
+other. In nearly all steps every input is within its range, so one branch takes them all. The bits
+of all results stay the same.
 """
 
 from __future__ import annotations
@@ -28,17 +34,19 @@ from language.ir.program import Program
 from language.ir.rewrite_ops import map_expressions
 
 LATCH = "latch"
+"""The block that takes the inputs of a step."""
 WITHIN = "within"
-"""A function of C alone."""
+"""The function `low <= x <= high`, which exists in C only."""
 LATCH_EACH = "latch_each"
-"""What takes the inputs one by one."""
+"""The block that takes the inputs one by one."""
 
 
 def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
-    """Return a Program that takes its inputs at once where all are within their ranges (rule C17).
+    """Return a Program that takes all inputs at once if all are within their ranges (rule C17).
 
-    `by_magnitude` compares the size of x with one end of a range, which takes one branch; tools that
-    follow ranges through code know x better without it.
+    With `by_magnitude` a range check becomes one comparison of a magnitude or of bits. Without it
+    the bounds stay visible to tools that propagate ranges through code. The block `latch` is merged
+    if it has at least two branches, each of which assigns one variable.
     """
     largest = MAX_FINITE[program.number_type]
     words = frozenset(variable.name for variable in program.variables if variable.values)
@@ -64,9 +72,10 @@ def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
 
 
 def fold_range_check(expr: Expr) -> Expr:
-    """Return `low <= x <= high` as one comparison where 0 is between; with a NaN both are false.
+    """Return `low <= x <= high` as one comparison if 0 is between the ends; also below `not`.
 
-    |x| <= high where the ends are equal, else `within`, which compares bits.
+    It becomes |x| <= high if the ends have equal magnitude, else `within`, which compares bits.
+    Both are false for a NaN, as before. Any other expression is returned as it is.
     """
     match expr:
         case Binary(
@@ -81,7 +90,7 @@ def fold_range_check(expr: Expr) -> Expr:
 
 
 def _finite_as_range(expr: Expr, largest: float) -> Expr:
-    """Return `x - x >= 0`, true for what is finite, as a range that ends at the largest number."""
+    """Return `x - x >= 0`, the test for a finite number, as `-largest <= x and x <= largest`."""
     match expr:
         case Compare(">=", Binary("-", value, same), Value(0.0)) if value == same:
             low, high = Value(-largest), Value(largest)
@@ -90,7 +99,10 @@ def _finite_as_range(expr: Expr, largest: float) -> Expr:
 
 
 def _drop_unsigned_bound(expr: Expr, words: frozenset[str]) -> Expr:
-    """Return the range of a word of an enumeration without `>= 0`: in C it is unsigned."""
+    """Return the range check of an enumeration without `>= 0`, because it is unsigned in C.
+
+    `words` holds the names of variables with enumeration values.
+    """
     match expr:
         case Binary("and", Compare(">=", Ref(name), Value(0)), rest) if name in words:
             return rest
@@ -98,6 +110,7 @@ def _drop_unsigned_bound(expr: Expr, words: frozenset[str]) -> Expr:
 
 
 def _conjuncts(condition: Expr) -> Iterator[Expr]:
+    """Yield the operands of nested `and` from left to right."""
     match condition:
         case Binary("and", left, right):
             yield from (*_conjuncts(left), *_conjuncts(right))
@@ -106,8 +119,10 @@ def _conjuncts(condition: Expr) -> Iterator[Expr]:
 
 
 def _conjunction(left: Expr, right: Expr) -> Expr:
+    """Return the expression `left and right`."""
     return Binary("and", left, right)
 
 
 def _is_single_assignment(block: Block) -> bool:
+    """Tell whether a block consists of one assignment."""
     return len(block) == 1 and isinstance(block[0], Assign)

@@ -1,4 +1,8 @@
-"""Marks: a Program that notes which signals left their range, for who reports them."""
+"""Range violation flags: a pass that records which signals left their range, for simulations.
+
+before: faults[f] = true (signal s)
+after:  faults[f] = true (signal s); memory.left_k = true
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,23 @@ from language.ir.program import Program, Variable
 from language.ir.traversal import walk_ops
 
 RANGE_MARK = "memory.left_{}"
+"""The name of the flag of a signal; `{}` is the index in `ranged_signals`."""
 
 
 def ranged_signals(program: Program) -> tuple[str, ...]:
-    """Return the signals whose leaving of a range is reported."""
+    """Return the signals with a fault bit for their range, each once, in the order of the
+    operations.
+    """
     ops = (op for block in program.blocks.values() for op in walk_ops(block))
     found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
     return tuple(dict.fromkeys(signal for signal in found if signal))
 
 
 def add_range_marks(program: Program) -> Program:
-    """Return a Program that notes which signals left their range."""
+    """Return a Program with a truth variable for each signal that left its range; see the module.
+
+    A Program without such signals is returned as it is.
+    """
     signals = ranged_signals(program)
     if not signals:
         return program
@@ -31,6 +41,7 @@ def add_range_marks(program: Program) -> Program:
 
 
 def _insert_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
+    """Yield the operations of a block with the flags set, also inside nested blocks."""
     for op in block:
         match op:
             case Branch(condition, then, other):

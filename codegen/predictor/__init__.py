@@ -1,1 +1,3 @@
-"""Compiled one-step predictors: a model that follows recordings, with Kalman gains."""
+"""Compiled one-step predictors: a model that follows recordings and is corrected by Kalman
+gains.
+"""

@@ -1,1 +1,1 @@
-"""Proofs: what tools of others say of the C of a Program."""
+"""Checks of generated C by external tools: compilers, cppcheck, sanitizers and Frama-C."""

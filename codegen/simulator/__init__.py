@@ -1,1 +1,1 @@
-"""Compiled simulations of whole systems, and of a Program block by block."""
+"""Compiled simulations of whole systems, and compiled execution of a Program block by block."""

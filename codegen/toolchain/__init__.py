@@ -1,1 +1,1 @@
-"""External tools: the C compiler, target machines, templates, caches of built programs."""
+"""External tools: the C compiler, target machines, templates, caches of compiled programs."""

@@ -1,1 +1,1 @@
-"""Descriptions of generated C for measurement and calibration tools (ASAM)."""
+"""A2L (ASAM MCD-2 MC): descriptions of generated C for measurement and calibration tools."""

@@ -1,4 +1,6 @@
-"""Conversion: how a raw number of the C is shown by a tool: with its unit, by a name, in ms."""
+"""Conversions (A2L COMPU_METHOD): how a tool displays a raw number of the C: unit, factor or
+names.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from language.ir.program import TICK_UNIT, Constant, Program, Variable, fired_va
 
 @dataclass(frozen=True)
 class Conversion:
-    """A unit alone (COMPU_METHOD IDENTICAL), with a `factor` (LINEAR), or `names` of numbers
+    """A conversion from a raw number to its display.
+
+    It has a unit alone (COMPU_METHOD IDENTICAL), a `factor` (LINEAR), or `names` of numbers
     (TAB_VERB).
     """
 
@@ -21,13 +25,19 @@ class Conversion:
 
 
 TRUTH = Conversion(names=((0, "false"), (1, "true")))
+"""The conversion of a truth value."""
 COUNT = Conversion()
+"""The conversion of a number without a unit."""
 MS_PER_SECOND = 1000
-"""A counter of ticks is shown in ms."""
+"""Milliseconds in a second; counters of ticks are displayed in ms."""
 
 
 def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
-    """Return how a variable or constant of a Program is shown."""
+    """Return the conversion of a variable or constant.
+
+    Enumerations, truth values, modes and transitions have names; a real has its unit; a counter of
+    ticks is displayed in ms if the Program has a period. All others are COUNT.
+    """
     if item.values:
         return Conversion(names=tuple(enumerate(item.values)))
     if item.type == "real":
@@ -41,7 +51,9 @@ def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
 
 
 def _enumerated_variables(program: Program) -> dict[str, Conversion]:
-    """Return the variables that hold numbers of modes and transitions."""
+    """Return the conversions of the variables that hold numbers of modes and transitions, by
+    name.
+    """
     conversions = {
         variable: Conversion(names=tuple((m.number, m.name) for m in program.modes_of(region)))
         for region, variable in program.mode_variables().items()
@@ -56,6 +68,6 @@ def _enumerated_variables(program: Program) -> dict[str, Conversion]:
 
 
 def _disambiguate(names: list[tuple[int, str]]) -> list[tuple[int, str]]:
-    """Return names of numbers, those that several have with the number."""
+    """Return the named numbers; a name that occurs more than once gets its number appended."""
     count = Counter(name for _, name in names)
     return [(n, f"{name} {n}" if count[name] > 1 else name) for n, name in names]

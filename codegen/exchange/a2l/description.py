@@ -1,4 +1,7 @@
-"""Description: what a tool may measure and calibrate in the C of a Program, and how it is shown."""
+"""Module description: the measurements and characteristics of a Program's C for A2L.
+
+`writer.py` prints a `ModuleDescription` as an A2L file.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from language.ir.printer import digest
 from language.ir.program import Constant, Program, Variable
 
 INSTANCE_STRUCT, PAGE_STRUCT = "Self", "Cal"
-"""The structures of a module that a tool reads and writes, as the end of their C type."""
+"""Suffixes of the C types of the instance and of the calibration page."""
 TYPE_LIMITS: Mapping[str, tuple[float, float]] = {
     "double": (-MAX_FINITE["float64"], MAX_FINITE["float64"]),
     "float": (-MAX_FINITE["float32"], MAX_FINITE["float32"]),
@@ -26,14 +29,20 @@ TYPE_LIMITS: Mapping[str, tuple[float, float]] = {
     "int32_t": (-(2**31), 2**31 - 1),
     "uint32_t": (0, 2**32 - 1),
 }
+"""The smallest and largest value of each C type."""
 TOOL_GROUP = {"latched": "input", "timer": "memory"}
-"""Where a tool finds variables that are not grouped as they are named."""
+"""The group in a tool of variables whose own group has another name."""
 POINTER_PREFIX = re.compile(r"^(self->|cal->)")
+"""The pointer before a member of the instance or of the page."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A value in the instance: `path` is its place in `X_Self`; `bit` one of a word, -1: all."""
+    """A value in the instance.
+
+    `path` is its member path in `X_Self`. `size` is the length of an array, 0 for a scalar. `bit`
+    is the index of a bit of a word, -1 for the whole word.
+    """
 
     name: str
     about: str
@@ -48,7 +57,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Axis:
-    """The fixed points of one axis of a table."""
+    """An axis of a table with its fixed points."""
 
     conversion: Conversion
     points: tuple[float, ...]
@@ -56,7 +65,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Characteristic:
-    """A value, a curve or a map on the page: `path` is its place in `X_Cal`."""
+    """A value, curve or map on the calibration page; `path` is its member path in `X_Cal`."""
 
     name: str
     about: str
@@ -70,7 +79,7 @@ class Characteristic:
 
 @dataclass(frozen=True)
 class ModuleDescription:
-    """All that a tool may see of one automaton."""
+    """The measurements and characteristics of the C of one Program."""
 
     name: str
     digest: str
@@ -80,7 +89,7 @@ class ModuleDescription:
 
     @property
     def groups(self) -> dict[str, list[Measurement | Characteristic]]:
-        """What belongs together, in order."""
+        """The characteristics and measurements by group, in their order."""
         by_group: dict[str, list[Measurement | Characteristic]] = {}
         every: list[Measurement | Characteristic] = [*self.characteristics, *self.measurements]
         for one in every:
@@ -89,7 +98,7 @@ class ModuleDescription:
 
 
 def describe_module(program: Program) -> ModuleDescription:
-    """Return what a tool may measure and calibrate in the C of a Program."""
+    """Return the measurements and characteristics of the C of a Program."""
     step_program = restrict_to_step(program)
     c_names = CNames(step_program, solved_prefix="cal->solved.")
     measured = [
@@ -118,7 +127,7 @@ def describe_module(program: Program) -> ModuleDescription:
 
 
 def _measurement(variable: Variable, program: Program, c_names: CNames) -> Measurement | None:
-    """Return a variable that the instance keeps; None for others."""
+    """Return the measurement of a variable; None for a variable that is not in the instance."""
     text = c_names(variable.name)
     if not text.startswith("self->"):
         return None
@@ -138,6 +147,7 @@ def _measurement(variable: Variable, program: Program, c_names: CNames) -> Measu
 
 
 def _derived_measurement(constant: Constant, program: Program, c_names: CNames) -> Measurement:
+    """Return the measurement of a derived constant, which is in the instance."""
     path = POINTER_PREFIX.sub("", c_names(constant.name))
     kind = c_type(constant, program.number_type)
     conversion = conversion_of(constant, program)
@@ -154,7 +164,7 @@ def _derived_measurement(constant: Constant, program: Program, c_names: CNames) 
 
 
 def _fault_measurements(program: Program) -> list[Measurement]:
-    """Return the bits of the fault word, each by its name."""
+    """Return one measurement for each bit of the fault word."""
     name, kind = f"{program.name}.memory.faults", "uint32_t"
     return [
         Measurement(
@@ -165,6 +175,9 @@ def _fault_measurements(program: Program) -> list[Measurement]:
 
 
 def _characteristic(constant: Constant, program: Program, c_names: CNames) -> Characteristic:
+    """Return the characteristic of a tunable parameter or solved number, with the axes of a
+    table.
+    """
     path = POINTER_PREFIX.sub("", c_names(constant.name))
     kind = c_type(constant, program.number_type)
     table = constant.name.partition(".")[2]

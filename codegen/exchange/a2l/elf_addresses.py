@@ -1,4 +1,6 @@
-"""Image: where the structures of a module lie in a linked program (ELF with DWARF)."""
+"""ELF addresses: the locations of a module's structures in a linked program, from its DWARF
+data.
+"""
 
 from __future__ import annotations
 
@@ -14,26 +16,28 @@ if TYPE_CHECKING:
     from elftools.elf.elffile import ELFFile
 
 MAX_ARRAY_ELEMENTS = 64
-"""Elements of an array of instances that are looked at."""
+"""Maximum number of elements of an array of instances that are listed."""
 TRANSPARENT_TAGS = (
     "DW_TAG_const_type",
     "DW_TAG_volatile_type",
     "DW_TAG_typedef",
     "DW_TAG_restrict_type",
 )
+"""DWARF tags of types that only qualify or rename another type."""
 DW_OP_ADDR = 0x03
-"""DW_OP_addr: an address follows."""
+"""The DWARF operation DW_OP_addr, which an address follows."""
 
 
 class ImageError(ValueError):
-    """A file is no linked program with debug information, or has not what is asked for."""
+    """A file is not a linked program with debug information, or lacks the requested structure."""
 
 
 @dataclass(frozen=True)
 class StructLocation:
-    """A structure in memory: the `symbol` that names it, like `app.selves[1]`, its address, and the
-    offsets and sizes [bytes] of its members by path, like `state.w_em`. One that `is_fixed` nobody
-    writes to.
+    """A structure in memory.
+
+    `symbol` names it, like `app.selves[1]`. `members` gives offset and size [bytes] of each member
+    by its path, like `state.w_em`. `is_const` is true for a structure that is never written.
     """
 
     symbol: str
@@ -44,7 +48,11 @@ class StructLocation:
 
 @dataclass(frozen=True)
 class Image:
-    """A linked program: `places` of structures by their C type, and addresses of symbols."""
+    """A linked program.
+
+    `structures` are the locations of structures by C type, `symbols` the addresses of symbols,
+    `strings` the texts at the requested symbols.
+    """
 
     path: Path
     structures: Mapping[str, tuple[StructLocation, ...]]
@@ -55,7 +63,11 @@ class Image:
     def select_structure(
         self, kind: str, candidates: Sequence[StructLocation], symbol: str | None
     ) -> StructLocation:
-        """Return the one place that was found, or the one with a symbol. Raises ImageError."""
+        """Return the only candidate, or the one named `symbol` if that is not None.
+
+        `kind` is the C type for messages. Raises ImageError if there is no such candidate or more
+        than one.
+        """
         chosen = [place for place in candidates if symbol in (None, place.symbol)]
         if len(chosen) == 1:
             return chosen[0]
@@ -68,9 +80,10 @@ class Image:
 
 
 def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ...] = ()) -> Image:
-    """Read where structures of some types lie in a linked program, and the texts at symbols.
+    """Read a linked program: the locations of structures of the given C types, and texts at
+    symbols.
 
-    Raises ImageError, ToolMissing.
+    Raises ImageError; MissingToolError if pyelftools is missing.
     """
     try:
         from elftools.common.exceptions import ELFError
@@ -99,6 +112,7 @@ def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ..
 
 
 def _find_structures(elf: ELFFile, types: tuple[str, ...]) -> dict[str, tuple[StructLocation, ...]]:
+    """Return the locations of structures of the given types, also those inside other variables."""
     by_type: dict[str, dict[str, StructLocation]] = {name: {} for name in types}
     for unit in elf.get_dwarf_info().iter_CUs():
         for die in unit.iter_DIEs():
@@ -119,7 +133,10 @@ def _find_structures(elf: ELFFile, types: tuple[str, ...]) -> dict[str, tuple[St
 def _nested_structures(
     kind: DIE | None, symbol: str, address: int, types: tuple[str, ...]
 ) -> Iterator[tuple[str, str, int, DIE]]:
-    """Yield what of some types is in a variable: type, symbol, address, its structure."""
+    """Yield the structures of the given types inside a variable: type name, symbol, address, DIE.
+
+    Members of structures and up to MAX_ARRAY_ELEMENTS elements of arrays are searched.
+    """
     while kind is not None and kind.tag in TRANSPARENT_TAGS:
         if kind.tag == "DW_TAG_typedef" and _name_of(kind) in types:
             structure = _strip_qualifiers(kind)
@@ -144,7 +161,9 @@ def _nested_structures(
 
 
 def _members(structure: DIE, above: str, start: int) -> Iterator[tuple[str, int, int]]:
-    """Yield the path, offset and size of each member that is no structure."""
+    """Yield path, offset and size [bytes] of each member of a structure that is not a structure
+    itself.
+    """
     for member in _struct_fields(structure):
         path, place = f"{above}{_name_of(member)}", start + _offset_of(member)
         kind = _strip_qualifiers(_type_of(member))
@@ -155,11 +174,12 @@ def _members(structure: DIE, above: str, start: int) -> Iterator[tuple[str, int,
 
 
 def _struct_fields(structure: DIE) -> Iterator[DIE]:
+    """Return an iterator over the members of a structure."""
     return (child for child in structure.iter_children() if child.tag == "DW_TAG_member")
 
 
 def _strip_qualifiers(kind: DIE | None) -> DIE | None:
-    """Return a type without its qualifiers and other names."""
+    """Return a type without qualifiers and typedefs; None for `void`."""
     while kind is not None and kind.tag in TRANSPARENT_TAGS:
         kind = _type_of(kind)
     return kind
@@ -175,7 +195,7 @@ def _is_const(kind: DIE | None) -> bool:
 
 
 def _byte_size(kind: DIE | None) -> int:
-    """Return the bytes of a type, 0 where it does not say."""
+    """Return the size of a type [bytes]; 0 if it is not known."""
     kind = _strip_qualifiers(kind)
     if kind is None:
         return 0
@@ -186,6 +206,7 @@ def _byte_size(kind: DIE | None) -> int:
 
 
 def _element_count(array: DIE) -> int:
+    """Return the number of elements of an array over all dimensions."""
     total = 1
     for child in array.iter_children():
         if child.tag == "DW_TAG_subrange_type":
@@ -195,12 +216,15 @@ def _element_count(array: DIE) -> int:
 
 
 def _type_of(die: DIE) -> DIE | None:
+    """Return the type of a variable, member or type; None if it has none."""
     has_one = "DW_AT_type" in die.attributes
     return die.get_DIE_from_attribute("DW_AT_type") if has_one else None
 
 
 def _declaration_of(die: DIE) -> DIE:
-    """Return the declaration that a definition completes, where it does."""
+    """Return the declaration that a definition without a type refers to, else the definition
+    itself.
+    """
     for name in ("DW_AT_specification", "DW_AT_abstract_origin"):
         if name in die.attributes and "DW_AT_type" not in die.attributes:
             return die.get_DIE_from_attribute(name)
@@ -208,17 +232,21 @@ def _declaration_of(die: DIE) -> DIE:
 
 
 def _name_of(die: DIE) -> str:
+    """Return the name of a DIE; an empty text if it has none."""
     name = die.attributes.get("DW_AT_name")
     return name.value.decode() if name else ""
 
 
 def _offset_of(member: DIE) -> int:
+    """Return the offset of a member [bytes]."""
     at = member.attributes.get("DW_AT_data_member_location")
     return int(at.value) if at else 0
 
 
 def _address_of(die: DIE, elf: ELFFile) -> int | None:
-    """Return where a variable lies, None for all else."""
+    """Return the address of a variable; None if it has no fixed address, or if `die` is no
+    variable.
+    """
     at = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
     if (
         at is None
@@ -230,6 +258,7 @@ def _address_of(die: DIE, elf: ELFFile) -> int | None:
 
 
 def _symbols(elf: ELFFile) -> dict[str, int]:
+    """Return the addresses of all symbols by name."""
     from elftools.elf.sections import SymbolTableSection
 
     tables = [one for one in elf.iter_sections() if isinstance(one, SymbolTableSection)]
@@ -237,7 +266,10 @@ def _symbols(elf: ELFFile) -> dict[str, int]:
 
 
 def _string_at(elf: ELFFile, address: int) -> str:
-    """Return the text that begins at an address, as far as it is printable."""
+    """Return the zero-terminated ASCII text at an address, at most 256 characters.
+
+    Returns an empty text if the address is in no loaded section.
+    """
     for section in elf.iter_sections():
         start = section["sh_addr"]
         if section["sh_type"] == "SHT_PROGBITS" and start <= address < start + section["sh_size"]:

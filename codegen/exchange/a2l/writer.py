@@ -1,4 +1,7 @@
-"""A2L: what a tool may measure and calibrate, as ASAM MCD-2 MC 1.7.1; addresses from an ELF."""
+"""A2L writer: prints the description of a Program's C as ASAM MCD-2 MC 1.7.1.
+
+Addresses come from a linked program (ELF); without one the file refers to symbols.
+"""
 
 from __future__ import annotations
 
@@ -34,33 +37,39 @@ A2L_TYPES: Mapping[str, tuple[str, int]] = {
     "int32_t": ("SLONG", 4),
     "uint32_t": ("ULONG", 4),
 }
-"""The name of a C type there, and its bytes."""
+"""The A2L data type of a C type, and its size [bytes]."""
 CHARACTERISTIC_KINDS = ("VALUE", "CURVE", "MAP")
-"""By how many axes a characteristic has."""
+"""The A2L kind of a characteristic by its number of axes."""
 REFERENCES = ((Characteristic, "REF_CHARACTERISTIC"), (Measurement, "REF_MEASUREMENT"))
+"""The A2L keywords that refer to members of a group."""
 DISPLAY_FORMAT: Mapping[NumberType, str] = {"float64": "%12.6", "float32": "%10.4"}
+"""The display format of a real by its number type."""
 
 
 @dataclass(frozen=True)
 class ModuleLocation:
-    """Where the page and one instance lie; `instance` is None where a program has not told."""
+    """The locations of the calibration page and of one instance in a linked program.
+
+    `instance` is None if the program contains no instance as a variable.
+    """
 
     image: Image
     page: StructLocation
     instance: StructLocation | None
 
     def structure_of(self, item: Measurement | Characteristic) -> StructLocation | None:
-        """Return the structure that something is in."""
+        """Return the structure that contains an item: the page or the instance."""
         return self.page if isinstance(item, Characteristic) else self.instance
 
 
 def locate_module(
     program: Program, elf: Path, page: str | None = None, instance: str | None = None
 ) -> ModuleLocation:
-    """Find a page and an instance of a Program's C in a linked program.
+    """Return the locations of a page and an instance of a Program's C in a linked program.
 
-    `page` and `instance` name them where there are several. Raises ImageError: also for code of
-    another Program; ToolMissing.
+    `page` and `instance` are symbols that select one of several. The default page `X_default_cal`
+    is preferred. Raises ImageError, also if the ELF was built from another Program;
+    MissingToolError.
     """
     description = describe_module(program)
     types = f"{description.name}_{PAGE_STRUCT}", f"{description.name}_{INSTANCE_STRUCT}"
@@ -85,9 +94,10 @@ def locate_module(
 
 
 def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
-    """Return the A2L of a Program's C. Raises ImageError where the ELF has another layout.
+    """Return the A2L file of a Program's C as text.
 
-    Without a place characteristics link to symbols, and measurements have no address.
+    Without a location, characteristics refer to symbols and measurements have no address. Raises
+    ImageError if the layout of the structures in the ELF differs.
     """
     description = describe_module(program)
     methods = _conversion_methods(description, program.number_type)
@@ -131,7 +141,9 @@ def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
 
 
 def sanitise_string(text: str) -> str:
-    """Return a text as it can stand between quotes."""
+    """Return a text as one line of ASCII without backslashes and double quotes, for a string in
+    A2L.
+    """
     plain = text.encode("ascii", "replace").decode()
     return re.sub(r"\s+", " ", plain.replace("\\", "/").replace('"', "'")).strip()
 
@@ -142,7 +154,9 @@ def _common_context(
     program: Program,
     location: ModuleLocation | None,
 ) -> dict[str, Any]:
-    """Return what both have: name, type, limits, address."""
+    """Return the context that measurements and characteristics share: name, type, limits,
+    address.
+    """
     place = location.structure_of(item) if location else None
     page = f"{program.name}_default_cal.{item.path}" if isinstance(item, Characteristic) else ""
     factor = item.conversion.factor
@@ -169,7 +183,10 @@ def _common_context(
 
 
 def _member_offset(place: StructLocation, item: Measurement | Characteristic) -> int:
-    """Return where a member is. Raises ImageError where it is not, or of another size."""
+    """Return the offset of an item in its structure [bytes].
+
+    Raises ImageError if the member is missing or has another size.
+    """
     count = item.size if isinstance(item, Measurement) else 1
     for axis in item.axes if isinstance(item, Characteristic) else ():
         count *= len(axis.points)
@@ -182,7 +199,7 @@ def _member_offset(place: StructLocation, item: Measurement | Characteristic) ->
 def _characteristic_context(
     characteristic: Characteristic, method_names: Mapping[Conversion, str], number: NumberType
 ) -> dict[str, Any]:
-    """Return what a characteristic has beside: its kind, layout and axes."""
+    """Return the context that only characteristics have: kind, record layout and axes."""
     return {
         "kind": CHARACTERISTIC_KINDS[len(characteristic.axes)],
         "layout": f"layout.{A2L_TYPES[characteristic.type][0]}",
@@ -193,6 +210,7 @@ def _characteristic_context(
 def _axis_context(
     axis: Axis, method_names: Mapping[Conversion, str], number: NumberType
 ) -> dict[str, Any]:
+    """Return the context of an axis: conversion, points and limits."""
     points = [shortest_decimal(point, number) for point in axis.points]
     return {
         "method": method_names[axis.conversion],
@@ -205,7 +223,10 @@ def _axis_context(
 def _conversion_methods(
     description: ModuleDescription, number: NumberType
 ) -> dict[Conversion, dict[str, Any]]:
-    """Return the conversions that are used, each with the name of its unit or its first user."""
+    """Return the contexts of all used conversions, each once.
+
+    Each has a unique name, which is made from its unit or from the path of its first user.
+    """
     used = [(one.conversion, one.path) for one in description.characteristics]
     used += [
         (axis.conversion, one.path) for one in description.characteristics for axis in one.axes
@@ -235,24 +256,26 @@ def _conversion_methods(
 
 
 def _to_identifier(text: str) -> str:
-    """Return a unit or path as a word: `rad/s` as rad_per_s."""
+    """Return a unit or path as an identifier: `rad/s` as rad_per_s."""
     words = text.replace("/", "_per_").replace("*", "_").replace(".", "_").replace("^-", "_m")
     word = re.sub(r"\W", "", words) or "none"
     return f"_{word}" if word[0].isdigit() else word
 
 
 def _unique_name(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken: with a number behind it where it is."""
+    """Return the name, with the first free number from 2 appended if it is in `taken`."""
     numbered = (f"{name}_{k}" for k in count(2))
     return name if name not in taken else next(one for one in numbered if one not in taken)
 
 
 def _record_layouts(description: ModuleDescription) -> list[dict[str, str]]:
+    """Return the contexts of one record layout for each data type of a characteristic."""
     kinds = {A2L_TYPES[one.type][0]: None for one in description.characteristics}
     return [{"name": f"layout.{kind}", "type": kind} for kind in kinds]
 
 
 def _group_contexts(description: ModuleDescription) -> list[dict[str, Any]]:
+    """Return the contexts of the groups with their members by keyword."""
     groups = []
     for group, inside in description.groups.items():
         members = [
@@ -266,13 +289,18 @@ def _group_contexts(description: ModuleDescription) -> list[dict[str, Any]]:
 
 
 def _bit_mask(measurement: Measurement) -> str | None:
+    """Return the mask of a single bit in hexadecimal; None for a whole word."""
     return f"0x{1 << measurement.bit:X}" if measurement.bit >= 0 else None
 
 
 def _format_number(value: float, kind: str, number: NumberType) -> str:
+    """Return a limit as text: a real as its shortest decimal, any other value without a
+    fraction.
+    """
     is_real = kind in ("double", "float") or value != int(value)
     return shortest_decimal(float(value), number) if is_real else str(int(value))
 
 
 def _format_address(address: int) -> str:
+    """Return an address as eight hexadecimal digits."""
     return f"0x{address:08X}"

@@ -1,1 +1,1 @@
-"""Exchange: calibration pages in the formats of measurement and calibration tools."""
+"""Calibration pages in the file formats of measurement and calibration tools: DCM, CDFX, CSV."""

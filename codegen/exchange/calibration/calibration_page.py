@@ -1,7 +1,7 @@
-"""Page: the calibration page of a Program as characteristics - tunables, then solved numbers.
+"""Calibration page: the tunable parameters of a Program and its solved numbers as characteristics.
 
-The names are those that the C has, behind that of the automaton: `estimator.J_em`,
-`estimator.solved.stamp_J_em`. Values are in SI, as the shortest decimals of the working type.
+Names are those of the C members behind the name of the automaton: `estimator.J_em`,
+`estimator.solved.stamp_J_em`. Values are in SI units, as the shortest decimals of the number type.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from language.overlays.literal_format import format_exact
 from language.typecheck.lookup_table import LookupTable
 
 STAMP_PREFIX = "solved.stamp_"
+"""The prefix of stamps: the parameter values for which solved numbers were computed (rule C15)."""
 
 
 def page_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the constants of the page in the order of its members."""
+    """Return the constants of the page in the order of its members: tunables, then solved
+    numbers.
+    """
     constants = restrict_to_step(program).constants
     return tuple(
         constant
@@ -37,12 +40,16 @@ def page_name(program: Program, constant: Constant) -> str:
 
 
 def page_characteristics(automaton: Automaton, program: Program) -> tuple[FileCharacteristic, ...]:
-    """Return the page of an automaton's Program with its values."""
+    """Return the page of an automaton's Program as characteristics with its values."""
     return tuple(_page_characteristic(automaton, program, c) for c in page_constants(program))
 
 
 def format_constant_value(value: float, constant: Constant, number: NumberType) -> str:
-    """Return a value of a constant as it stands in a file."""
+    """Return a value of a constant as text in a file.
+
+    A truth value is `true` or `false`, an enumeration value its name, a whole number an integer, a
+    real its shortest decimal.
+    """
     if constant.type == "truth":
         return "true" if value else "false"
     if constant.values:
@@ -53,6 +60,7 @@ def format_constant_value(value: float, constant: Constant, number: NumberType) 
 def _page_characteristic(
     automaton: Automaton, program: Program, constant: Constant
 ) -> FileCharacteristic:
+    """Return a constant of the page as a characteristic."""
     if constant.unit == TICK_UNIT:
         return _wait_as_time(automaton, program, constant)
     table = None
@@ -74,7 +82,7 @@ def _page_characteristic(
 
 
 def _wait_as_time(automaton: Automaton, program: Program, constant: Constant) -> FileCharacteristic:
-    """Return a tunable wait, which is kept in ticks, as the time that it is."""
+    """Return a tunable wait, which the page holds in ticks, as a characteristic in seconds."""
     assert automaton.period
     time = int(constant.value) * automaton.period
     name = Cell(page_name(program, constant))
@@ -82,7 +90,7 @@ def _wait_as_time(automaton: Automaton, program: Program, constant: Constant) ->
 
 
 def axes_of(table: LookupTable, number: NumberType) -> tuple[FileAxis, ...]:
-    """Return the axes of a table as they are compiled in, in SI."""
+    """Return the axes of a table with their compiled points, in SI units."""
     return tuple(
         FileAxis(
             tuple(

@@ -1,5 +1,7 @@
-"""CDFX: a page as ASAM CDF 2.0. Axes are compiled in; a VG holds the values over the first axis
-for one point of the second.
+"""CDFX writer: a calibration page as ASAM CDF 2.0.
+
+Axes are compiled into the C, so they are fixed (FIX_AXIS). A group VG holds the values of a map
+over the first axis, for one point of the second.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from codegen.exchange.calibration.characteristic import (
 from language.text.sanitise import escape_invisible
 
 CATEGORIES = ("VALUE", "CURVE", "MAP")
-"""What a characteristic is called, by its number of axes."""
+"""The category of a characteristic by its number of axes."""
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <!-- {heading} -->
 <MSRSW>
@@ -30,23 +32,27 @@ HEAD = """<?xml version="1.0" encoding="UTF-8"?>
           <SHORT-NAME>{title}</SHORT-NAME>
           <CATEGORY>NO_VCD</CATEGORY>
 """
+"""The begin of a file; `{heading}` and `{title}` are replaced."""
 TAIL = """        </SW-INSTANCE-TREE>
       </SW-INSTANCE-SPEC>
     </SW-SYSTEM>
   </SW-SYSTEMS>
 </MSRSW>
 """
+"""The end of a file."""
 INDENT = " " * 10
+"""The indentation of an instance."""
 
 
 def format_cdfx(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as a CDFX file."""
+    """Return a page as a CDFX file with a title and a comment of several parts."""
     comment = escape(", ".join(heading)).replace("--", "- -")
     lines = [f"{INDENT}{line}\n" for one in page for line in _format_instance(one)]
     return HEAD.format(title=escape(title), heading=comment) + "".join(lines) + TAIL
 
 
 def _format_instance(characteristic: FileCharacteristic) -> Iterator[str]:
+    """Yield the lines of a characteristic."""
     is_truth = (
         characteristic.is_text
         and not characteristic.axes
@@ -55,8 +61,10 @@ def _format_instance(characteristic: FileCharacteristic) -> Iterator[str]:
     yield "<SW-INSTANCE>"
     yield f"  <SHORT-NAME>{escape(characteristic.name.text)}</SHORT-NAME>"
     if characteristic.about:
-        yield f"  <LONG-NAME>{escape(escape_invisible(' '.join(characteristic.about.split())))}</LONG-NAME>"
-    yield f"  <CATEGORY>{'BOOLEAN' if is_truth else CATEGORIES[len(characteristic.axes)]}</CATEGORY>"
+        about = escape_invisible(" ".join(characteristic.about.split()))
+        yield f"  <LONG-NAME>{escape(about)}</LONG-NAME>"
+    category = "BOOLEAN" if is_truth else CATEGORIES[len(characteristic.axes)]
+    yield f"  <CATEGORY>{category}</CATEGORY>"
     yield "  <SW-VALUE-CONT>"
     yield from _format_unit(characteristic.unit)
     yield "    <SW-VALUES-PHYS>"
@@ -72,6 +80,9 @@ def _format_instance(characteristic: FileCharacteristic) -> Iterator[str]:
 
 
 def _format_values(characteristic: FileCharacteristic) -> Iterator[str]:
+    """Yield the lines of the values: cells in order, or one group VG for each point of the
+    second axis.
+    """
     tag = "VT" if characteristic.is_text else "V"
     if len(characteristic.axes) < 2:
         yield from (f"      {_format_cell(cell, tag)}" for cell in characteristic.values)
@@ -87,6 +98,7 @@ def _format_values(characteristic: FileCharacteristic) -> Iterator[str]:
 
 
 def _format_axis(axis: FileAxis) -> Iterator[str]:
+    """Yield the lines of an axis."""
     yield "    <SW-AXIS-CONT>"
     yield "      <CATEGORY>FIX_AXIS</CATEGORY>"
     yield from (f"  {line}" for line in _format_unit(axis.unit))
@@ -97,9 +109,11 @@ def _format_axis(axis: FileAxis) -> Iterator[str]:
 
 
 def _format_unit(unit: Cell | None) -> Iterator[str]:
+    """Yield the line of a unit, or nothing if there is none."""
     if unit:
         yield f"    <UNIT-DISPLAY-NAME>{escape(unit.text)}</UNIT-DISPLAY-NAME>"
 
 
 def _format_cell(cell: Cell, tag: str) -> str:
+    """Return an element with the text of a cell."""
     return f"<{tag}>{escape(cell.text)}</{tag}>"

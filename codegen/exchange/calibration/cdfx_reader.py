@@ -1,7 +1,7 @@
-"""CDFX reader: an ASAM CDF 2.0 file as calibration tools write it, in any encoding that XML knows.
+"""CDFX reader: reads ASAM CDF 2.0 files of calibration tools, in any encoding that XML declares.
 
-Axes that several maps share (COM_AXIS, RES_AXIS as instances of their own) are passed over; a map
-that only refers to one has no points here.
+Axes that several maps share (instances with category COM_AXIS or RES_AXIS) are skipped. A map that
+only refers to such an axis has no points.
 """
 
 from __future__ import annotations
@@ -21,11 +21,17 @@ from codegen.exchange.calibration.xml_spans import Element, parse_xml
 from language.text.diagnostic import Problems, Source
 
 VALUE_CATEGORIES = ("VALUE", "DEPENDENT_VALUE", "BOOLEAN", "ASCII", "VAL_BLK", "CURVE", "MAP")
+"""Categories of instances that are read."""
 SHARED_AXIS_CATEGORIES = ("COM_AXIS", "RES_AXIS", "CURVE_AXIS")
+"""Categories of shared axes, which are skipped."""
 
 
 def read_cdfx(source: Source, data: bytes, problems: Problems, name_filter: NameFilter) -> PageFile:
-    """Read what is `name_filter` of a CDFX file; problems are reported, at last with SpecError."""
+    """Return the characteristics of a CDFX file whose names the filter accepts.
+
+    Problems are reported to `problems`; SpecError is raised at the end, or after MAX_PROBLEMS
+    errors.
+    """
     root = parse_xml(source, data)
     if root.tag != "MSRSW":
         label = f"this is no CDFX file: it begins with `{root.tag}`, not with `MSRSW`"
@@ -45,6 +51,11 @@ def read_cdfx(source: Source, data: bytes, problems: Problems, name_filter: Name
 
 
 def _read_characteristic(instance: Element, problems: Problems) -> FileCharacteristic | None:
+    """Return an instance as a characteristic.
+
+    Returns None for a shared axis without a report, for an unknown category with a warning, and for
+    a malformed instance with an error.
+    """
     name, category = instance.find("SHORT-NAME"), instance.find("CATEGORY")
     kind = category.text if category else "VALUE"
     if name is None or not name.text:
@@ -78,12 +89,12 @@ def _read_characteristic(instance: Element, problems: Problems) -> FileCharacter
 
 
 def _value_elements(element: Element | None) -> Iterator[Element]:
-    """Iterate over the values in an element: numbers and texts."""
+    """Return an iterator over the values in an element: numbers (V) and texts (VT)."""
     return (child for child in (element.children if element else ()) if child.tag in ("V", "VT"))
 
 
 def _read_axes(instance: Element) -> Iterator[FileAxis]:
-    """Yield the axes that have points, the first one first."""
+    """Yield the axes that have points, in the order of their index."""
     conts = instance.find("SW-AXIS-CONTS")
     containers = list(conts.find_all("SW-AXIS-CONT")) if conts else []
     for cont in sorted(containers, key=_axis_index):
@@ -93,10 +104,12 @@ def _read_axes(instance: Element) -> Iterator[FileAxis]:
 
 
 def _axis_index(cont: Element) -> str:
+    """Return the index of an axis as text; an empty text if there is none."""
     index = cont.find("SW-AXIS-INDEX")
     return index.text if index else ""
 
 
 def _read_unit(element: Element | None) -> Cell | None:
+    """Return the unit in an element; None if there is none."""
     unit = element.find("UNIT-DISPLAY-NAME") if element else None
     return Cell(unit.text, unit.span) if unit else None

@@ -1,4 +1,4 @@
-"""Exact: the number that a cell of a file is, and the unit that stands beside it."""
+"""Cell parser: the exact number of a cell, and the unit that stands beside it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from language.text.diagnostic import Problems
 from language.text.sanitise import truncate
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+"""A decimal number with an optional exponent."""
 MAX_EXPONENT = 400
-"""Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
+"""Largest decimal exponent that is accepted; a double overflows or underflows beyond it."""
 MAX_LENGTH, MAX_SHOWN = 400, 60
-"""Most characters of a number that is read, and of a text that is quoted."""
+"""Maximum length of a number that is read, and of a text that is quoted [characters]."""
 UNIT_SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(("-", "--", "[-]"), "1"),
     **dict.fromkeys(("\N{DEGREE SIGN}C", "\N{DEGREE CELSIUS}", "deg C"), "degC"),
@@ -24,14 +25,15 @@ UNIT_SYNONYMS: Mapping[str, str] = {
     "%": "percent",
     "\N{DEGREE SIGN}": "deg",
 }
-"""Units as calibration tools write them, and how the language does."""
+"""Spellings of units in calibration tools, and the units of the language."""
 SUPERSCRIPTS = str.maketrans(
     {"\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3", "\N{MIDDLE DOT}": "*"}
 )
+"""Characters in units, and their notation in the language."""
 
 
 def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
-    """Return the number of a cell, or None with the problem reported."""
+    """Return the exact number of a cell; None with a problem reported for any other text."""
     text = cell.text
     shown = truncate(text, MAX_SHOWN)
     label = f"`{shown}` is not a number"
@@ -50,9 +52,10 @@ def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
 
 
 def parse_unit_cell(cell: Cell | None, declared_unit: Unit, problems: Problems) -> Unit | None:
-    """Return the unit that a file tells; SI where it tells none, None with a problem reported.
+    """Return the unit of a cell; the SI unit of `declared_unit` if the cell is None or empty.
 
-    `declared_unit` is what the values are declared in: the unit has to fit it.
+    Returns None with a problem reported if the unit is unknown or has another dimension than
+    `declared_unit`.
     """
     si = Unit(str(declared_unit.dimension), Fraction(1), declared_unit.dimension)
     if cell is None or not cell.text.strip() or cell.text == si.text:

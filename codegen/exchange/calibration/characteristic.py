@@ -1,4 +1,6 @@
-"""Characteristic: a parameter as calibration tools exchange it - texts, each with its place."""
+"""Characteristics of calibration files: names, values, units and axes as texts with their
+positions.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +10,14 @@ from dataclasses import dataclass
 from language.text.diagnostic import Problems, Source, Span
 
 NOWHERE = Span(Source(""), 0, 0)
-"""The place of what is not read from a file."""
+"""The position of a text that does not come from a file."""
 MAX_PROBLEMS = 20
-"""After so many problems the rest of a file is not looked at."""
+"""Number of errors after which the rest of a file is not read."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A text of a file and where it stands."""
+    """A text of a file and its position."""
 
     text: str
     span: Span = NOWHERE
@@ -23,7 +25,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class FileAxis:
-    """An axis of a table; `unit` is None where none is told."""
+    """An axis of a table; `unit` is None if the file gives none."""
 
     points: tuple[Cell, ...]
     unit: Cell | None = None
@@ -31,9 +33,9 @@ class FileAxis:
 
 @dataclass(frozen=True)
 class FileCharacteristic:
-    """A parameter with its values; of a table the last axis varies fastest.
+    """A parameter in a file with its values; in a table the last axis varies fastest.
 
-    `unit` is None where the file tells none. `is_text`: the values are words, not numbers.
+    `unit` is None if the file gives none. `is_text` tells that the values are words, not numbers.
     """
 
     name: Cell
@@ -46,19 +48,19 @@ class FileCharacteristic:
 
 @dataclass(frozen=True)
 class PageFile:
-    """What a file of calibration data holds: its source and the characteristics in their order."""
+    """The contents of a calibration file: its source and its characteristics in their order."""
 
     source: Source
     characteristics: tuple[FileCharacteristic, ...]
 
 
 def transpose_map(values: Sequence[Cell], columns: int) -> tuple[Cell, ...]:
-    """Return the values of a map with its axes exchanged: rows of so many columns, by column."""
+    """Return the values of a map, given row by row with `columns` values each, column by column."""
     return tuple(cell for column in range(columns) for cell in values[column::columns])
 
 
 def report_duplicates(characteristics: Iterable[FileCharacteristic], problems: Problems) -> None:
-    """Report names that stand twice in a file."""
+    """Report an error for each name that occurs again in a file."""
     first: dict[str, Span] = {}
     for one in characteristics:
         place = first.setdefault(one.name.text, one.name.span)
@@ -68,6 +70,6 @@ def report_duplicates(characteristics: Iterable[FileCharacteristic], problems: P
 
 
 def stop_if_many(problems: Problems) -> None:
-    """Raise SpecError where a file has so many problems that more would not help."""
+    """Raise SpecError if a file has MAX_PROBLEMS errors or more."""
     if sum(problem.severity == "error" for problem in problems.reported) >= MAX_PROBLEMS:
         problems.raise_if_errors()

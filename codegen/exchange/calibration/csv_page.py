@@ -1,4 +1,7 @@
-"""CSV page: one line for each number - `name,value,unit`, and in tables `x,x_unit,y,y_unit`."""
+"""CSV pages: one line for each number, with columns name, value, unit, x, x_unit, y, y_unit.
+
+The columns x and y hold the axis points of tables.
+"""
 
 from __future__ import annotations
 
@@ -19,21 +22,27 @@ from codegen.exchange.calibration.name_filter import NameFilter
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 
 COLUMNS = ("name", "value", "unit", "x", "x_unit", "y", "y_unit")
+"""The columns of a page."""
 REQUIRED_COLUMNS = ("name", "value")
+"""The columns that a file must have."""
 SEPARATORS = ",;\t"
+"""Separators that are recognised; the most frequent one in the first line is used."""
 
 Row = Mapping[str, Cell]
+"""The cells of a line by column."""
 
 
 @dataclass(frozen=True)
 class _ReadContext:
+    """The source of a file, its problems and the filter of names."""
+
     source: Source
     problems: Problems
     name_filter: NameFilter
 
 
 def format_csv(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as CSV; `title` and `heading` have no place in it."""
+    """Return a page as CSV; `title` and `heading` are ignored, because CSV has no comments."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -43,6 +52,7 @@ def format_csv(title: str, heading: Sequence[str], page: Sequence[FileCharacteri
 
 
 def _format_rows(characteristic: FileCharacteristic) -> Iterator[tuple[str, ...]]:
+    """Yield the cells of one line for each value of a characteristic."""
     unit = characteristic.unit.text if characteristic.unit else ""
     points: list[tuple[str, ...]] = [()]
     for axis in characteristic.axes:
@@ -54,7 +64,11 @@ def _format_rows(characteristic: FileCharacteristic) -> Iterator[tuple[str, ...]
 
 
 def read_csv(source: Source, text: str, problems: Problems, name_filter: NameFilter) -> PageFile:
-    """Read what is `name_filter` of a page in CSV; problems are reported, at last with SpecError."""
+    """Return the characteristics of a CSV page whose names the filter accepts.
+
+    The lines of one name must be consecutive. Problems are reported to `problems`; SpecError is
+    raised at the end, or after MAX_PROBLEMS errors.
+    """
     context = _ReadContext(source, problems, name_filter)
     groups: dict[str, list[Row]] = {}
     last = ""
@@ -74,7 +88,9 @@ def read_csv(source: Source, text: str, problems: Problems, name_filter: NameFil
 
 
 def _read_rows(context: _ReadContext, text: str) -> Iterator[Row]:
-    """Yield the cells of each line by their column."""
+    """Yield the cells of each accepted line by column; the first line holds the names of the
+    columns.
+    """
     first = context.source.lines[0]
     separator = max(SEPARATORS, key=first.count)
     lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
@@ -94,6 +110,7 @@ def _read_rows(context: _ReadContext, text: str) -> Iterator[Row]:
 
 
 def _require_columns(columns: Sequence[str], span: Span, problems: Problems) -> None:
+    """Report missing, unknown and duplicate columns; raises SpecError if there are any."""
     for column in REQUIRED_COLUMNS:
         if column not in columns:
             problems.error("column", span, f"the first line has no column `{column}`")
@@ -109,7 +126,11 @@ def _require_columns(columns: Sequence[str], span: Span, problems: Problems) -> 
 def _parse_row(
     columns: Sequence[str], cells: Sequence[str], span: Span, context: _ReadContext
 ) -> Iterator[Row]:
-    """Yield the one row of a line, or none with the problem reported; none of another's."""
+    """Yield the row of a line.
+
+    Yields nothing for a name that the filter rejects, and nothing, with a problem reported, for a
+    line without a name or with a wrong number of cells.
+    """
     texts, problems = [cell.strip() for cell in cells], context.problems
     place = columns.index("name")
     name = texts[place] if place < len(texts) else ""
@@ -130,13 +151,18 @@ def _parse_row(
 
 
 def _cell_span(span: Span, line: str, text: str) -> Span:
-    """Return where a cell stands in its line, as near as can be told."""
+    """Return the position of the first occurrence of a text in a line; the begin if it is
+    absent.
+    """
     start = max(line.find(text), 0) if text else 0
     return span.subspan(start, len(text))
 
 
 def _parse_characteristic(rows: Sequence[Row], problems: Problems) -> FileCharacteristic:
-    """Return the rows of one name as a characteristic; their points are a grid."""
+    """Return the rows of one name as a characteristic.
+
+    Reports several rows without axis points, points that are not a full grid, and different units.
+    """
     first = rows[0]
     axes: list[FileAxis] = []
     for letter in "xy":
@@ -160,6 +186,7 @@ def _parse_characteristic(rows: Sequence[Row], problems: Problems) -> FileCharac
 
 
 def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
+    """Report a unit that differs from that of the first row, one error for each column."""
     first = rows[0]
     for column in (column for column in ("unit", "x_unit", "y_unit") if column in first):
         others = (row[column] for row in rows if row[column].text != first[column].text)
@@ -172,7 +199,9 @@ def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
 
 
 def _is_grid(rows: Sequence[Row], axes: Sequence[FileAxis]) -> bool:
-    """Tell whether the points of the rows are those of a table, the last axis fastest."""
+    """Tell whether the points of the rows are the full grid of the axes, with the last axis
+    fastest.
+    """
     if math.prod(len(axis.points) for axis in axes) != len(rows):
         return False
     grid: list[tuple[str, ...]] = [()]

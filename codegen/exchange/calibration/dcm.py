@@ -1,6 +1,7 @@
-"""DCM: a page as DCM 2.0 (ETAS), in ASCII.
+"""DCM writer: a calibration page in the format DCM 2.0 (ETAS), in ASCII.
 
-Axes are compiled in, so tables are FESTKENNLINIE and FESTKENNFELD: X is the first axis of `over`.
+Axes are compiled into the C, so tables are FESTKENNLINIE and FESTKENNFELD. X is the first axis of
+`over`.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from codegen.emit.c_comment import sanitise_comment
 from codegen.exchange.calibration.characteristic import Cell, FileCharacteristic, transpose_map
 
 DCM_KINDS = ("FESTWERT", "FESTKENNLINIE", "FESTKENNFELD")
-"""What a characteristic is called, by its number of axes."""
+"""The keyword of a characteristic by its number of axes."""
 VALUES_PER_LINE = 6
-"""Most numbers in a line, as other tools write them."""
+"""Maximum number of values in a line, as other tools write them."""
 
 
 def format_dcm(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as a DCM file; `title` is the function that all belong to."""
+    """Return a page as a DCM file; `title` is the function of all characteristics, `heading` a
+    comment.
+    """
     lines = [f"* {line}" for line in heading]
     lines += ["", "KONSERVIERUNG_FORMAT 2.0", "", "FUNKTIONEN"]
     lines += [f'  FKT {title} "" ""', "END", ""]
@@ -27,6 +30,7 @@ def format_dcm(title: str, heading: Sequence[str], page: Sequence[FileCharacteri
 
 
 def _format_block(characteristic: FileCharacteristic, title: str) -> Iterator[str]:
+    """Yield the lines of a characteristic."""
     sizes = "".join(f" {len(axis.points)}" for axis in characteristic.axes)
     yield f"{DCM_KINDS[len(characteristic.axes)]} {characteristic.name.text}{sizes}"
     if characteristic.about:
@@ -52,7 +56,7 @@ def _format_block(characteristic: FileCharacteristic, title: str) -> Iterator[st
 
 
 def _format_rows(characteristic: FileCharacteristic, word: str) -> Iterator[str]:
-    """A row of values over X for each point of Y."""
+    """Yield for each point of Y its line, then the lines of values over X."""
     first, second = characteristic.axes
     values: Sequence[Cell] = transpose_map(characteristic.values, len(second.points))
     for number, point in enumerate(second.points):
@@ -62,10 +66,13 @@ def _format_rows(characteristic: FileCharacteristic, word: str) -> Iterator[str]
 
 
 def _format_lines(word: str, texts: Sequence[str]) -> Iterator[str]:
+    """Yield lines that begin with a keyword and hold at most VALUES_PER_LINE texts."""
     for start in range(0, len(texts), VALUES_PER_LINE):
         yield f"  {word} {' '.join(texts[start : start + VALUES_PER_LINE])}"
 
 
 def _quote(text: str) -> str:
-    """Return a text between quotes, of which it can hold none."""
+    """Return a text in double quotes, as one line of ASCII; double quotes inside become single
+    ones.
+    """
     return '"' + sanitise_comment(text).replace('"', "'") + '"'

@@ -1,4 +1,4 @@
-"""DCM block: what stands between the head of a characteristic and its END."""
+"""DCM blocks: the lines between the head of a characteristic and its END, and their conversion."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ from codegen.exchange.calibration.characteristic import (
 from language.text.diagnostic import Problems
 
 SHARED_AXIS = "STUETZSTELLENVERTEILUNG"
+"""The keyword of axis points that several maps share."""
 CURVE_KINDS = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")
+"""Keywords of curves."""
 MAP_KINDS = ("KENNFELD", "FESTKENNFELD", "GRUPPENKENNFELD")
+"""Keywords of maps."""
 SIZES: Mapping[str, tuple[int, ...]] = {
     "FESTWERT": (0,),
     "TEXTSTRING": (0,),
@@ -25,13 +28,14 @@ SIZES: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(CURVE_KINDS, (1,)),
     **dict.fromkeys(MAP_KINDS, (2,)),
 }
-"""How many sizes stand behind the name of each kind."""
+"""The numbers of sizes that may follow the name of each kind of block."""
 MAX_VALUES = 1_000_000
+"""Largest size of a block."""
 
 
 @dataclass(frozen=True)
 class DcmBlock:
-    """The lines of a block, by what they hold, in their order."""
+    """The contents of a block by keyword; `sizes` is None if its head is malformed."""
 
     head: Cell
     name: Cell
@@ -45,12 +49,16 @@ class DcmBlock:
 
 
 def is_count(text: str) -> bool:
-    """Tell whether a text is a number of values."""
+    """Tell whether a text is a whole number from 1 to MAX_VALUES."""
     return text.isascii() and text.isdecimal() and len(text) < 8 and 0 < int(text) <= MAX_VALUES
 
 
 def characteristic_of(block: DcmBlock, problems: Problems) -> FileCharacteristic | None:
-    """Return what a block is, or None with the problem reported."""
+    """Return a block as a characteristic.
+
+    Returns None with problems reported if it has both numbers and texts, or if the numbers of
+    values or points differ from the sizes in its head.
+    """
     sizes = block.sizes or ()
     values = block.numbers or block.texts
     if block.numbers and block.texts:
@@ -78,6 +86,7 @@ def characteristic_of(block: DcmBlock, problems: Problems) -> FileCharacteristic
 def _has_count(
     cells: list[Cell], count: int, what: str, block: DcmBlock, problems: Problems
 ) -> bool:
+    """Tell whether there are `count` cells; report a problem otherwise. `what` names them."""
     if len(cells) == count:
         return True
     place = cells[count].span if len(cells) > count else block.name.span

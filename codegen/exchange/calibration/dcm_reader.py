@@ -1,8 +1,8 @@
-"""DCM reader: a DCM 2.0 file line by line, as INCA, CANape and others write it.
+"""DCM reader: reads DCM 2.0 files line by line, as INCA, CANape and other tools write them.
 
-Lines that begin with `*`, `!` or `.` are comments. What says nothing about values (FUNKTION,
-DISPLAYNAME, VAR ...) is passed over, and so are points that several maps share
-(STUETZSTELLENVERTEILUNG): each map repeats those that it uses.
+Lines that begin with `*`, `!` or `.` are comments. Keywords without values (FUNKTION, DISPLAYNAME,
+VAR and others) are skipped. So are shared axis points (STUETZSTELLENVERTEILUNG), because each map
+repeats the points that it uses.
 """
 
 from __future__ import annotations
@@ -30,14 +30,19 @@ from codegen.exchange.calibration.name_filter import NameFilter
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 
 COMMENTS = ("*", "!", ".")
+"""First characters of comment lines."""
 WORD = re.compile(r'"[^"]*"|"?[^\s"]+|"')
+"""A word of a line: a text in quotes, or characters without a blank."""
 SECTIONS = ("FUNKTIONEN", "VARIANTENKODIERUNG")
 """Sections that end with END and hold no values."""
 HEADS = ("KONSERVIERUNG_FORMAT", "MODULKOPF", *SECTIONS, *SIZES)
+"""Keywords that begin a block or section."""
 VERSIONS = ("1.0", "2.0")
+"""Versions of the format that are read."""
 VALUE_WORDS = ("ST/X", "ST/Y", "WERT", "TEXT", "EINHEIT_X", "EINHEIT_Y", "EINHEIT_W")
+"""Keywords of lines in a block that hold values or units."""
 IGNORED_WORDS = ("LANGNAME", "DISPLAYNAME", "FUNKTION", "VAR")
-"""Words of a block that say nothing about its values."""
+"""Keywords of lines in a block that do not affect its values."""
 
 Words = list[Cell]
 Lines = Iterator[Words]
@@ -45,7 +50,9 @@ Lines = Iterator[Words]
 
 @dataclass(frozen=True)
 class _ReadContext:
-    """`passed` are the unknown words that were told of: each once, and not more than a few."""
+    """The source of a file, its problems, and the unknown keywords that were reported, each
+    once.
+    """
 
     source: Source
     problems: Problems
@@ -53,7 +60,11 @@ class _ReadContext:
 
 
 def read_dcm(source: Source, problems: Problems, name_filter: NameFilter) -> PageFile:
-    """Read what is `name_filter` of a DCM file; problems are reported, at last with SpecError."""
+    """Return the characteristics of a DCM file whose names the filter accepts.
+
+    Problems are reported to `problems`; SpecError is raised at the end, or after MAX_PROBLEMS
+    errors.
+    """
     context = _ReadContext(_blank_other_blocks(source, name_filter), problems)
     lines = _word_lines(context)
     characteristics: list[FileCharacteristic] = []
@@ -79,8 +90,9 @@ def read_dcm(source: Source, problems: Problems, name_filter: NameFilter) -> Pag
 
 
 def _blank_other_blocks(source: Source, name_filter: NameFilter) -> Source:
-    """Return a file in which the lines of blocks that are not `name_filter` are blank: up to their END,
-    or to the next head where one has none.
+    """Return a source in which the lines of blocks that the filter rejects are empty.
+
+    A rejected block reaches up to its END, or to the next head if it has none.
     """
     lines, is_inside = [], False
     for number, line in enumerate(source.lines, start=1):
@@ -94,6 +106,7 @@ def _blank_other_blocks(source: Source, name_filter: NameFilter) -> Source:
 
 
 def _require_format(words: Words, context: _ReadContext) -> None:
+    """Report a problem unless the words are `KONSERVIERUNG_FORMAT` and a known version."""
     start = Span(context.source, 1, 1)
     if not words or words[0].text != "KONSERVIERUNG_FORMAT":
         place = words[0].span if words else start
@@ -106,7 +119,7 @@ def _require_format(words: Words, context: _ReadContext) -> None:
 
 
 def _word_lines(context: _ReadContext) -> Lines:
-    """Yield the words of each line that holds some and is no comment."""
+    """Yield the words of each line that is neither empty nor a comment; report unclosed quotes."""
     for number, line in enumerate(context.source.lines, start=1):
         text = line.strip()
         if not text or text.startswith(COMMENTS):
@@ -121,12 +134,16 @@ def _word_lines(context: _ReadContext) -> Lines:
 
 
 def _skip_section(head: Cell, lines: Lines, problems: Problems) -> None:
+    """Consume lines up to END; report a problem if there is none."""
     if all(words[0].text != "END" for words in lines):
         problems.error("form", head.span, f"`{head.text}` has no `END`")
 
 
 def _read_block(words: Words, lines: Lines, context: _ReadContext) -> DcmBlock | None:
-    """Return a block up to its END; None where its head is no name with its sizes."""
+    """Return the block up to its END; None if its head lacks a name or has wrong sizes.
+
+    Raises SpecError if END is missing.
+    """
     head, *rest = words
     problems = context.problems
     block = DcmBlock(head, rest[0] if rest else head, _read_sizes(head, rest[1:], problems))
@@ -145,7 +162,10 @@ def _read_block(words: Words, lines: Lines, context: _ReadContext) -> DcmBlock |
 
 
 def _read_sizes(head: Cell, words: Words, problems: Problems) -> tuple[int, ...] | None:
-    """Return the numbers behind a name: `4`, `4 3`, or `4 @ 3` of a block of values."""
+    """Return the sizes behind a name: `4`, `4 3`, or `4 @ 3` for a block of values.
+
+    Returns None with a problem reported if they are not those of SIZES.
+    """
     texts = [word.text for word in words]
     if head.text == "FESTWERTEBLOCK" and len(texts) == 3 and texts[1] == "@":
         texts = [texts[0], texts[2]]
@@ -161,11 +181,12 @@ def _read_sizes(head: Cell, words: Words, problems: Problems) -> tuple[int, ...]
 
 
 def _unquote(cell: Cell) -> Cell:
+    """Return a cell without the quotes around its text."""
     return Cell(cell.text.strip('"'), cell.span)
 
 
 def _read_line(block: DcmBlock, words: Words, context: _ReadContext) -> None:
-    """Take a line of a block."""
+    """Add a line to a block; report a keyword without values, and warn of an unknown keyword."""
     word, *rest = words
     cells = [_unquote(cell) for cell in rest]
     target = _target_list(block, word.text)
@@ -183,7 +204,7 @@ def _read_line(block: DcmBlock, words: Words, context: _ReadContext) -> None:
 
 
 def _target_list(block: DcmBlock, word: str) -> list[Cell] | None:
-    """Return where the values behind a word are kept; None for a word that has none."""
+    """Return the list of a block that receives the values of a keyword; None for other keywords."""
     match word:
         case "ST/X" | "ST_TX/X":
             return block.points_x
@@ -198,7 +219,9 @@ def _target_list(block: DcmBlock, word: str) -> list[Cell] | None:
 
 
 def _warn_unknown_word(word: Cell, block: DcmBlock, context: _ReadContext) -> None:
-    """Warn of a word that is not known; the first few are told, each where it stands first."""
+    """Warn of an unknown keyword at its first occurrence, for at most MAX_PROBLEMS keywords of a
+    file.
+    """
     if word.text in context.reported_words or len(context.reported_words) >= MAX_PROBLEMS:
         return
     context.reported_words.add(word.text)

@@ -1,4 +1,4 @@
-"""Page text: the bytes of a file of calibration data, and the text that they are."""
+"""Encoding of calibration files: reads their bytes and decodes their text."""
 
 from __future__ import annotations
 
@@ -9,15 +9,21 @@ from pathlib import Path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_BYTES = 8 * 1024 * 1024
-"""Largest file read: the page of a large automaton has some 100 kB."""
+"""Largest file that is read [bytes]; the page of a large automaton has about 100 kB."""
 LINE_END = re.compile(r"\r\n|\r|\n")
+"""The end of a line on any system."""
 CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b\x0e-\x1f]")
-"""Characters that no text has: tabs, ends of lines and of pages are none of them."""
+"""Control characters that no text contains; tabs, line ends and form feeds are not among them."""
 UTF16_BOM = (b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks of UTF-16."""
 
 
 def read_bytes(path: Path, display_name: str) -> bytes:
-    """Return what a file holds. Raises SpecError for what is no file, is empty or too large."""
+    """Return the contents of a file; `display_name` names it in messages.
+
+    Raises SpecError for a path that is no readable regular file, or is empty or larger than
+    MAX_BYTES.
+    """
     place = Span(Source(display_name), 1, 1)
     problems = Problems()
     data = b""
@@ -44,7 +50,11 @@ def read_bytes(path: Path, display_name: str) -> bytes:
 def decode_text(
     data: bytes, display_name: str, fallback_encoding: str | None = None
 ) -> tuple[Source, str]:
-    """Return the text of a file in UTF-8, or else in the encoding `fallback_encoding`. Raises SpecError."""
+    """Return the source of a file, split into lines, and its text.
+
+    The text is decoded as UTF-8, else in `fallback_encoding` if that is not None. Raises SpecError
+    for UTF-16, undecodable bytes and control characters.
+    """
     problems = Problems()
     if data.startswith(UTF16_BOM):
         place = Span(Source(display_name), 1, 1)

@@ -1,4 +1,4 @@
-"""Formats: the files of calibration tools that are written and read, by their endings."""
+"""Formats of calibration files: writers and readers of DCM, CDFX and CSV by file name extension."""
 
 from __future__ import annotations
 
@@ -22,29 +22,38 @@ from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.project_files import display_path
 
 Reader = Callable[[str, bytes, Problems, NameFilter], PageFile]
+"""A function that reads a page: name, bytes, problems and filter to a `PageFile`."""
 
 
 @dataclass(frozen=True)
 class Format:
-    """How a page is written under a title with lines of a heading, and how it is read."""
+    """The writer of a format (title, heading lines, page) and its reader."""
 
     write: Callable[[str, Sequence[str], Sequence[FileCharacteristic]], str]
     read: Reader
 
 
 def _decode_dcm(name: str, data: bytes, problems: Problems, name_filter: NameFilter) -> PageFile:
-    """DCM says nothing of its encoding: UTF-8, else what Windows writes in the West."""
+    """Read a DCM file.
+
+    DCM does not declare its encoding: it is UTF-8, else Latin-1, the usual encoding of Western
+    Windows.
+    """
     source, _ = decode_text(data, name, "latin-1")
     return read_dcm(source, problems, name_filter)
 
 
 def _decode_cdfx(name: str, data: bytes, problems: Problems, name_filter: NameFilter) -> PageFile:
-    """XML says its encoding itself; its lines are shown where they are UTF-8."""
+    """Read a CDFX file.
+
+    XML declares its own encoding; the lines shown in messages are decoded as UTF-8.
+    """
     lines = tuple(data.decode("utf-8", errors="replace").splitlines())
     return read_cdfx(Source(name, lines), data, problems, name_filter)
 
 
 def _decode_csv(name: str, data: bytes, problems: Problems, name_filter: NameFilter) -> PageFile:
+    """Read a CSV file in UTF-8."""
     source, text = decode_text(data, name)
     return read_csv(source, text, problems, name_filter)
 
@@ -54,10 +63,13 @@ FORMATS: Mapping[str, Format] = {
     "cdfx": Format(format_cdfx, _decode_cdfx),
     "csv": Format(format_csv, _decode_csv),
 }
+"""The formats by name, which is also the extension of a file."""
 
 
 def format_name(path: Path, explicit_format: str | None = None) -> str | None:
-    """Return the name of the format that is named, else that of a file's ending; None if none."""
+    """Return the name of the explicit format, else of the extension of a file; None if it is
+    unknown.
+    """
     name = explicit_format or path.suffix.lower().removeprefix(".")
     return name if name in FORMATS else None
 
@@ -68,9 +80,9 @@ def read_page(
     explicit_format: str | None = None,
     name_filter: NameFilter | None = None,
 ) -> PageFile:
-    """Read a file of calibration data, of its names those that are `name_filter`.
+    """Return the characteristics of a calibration file whose names the filter accepts; all if None.
 
-    Raises SpecError with its problems.
+    Raises SpecError with all problems, also for an unknown format and for duplicate names.
     """
     name = display_path(path)
     data = read_bytes(path, name)

@@ -1,4 +1,6 @@
-"""Desk: a value of a file beside the parameter that it is for, and what is told of it."""
+"""Import context: converts values of a file to those of a parameter, and collects remarks on
+them.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,12 @@ from language.model.declaration import Parameter
 from language.text.diagnostic import Problems, Span
 
 RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
+"""The kinds of remarks."""
 
 
 @dataclass(frozen=True)
 class Remark:
-    """What is worth knowing of a name of the file: its place (None where it is absent), a text."""
+    """A remark on a name of a file; `span` is None if the name is absent from the file."""
 
     kind: RemarkKind
     name: str
@@ -29,7 +32,7 @@ class Remark:
 
 @dataclass(frozen=True)
 class ImportContext:
-    """What is compared with, and what was found until now."""
+    """The automaton and number type of an import, with the problems and remarks found so far."""
 
     automaton: Automaton
     number: NumberType
@@ -37,7 +40,7 @@ class ImportContext:
     remarks: list[Remark] = field(default_factory=list)
 
     def add_remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
-        """Tell what is worth knowing of a cell."""
+        """Append a remark on a cell; its position is `at`, or that of the cell."""
         self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
 
 
@@ -48,7 +51,12 @@ def convert_real(
     parameter: Parameter,
     context: ImportContext,
 ) -> float | None:
-    """Return a value of a parameter, single or of a table, that is in a unit."""
+    """Return the value of a cell in SI units, rounded to the number type.
+
+    A remark is added if the unit was converted or if rounding changed the number. Returns None with
+    a problem reported for a text that is not a number and for a value outside the range of the
+    parameter.
+    """
     number = parse_cell_number(cell, context.problems)
     value = None if number is None else convert_to_si(number, unit, cell, context)
     if number is None or value is None:
@@ -65,7 +73,7 @@ def convert_real(
     if limits:
         low, high = (round_to_type(limit, context.number) for limit in limits)
         if not low <= value <= high:
-            ends = f"{shortest_decimal(low, context.number)} to {shortest_decimal(high, context.number)}"
+            ends = " to ".join(shortest_decimal(end, context.number) for end in (low, high))
             label = f"`{characteristic.name.text}` = {shown} is outside its range, {ends} in SI"
             context.problems.error("range", cell.span, label)
             return None
@@ -78,7 +86,12 @@ def resolve_unit(
     cell: Cell | None,
     context: ImportContext,
 ) -> Unit | None:
-    """Return the unit that stands beside values, a parameter's `declared_unit` where none does."""
+    """Return the unit of values: that of `cell`, or the SI unit of `declared_unit` if there is
+    none.
+
+    A missing unit adds a remark unless the values are dimensionless. Returns None with a problem
+    reported if the unit is unknown or incompatible.
+    """
     unit = parse_unit_cell(cell, declared_unit, context.problems)
     if unit and (cell is None or not cell.text.strip()) and not declared_unit.dimension.is_number:
         context.add_remark(
@@ -88,7 +101,10 @@ def resolve_unit(
 
 
 def convert_to_si(number: Fraction, unit: Unit, cell: Cell, context: ImportContext) -> float | None:
-    """Return the value in SI of a number in a unit, None for one that is past the type."""
+    """Return a number in SI units, rounded to the number type.
+
+    Returns None with a problem reported if it is too large for the type.
+    """
     value = round_to_type(number * unit.factor + unit.offset, context.number)
     if abs(value) != float("inf"):
         return value

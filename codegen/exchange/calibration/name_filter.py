@@ -1,7 +1,7 @@
-"""Owned: which of the names in a file of calibration data are those of an automaton.
+"""Name filter: selects the names of one automaton in a calibration file.
 
-A file of a whole ECU has values of other functions. Where only an automaton's own are wanted,
-nothing of the others is looked at: not that they are malformed, nor that one stands twice.
+The file of a whole ECU contains values of other functions. If only those of one automaton are read,
+the others are not checked: malformed or duplicate entries among them are no problem.
 """
 
 from __future__ import annotations
@@ -13,15 +13,16 @@ from codegen.exchange.calibration.characteristic import Cell
 
 @dataclass(frozen=True)
 class NameFilter:
-    """The names that begin with an `owner`'s, or all where there is none; `passed` are the others,
-    each where it stood first.
+    """A filter that accepts names that begin with `owner` and a dot; all names if `owner` is empty.
+
+    `skipped` collects the rejected names, each with its first occurrence.
     """
 
     owner: str = ""
     skipped: dict[str, Cell] = field(default_factory=dict)
 
     def accepts(self, name: Cell) -> bool:
-        """Tell whether a name is wanted; one that is not is noted."""
+        """Tell whether the filter accepts a name; a rejected name is added to `skipped`."""
         if not self.owner or name.text.startswith(f"{self.owner}."):
             return True
         self.skipped.setdefault(name.text, name)

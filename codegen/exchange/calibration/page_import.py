@@ -1,7 +1,7 @@
-"""Taking: what a file says of the tunable parameters of an automaton, checked against its spec.
+"""Page import: checks a calibration file against a spec and returns the values of its parameters.
 
-A value is taken where its name, type, unit and range are those of the spec, values of a table where
-its points are. Solved numbers are never taken.
+A value is imported if its name, type, unit and range are those of the spec; the values of a table
+if its axis points are. Solved numbers are returned apart and never become values of the spec.
 """
 
 from __future__ import annotations
@@ -43,17 +43,21 @@ from language.text.document import ScalarNode, YamlNode
 from language.typecheck.types import MAX_INT
 
 SECOND_UNIT = parse_unit("s")
+"""The unit of a wait."""
 TICK_TOLERANCE = Fraction(1, 10**6)
-"""Part by which the time of a tool may miss whole ticks: it has multiplied float32."""
+"""Relative deviation of a time from whole ticks that is accepted, because tools compute in
+float32.
+"""
 ENUM_INDEX = re.compile(r"\d{1,4}(\.0*)?", re.ASCII)
-"""The number of a word in its list, as tools without words write it: `1`, `1.0000`."""
+"""An enumeration value written as its index, by tools without enumerations: `1`, `1.0000`."""
 
 
 @dataclass(frozen=True)
 class ImportedValues:
-    """Values of the language by parameter, in the order of the page, and what is told of them.
+    """The result of an import.
 
-    `solved` are the solved numbers of the file, in the working type, by the names of constants.
+    `values` are values by parameter in the order of the page. `solved` are the solved numbers of
+    the file, in the number type, by the names of constants.
     """
 
     values: Mapping[str, YamlNode]
@@ -68,9 +72,10 @@ def import_values(
     problems: Problems,
     name_filter: NameFilter,
 ) -> ImportedValues:
-    """Return what a file says of an automaton's page. Raises SpecError with all problems.
+    """Return the values that a file gives for the page of an automaton, with remarks.
 
-    What was passed over, since it is not `name_filter`, is told.
+    Names that the filter rejected and constants that are not in the file have a remark. Raises
+    SpecError with all problems.
     """
     constants = {page_name(program, constant): constant for constant in page_constants(program)}
     context = ImportContext(automaton, program.number_type, problems)
@@ -99,7 +104,10 @@ def import_values(
 def _match_names(
     file: PageFile, constants: Mapping[str, Constant], owner: str, problems: Problems
 ) -> dict[str, FileCharacteristic]:
-    """Return what has a name of the page; the first of the others are told with a name near it."""
+    """Return the characteristics by name; report names that are not on the page.
+
+    The first MAX_PROBLEMS reports suggest a similar name.
+    """
     characteristics: dict[str, FileCharacteristic] = {}
     others = 0
     for one in file.characteristics:
@@ -116,6 +124,11 @@ def _match_names(
 def _read_solved(
     characteristic: FileCharacteristic, constant: Constant, context: ImportContext
 ) -> dict[str, float]:
+    """Return a solved number by the name of its constant; an empty dictionary with a problem
+    reported if
+
+    it is invalid.
+    """
     cell = _require_single(characteristic, context.problems)
     number = parse_cell_number(cell, context.problems) if cell else None
     if cell is None or number is None:
@@ -127,7 +140,10 @@ def _read_solved(
 def _read_value(
     characteristic: FileCharacteristic, constant: Constant, context: ImportContext
 ) -> YamlNode | None:
-    """Return the value of a parameter as a calibration file has it, None where it is not taken."""
+    """Return the value of a parameter as a node of a calibration overlay.
+
+    Returns None with problems reported if it is invalid.
+    """
     parameter = context.automaton.parameters[unqualified_name(constant.name)]
     if parameter.table:
         return read_table(characteristic, constant, parameter, context)
@@ -148,6 +164,9 @@ def _read_value(
 
 
 def _require_single(characteristic: FileCharacteristic, problems: Problems) -> Cell | None:
+    """Return the only value of a characteristic without axes; None with a problem reported
+    otherwise.
+    """
     if len(characteristic.values) == 1 and not characteristic.axes:
         return characteristic.values[0]
     problems.error(
@@ -159,7 +178,10 @@ def _require_single(characteristic: FileCharacteristic, problems: Problems) -> C
 def _read_real(
     characteristic: FileCharacteristic, cell: Cell, parameter: Parameter, context: ImportContext
 ) -> float | None:
-    """Return a real in SI, in the working type and in its range; what was done to it is told."""
+    """Return a real value in SI units in the number type, with remarks on conversion and rounding.
+
+    Returns None with a problem reported if it is invalid or outside its range.
+    """
     unit = resolve_unit(characteristic, parameter.unit, characteristic.unit, context)
     return convert_real(characteristic, cell, unit, parameter, context) if unit else None
 
@@ -167,7 +189,11 @@ def _read_real(
 def _read_ticks(
     characteristic: FileCharacteristic, cell: Cell, constant: Constant, context: ImportContext
 ) -> YamlNode | None:
-    """Return a tunable wait, a time of whole ticks; what is none is rounded up, and told."""
+    """Return a tunable wait as a time of whole ticks, in the unit of its parameter.
+
+    A time that is not a whole number of ticks is rounded up, with a remark. Returns None with a
+    problem reported if it is invalid or outside its range.
+    """
     assert context.automaton.period and constant.range
     unit = resolve_unit(characteristic, SECOND_UNIT, characteristic.unit, context)
     number = parse_cell_number(cell, context.problems)
@@ -182,8 +208,9 @@ def _read_ticks(
         text = f"`{cell.text}` is rounded up to {format_exact(time)} s, {ticks} ticks"
         context.add_remark("rounded", characteristic.name, text, cell.span)
     elif unit.factor != 1:
-        told = f"`{cell.text} {characteristic.unit.text if characteristic.unit else ''}` is {format_exact(time)} s"
-        context.add_remark("converted", characteristic.name, told, cell.span)
+        unit_text = characteristic.unit.text if characteristic.unit else ""
+        text = f"`{cell.text} {unit_text}` is {format_exact(time)} s"
+        context.add_remark("converted", characteristic.name, text, cell.span)
     low, high = constant.range
     if not low <= ticks <= high or exact_ticks < -TICK_TOLERANCE:
         ends = " to ".join(format_exact(int(end) * context.automaton.period) for end in (low, high))
@@ -197,6 +224,7 @@ def _read_ticks(
 
 
 def _read_integer(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
+    """Return a whole number in its range; None with a problem reported for any other text."""
     number = parse_cell_number(cell, problems)
     if number is None:
         return None
@@ -212,7 +240,10 @@ def _read_integer(cell: Cell, parameter: Parameter, problems: Problems) -> int |
 
 
 def _read_word(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
-    """Return the place of a word in its list; a tool without words writes the place itself."""
+    """Return the index of a truth or enumeration value, given as a word or as the index itself.
+
+    Returns None with a problem reported for any other text.
+    """
     words = ("false", "true") if parameter.type == "bool" else parameter.values
     if cell.text in words:
         return words.index(cell.text)

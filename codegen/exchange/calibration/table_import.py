@@ -1,4 +1,6 @@
-"""Table: the values of a table that a file has, taken where its points are those of the spec."""
+"""Table import: the values of a table in a calibration file whose axis points are those of the
+spec.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,9 @@ def read_table(
     parameter: Parameter,
     context: ImportContext,
 ) -> YamlNode | None:
-    """Return the values of a table at its points, which are compiled in.
+    """Return the values of a table as a node of a calibration overlay, at the points of the spec.
 
-    None where it is no such table, which is reported.
+    Returns None with problems reported if the file has other points or an invalid value.
     """
     assert parameter.table
     problem_count = len(context.problems.reported)
@@ -58,7 +60,7 @@ def read_table(
 def _has_equal_axes(
     characteristic: FileCharacteristic, parameter: Parameter, context: ImportContext
 ) -> bool:
-    """Tell whether the axes of a file are those that are compiled in."""
+    """Tell whether the axes in a file equal the compiled ones in number, length, and points."""
     assert parameter.table
     compiled_axes = axes_of(parameter.table, context.number)
     if [len(axis.points) for axis in characteristic.axes] != [
@@ -80,6 +82,7 @@ def _has_equal_points(
     declared_unit: Unit,
     context: ImportContext,
 ) -> bool:
+    """Tell whether the points of an axis equal the compiled ones after conversion to SI units."""
     unit = resolve_unit(characteristic, declared_unit, axis.unit, context)
     return unit is not None and all(
         _is_equal(cell, unit, round_to_type(Fraction(point.text), context.number), context)
@@ -88,5 +91,6 @@ def _has_equal_points(
 
 
 def _is_equal(cell: Cell, unit: Unit, value: float, context: ImportContext) -> bool:
+    """Tell whether a cell, converted to SI units and rounded to the number type, equals a value."""
     number = parse_cell_number(cell, context.problems)
     return number is not None and convert_to_si(number, unit, cell, context) == value

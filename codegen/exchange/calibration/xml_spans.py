@@ -1,7 +1,7 @@
-"""XML tree: elements with their places; nothing is declared, fetched or expanded in it.
+"""XML parser: builds a tree of elements with their positions in the file.
 
-A document type may name a file of rules, which is not read. Entities that a document declares
-itself are refused, so that none can grow or reach a file.
+A document type declaration may name an external file, which is not read. Documents that declare
+entities are rejected, so that no entity can expand or refer to a file.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from xml.parsers import expat
 from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_DEPTH = 64
-"""Deepest nesting: a CDFX file of a structure in a structure has some twenty."""
+"""Maximum depth of nested elements; a CDFX file of nested structures has about twenty."""
 
 
 @dataclass(frozen=True)
 class Element:
-    """An element: its tag without a prefix, its own text, and what it holds."""
+    """An XML element: tag without namespace prefix, position, children, and pieces of its own
+    text.
+    """
 
     tag: str
     span: Span
@@ -27,22 +29,22 @@ class Element:
 
     @property
     def text(self) -> str:
-        """The text between its tags, without blanks around it."""
+        """The text directly inside the element, without surrounding white space."""
         return "".join(self.pieces).strip()
 
     def find_all(self, tag: str) -> Iterator[Element]:
-        """Iterate over the children with a tag."""
+        """Return an iterator over the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
     def find(self, *path: str) -> Element | None:
-        """Return what is found by going down a path of tags."""
+        """Return the first element at a path of tags below this one; None if there is none."""
         element: Element | None = self
         for tag in path:
             element = next(element.find_all(tag), None) if element else None
         return element
 
     def iter_descendants(self, tag: str) -> Iterator[Element]:
-        """Iterate over what is inside at any depth with a tag, in the order of the file."""
+        """Yield all elements with a tag below this one, at any depth, in the order of the file."""
         for child in self.children:
             if child.tag == tag:
                 yield child
@@ -50,7 +52,7 @@ class Element:
 
 
 class _Builder:
-    """What is told of a document while it is read, as a tree."""
+    """The handlers of an expat parser that build the tree of a document."""
 
     def __init__(self, source: Source, parser: expat.XMLParserType) -> None:
         self.source, self.parser, self.problems = source, parser, Problems()
@@ -63,10 +65,12 @@ class _Builder:
         parser.SkippedEntityHandler = self.skipped_entity
 
     def current_span(self, width: int = 1) -> Span:
+        """Return the current position of the parser."""
         at = self.parser.CurrentColumnNumber + 1
         return Span(self.source, self.parser.CurrentLineNumber, at, width)
 
     def start(self, name: str, attributes: object) -> None:
+        """Open an element; rejects a document nested deeper than MAX_DEPTH."""
         element = Element(name.rpartition(":")[2], self.current_span(len(name) + 1))
         self.stack[-1].children.append(element)
         self.stack.append(element)
@@ -74,28 +78,38 @@ class _Builder:
             self.reject("depth", f"elements lie more than {MAX_DEPTH} deep in each other")
 
     def end(self, name: str) -> None:
+        """Close the innermost element."""
         self.stack.pop()
 
     def text(self, data: str) -> None:
+        """Add text to the innermost element."""
         self.stack[-1].pieces.append(data)
 
     def document_type(self, name: str, system: object, public: object, inside: int) -> None:
+        """Reject a document type declaration with internal declarations."""
         if inside:
             self.reject("form", "a document that declares entities or elements is not read")
 
     def entity(self, *declared: object) -> None:
+        """Reject an entity declaration."""
         self.reject("form", "a document that declares entities is not read")
 
     def skipped_entity(self, name: str, is_parameter: object) -> None:
+        """Reject a reference to an unknown entity."""
         self.reject("form", f"the entity `{name}` is not known")
 
     def reject(self, kind: str, label: str) -> None:
+        """Report a problem at the current position and raise SpecError."""
         self.problems.error(kind, self.current_span(), label)
         raise SpecError(self.problems.reported)
 
 
 def parse_xml(source: Source, data: bytes) -> Element:
-    """Return the root of an XML document. Raises SpecError."""
+    """Return the root element of an XML document.
+
+    Raises SpecError for malformed XML, an unknown encoding, entity declarations or too deep
+    nesting.
+    """
     parser = expat.ParserCreate()
     parser.buffer_text = True
     parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)

@@ -1,1 +1,1 @@
-"""FMI: a Program as a co-simulation FMU of the Functional Mock-up Interface, 2.0 or 3.0."""
+"""Functional Mock-up Interface: a Program as a co-simulation FMU of FMI 2.0 or 3.0."""

@@ -1,4 +1,4 @@
-"""Archive: an FMU as the bytes of a zip file, the same bytes whenever it is made."""
+"""FMU archive: packs an FMU as a zip file whose bytes do not depend on the time of the build."""
 
 from __future__ import annotations
 
@@ -24,12 +24,18 @@ from codegen.toolchain.object_cache import substitute_objects
 from language.ir.program import Program
 
 SHARED_LIBRARY_FLAGS = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
-"""Only what the standard names is seen; without symbols, so that bytes do not tell of folders."""
+"""Flags of a shared library that exports only the functions of the standard. It has no symbols, so
+its
+
+bytes do not contain names of folders.
+"""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A machine as FMI names it: its folder in each version, and how its libraries end."""
+    """A platform in FMI: the name of its folder in each version, and the suffix of its
+    libraries.
+    """
 
     folders: Mapping[int, str]
     suffix: str
@@ -41,21 +47,26 @@ PLATFORMS: Mapping[tuple[str, str], Platform] = {
     ("Darwin", "x86_64"): Platform({2: "darwin64", 3: "x86_64-darwin"}, ".dylib"),
     ("Darwin", "arm64"): Platform({2: "darwin64", 3: "aarch64-darwin"}, ".dylib"),
 }
+"""The supported platforms by operating system and processor."""
 
 
 def binary_path(name: str, version: Version) -> str:
-    """Return the path in an FMU of what is compiled for this machine. Raises BuildError."""
+    """Return the path in an FMU of the binary for this machine.
+
+    Raises BuildError for a platform that FMI has no name for.
+    """
     machine = (platform.system(), platform.machine())
     if machine not in PLATFORMS:
         raise BuildError(f"FMI has no name for this machine ({' '.join(machine)}): pack sources")
-    found = PLATFORMS[machine]
-    return f"binaries/{found.folders[version]}/{name}{found.suffix}"
+    target = PLATFORMS[machine]
+    return f"binaries/{target.folders[version]}/{name}{target.suffix}"
 
 
 def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
-    """Return the library made of the sources of an FMU. Raises ToolMissing, BuildError.
+    """Compile the sources of an FMU and return the shared library.
 
-    Headers of the standard are not ours to change: they are read without warnings.
+    The headers of the standard are system headers for the compiler, which gives no warnings for
+    them. Raises MissingToolError, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         ours, standard = Path(name) / "sources", Path(name) / "standard"
@@ -75,18 +86,20 @@ def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> by
 
 
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The earliest time that a zip file can tell: no file in it has another."""
+"""The earliest time that a zip file can hold; every entry has it."""
 
 FILE_MODE, EXECUTABLE_MODE = 0o644, 0o755
+"""Permissions of files and of binaries."""
 
 UNIX = 3
-"""Who made an entry, for the permissions that it has."""
+"""The system code of Unix in a zip entry, which makes its permissions valid."""
 
 
 def build_fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
-    """Return an FMU of a Program, with a binary for this machine or with sources alone.
+    """Return an FMU of a Program as bytes, with a binary for this machine or with sources only.
 
-    Raises ValueError as `fmu_files` does; ToolMissing, BuildError where there is a binary to make.
+    Raises ValueError as `emit_fmu_files` does; MissingToolError and BuildError if a binary is
+    built.
     """
     files = emit_fmu_files(program, version)
     if not is_source_only:
@@ -97,6 +110,7 @@ def build_fmu(program: Program, version: Version, is_source_only: bool = False) 
 
 
 def _zip_files(files: Mapping[str, bytes]) -> bytes:
+    """Return a zip file with the files in the order of their paths; binaries are executable."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for path in sorted(files):

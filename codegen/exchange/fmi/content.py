@@ -1,4 +1,4 @@
-"""Content: the files of an FMU - its description, its sources, the headers of the standard."""
+"""FMU content: the files of an FMU: model description, sources, and headers of the standard."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ HEADERS: Mapping[Version, tuple[str, ...]] = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
 }
-"""Headers of the Modelica Association, under their own licence (BSD, two clauses)."""
+"""Headers of the Modelica Association, under their own licence (BSD, two clauses), by version."""
 COMPILER_OPTIONS = "-ffp-contract=off -fno-fast-math"
-"""What a compiler must be told; under others the bits are others."""
+"""Options that a compiler needs so that its code gives the same bits (rule C3)."""
 
 
 def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
-    """Return the files of an FMU without a binary, by their path in it.
+    """Return the files of an FMU without a binary, by their path in it, in sorted order.
 
-    Raises ValueError for a version that is not known and for a Program that has no C.
+    Raises ValueError for an unknown version and for a Program that has no C.
     """
     if version not in VERSIONS:
         known = " and ".join(map(str, VERSIONS))
@@ -44,25 +44,31 @@ def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
 
 
 def emit_wrapper(program: Program, version: Version) -> dict[str, str]:
-    """Return the C that puts the functions of the standard around a Program's own, by name."""
+    """Return the C file that implements the functions of the standard with those of a Program,
+    by name.
+    """
     context = fmu_context(program, version)
     return {f"{program.name}_fmu.c": render(f"fmi/fmi_{version}.c.jinja", context)}
 
 
 def read_headers(version: Version) -> dict[str, bytes]:
-    """Return the headers of the standard by name."""
+    """Return the contents of the headers of a version by name."""
     folder = resources.files("codegen.exchange.fmi").joinpath("headers")
     return {name: folder.joinpath(name).read_bytes() for name in HEADERS[version]}
 
 
 def instantiation_token(program: Program, version: Version) -> str:
-    """Return what ties a description to its binary: it follows from digest, version and product."""
+    """Return the token that ties a description to its binary, a UUID.
+
+    It is computed from the version of the product, the version of FMI, and the name and digest of
+    the Program.
+    """
     identity = f"modewright {product()} FMI {version} {program.name} {digest(program)}"
     return f"{{{uuid.uuid5(uuid.NAMESPACE_URL, identity)}}}"
 
 
 def fmu_context(program: Program, version: Version) -> dict[str, Any]:
-    """Return what the templates of an FMU read."""
+    """Return the context of the templates of an FMU."""
     variables = variables_of(program, version)
     period = program.period or program.major_step
     return {
@@ -88,8 +94,10 @@ def fmu_context(program: Program, version: Version) -> dict[str, Any]:
 
 
 def _c_sources(sources: Mapping[str, str]) -> list[str]:
+    """Return the names of the C files in sorted order."""
     return sorted(name for name in sources if name.endswith(".c"))
 
 
 def _render_bytes(template: str, context: Mapping[str, Any]) -> bytes:
+    """Return a rendered template in UTF-8."""
     return render(template, context).encode()

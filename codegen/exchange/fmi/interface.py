@@ -1,4 +1,6 @@
-"""Interface: the variables of a Program's FMU, in the order of their references."""
+"""FMU interface: the variables and enumeration types of a Program's FMU, in the order of
+references.
+"""
 
 from __future__ import annotations
 
@@ -32,21 +34,26 @@ from language.ir.program import (
 from language.text.sanitise import escape_invisible
 
 RUN_MODE = "memory.run_mode"
+"""The variable of the mode of the model that a run integrates."""
 
 PREFIX = "type."
-"""Stands before names of types: FMI wants them different from names of variables."""
+"""The prefix of type names, which in FMI must differ from names of variables."""
 
 
 @dataclass(frozen=True)
 class Enumeration:
-    """A type: its name, and its items, each a name and a number that need not start at 0."""
+    """An enumeration type: its name, and pairs of item name and number; numbers may begin at any
+    value.
+    """
 
     name: str
     items: tuple[tuple[str, int], ...]
 
 
 def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
-    """Return the types of a Program: the modes of each region, then lists of names."""
+    """Return the enumeration types of a Program: modes, modes of regions, run modes, then value
+    lists.
+    """
     types = [_mode_enumeration("mode", program.modes)]
     types += [_mode_enumeration(f"region.{info.name}", info.modes) for info in program.regions]
     if program.run_modes:
@@ -59,7 +66,9 @@ def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
 
 
 def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) -> str:
-    """Return the name of the type of a variable or constant; an empty text where it has none."""
+    """Return the type name of a variable or constant with enumeration `values`; empty if it has
+    no type.
+    """
     if name == MODE_VARIABLE:
         return f"{PREFIX}mode"
     if name == RUN_MODE:
@@ -72,6 +81,7 @@ def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) 
 
 
 def _mode_enumeration(name: str, modes: Iterable[ModeInfo]) -> Enumeration:
+    """Return the enumeration type of a list of modes."""
     return Enumeration(f"{PREFIX}{name}", tuple((mode.name, mode.number) for mode in modes))
 
 
@@ -83,17 +93,22 @@ LOCAL_PREFIXES = (
     "memory.mode",
     "memory.run_mode",
 )
+"""Prefixes of variables of the instance that become locals of the FMU unless an output shows
+them.
+"""
 
 FIRED = "memory.fired"
+"""The prefix of variables with the number of the last transition; they become locals too."""
 
 FAULTS = "memory.faults"
-"""Locals are what an instance carries of these, where no output has it."""
+"""The fault word, which becomes a local too."""
 
 
 def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
-    """Return the variables of an FMU: time, inputs, parameters, outputs, locals.
+    """Return the variables of an FMU in their order: time, inputs, parameters, outputs, locals,
+    faults.
 
-    Names are those of the spec; a name that is taken gets its causality before it.
+    Names are those of the spec. A name that occurs again gets its causality as a prefix.
     """
     program = restrict_to_step(program)
     variables = [
@@ -108,11 +123,13 @@ def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
 
 
 def _time_variable(version: Version) -> FmuVariable:
+    """Return the independent variable."""
     kind = fmi_type(version, "double")
     return FmuVariable("time", kind, "double", "time", "independent", "continuous", unit=SECOND)
 
 
 def _input_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+    """Yield the inputs and the flags for new values, with start values and limits."""
     place, first = CNames(program), _start_values(program)
     for variable in program.variables:
         group, _, name = variable.name.partition(".")
@@ -137,7 +154,10 @@ def _input_variables(program: Program, version: Version) -> Iterator[FmuVariable
 
 
 def _start_values(program: Program) -> dict[str, float | bool]:
-    """Return what inputs hold at first: their default, or of a range what is nearest to 0."""
+    """Return the start values of inputs: the default, else the value that `init` sets.
+
+    `init` sets the value of the range that is nearest to 0.
+    """
     held = {
         unqualified_name(op.target): op.value.value
         for op in program.blocks.get("init", ())
@@ -148,7 +168,7 @@ def _start_values(program: Program) -> dict[str, float | bool]:
 
 
 def _parameter_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
-    """The whole page: tunable parameters, tables by point, and numbers solved for them."""
+    """Yield the calibration page as parameters: tunables, tables by point, and solved numbers."""
     for constant in program.constants:
         if constant.kind not in ("tunable", "solved"):
             continue
@@ -175,6 +195,7 @@ def _parameter_variables(program: Program, version: Version) -> Iterator[FmuVari
 
 
 def _output_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+    """Yield the outputs."""
     sources = {variable.name: variable for variable in program.variables}
     for wire in program.outputs:
         source = dataclasses.replace(sources[wire.source], unit=wire.unit)
@@ -184,6 +205,7 @@ def _output_variables(program: Program, version: Version) -> Iterator[FmuVariabl
 
 
 def _local_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+    """Yield variables of the instance that no output shows, as locals."""
     place = CNames(program)
     output_sources = {wire.source for wire in program.outputs}
     for variable in program.variables:
@@ -198,6 +220,7 @@ def _local_variables(program: Program, version: Version) -> Iterator[FmuVariable
 
 
 def _fault_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+    """Yield one boolean local for each fault bit."""
     for bit, fault in enumerate(program.faults):
         yield FmuVariable(
             f"fault.{fault}",
@@ -218,7 +241,10 @@ def _make_variable(
     place: str,
     causality: Causality,
 ) -> FmuVariable:
-    """Return a variable with what follows from its type."""
+    """Return an FMU variable whose type, variability, unit and comment follow from a variable.
+
+    `place` is its path in C, `storage_type` its C type.
+    """
     declared = enumeration_name(program, variable.name, variable.values)
     flows = program.period is None and variable.type == "real"
     variability = "continuous" if flows else "discrete"
@@ -236,7 +262,10 @@ def _make_variable(
 
 
 def _with_limits(variable: FmuVariable, program: Program, constant: Constant | None) -> FmuVariable:
-    """Return a variable that may be set with what it may be set to."""
+    """Return a settable variable with the limits of its values.
+
+    The limits are those of the range of a parameter, of the enumeration, or of the C type.
+    """
     low, high = TYPE_LIMITS[variable.kept]
     if variable.declared:
         items = next(e.items for e in enumerations_of(program) if e.name == variable.declared)
@@ -244,16 +273,16 @@ def _with_limits(variable: FmuVariable, program: Program, constant: Constant | N
     if constant is None or constant.range is None:
         return dataclasses.replace(variable, low=low, high=high)
     ends = [float(end) for end in constant.range]
-    told = (
+    range_texts = (
         _format_value(ends[0], variable.kept, program),
         _format_value(ends[1], variable.kept, program),
     )
-    # The C compares doubles: a float32 end is written with all its digits.
-    return dataclasses.replace(variable, range=told, low=repr(ends[0]), high=repr(ends[1]))
+    # The C compares doubles: the end of a float32 range needs all digits of a double.
+    return dataclasses.replace(variable, range=range_texts, low=repr(ends[0]), high=repr(ends[1]))
 
 
 def _format_value(value: float | bool, storage_type: str, program: Program) -> str:
-    """Return a value as the description has it."""
+    """Return a value as text in the model description."""
     if storage_type == "bool":
         return "true" if value else "false"
     if storage_type in ("double", "float"):
@@ -262,6 +291,7 @@ def _format_value(value: float | bool, storage_type: str, program: Program) -> s
 
 
 def _make_names_unique(variables: Sequence[FmuVariable]) -> Iterator[FmuVariable]:
+    """Yield the variables; a name that occurred before gets its causality as a prefix."""
     taken: set[str] = set()
     for variable in variables:
         name = variable.name
@@ -274,6 +304,6 @@ def _make_names_unique(variables: Sequence[FmuVariable]) -> Iterator[FmuVariable
 def used_enumerations(
     program: Program, variables: Sequence[FmuVariable]
 ) -> tuple[Enumeration, ...]:
-    """Return the types that some variable has."""
+    """Return the enumeration types that at least one of the variables has."""
     declared = {variable.declared for variable in variables}
     return tuple(one for one in enumerations_of(program) if one.name in declared)

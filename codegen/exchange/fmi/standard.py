@@ -1,4 +1,6 @@
-"""Standard: the functions that FMI wants of every FMU, read from its headers; which we refuse."""
+"""FMI standard: the functions that every FMU must export, read from the headers, and the
+rejected ones.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ from importlib import resources
 from codegen.exchange.fmi.variable import FMI_TYPES, Version
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+"""A comment in C."""
 FUNCTION = re.compile(r"typedef\s+fmi\dStatus\s+(fmi\d\w+?)TYPE\s*\((.*?)\);", re.DOTALL)
+"""The type definition of a function that returns a status: name and parameters."""
 IMPLEMENTED: Mapping[Version, str] = {
     2: "SetDebugLogging SetupExperiment EnterInitializationMode ExitInitializationMode Terminate "
     "Reset GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate "
@@ -19,7 +23,7 @@ IMPLEMENTED: Mapping[Version, str] = {
     "GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState "
     "DeserializeFMUState DoStep",
 }
-"""Functions that return a status and have a template of their own."""
+"""Functions that return a status and have their own template."""
 REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
     ("String$", "no variable is a text"),
     ("Binary", "no variable is binary"),
@@ -32,12 +36,12 @@ REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
     ("StepMode|EvaluateDiscrete|UpdateDiscrete", "there is no event mode"),
     ("", "this is co-simulation, not model exchange"),
 )
-"""Why a function is refused: that of the first pattern found in its name."""
+"""Reasons why a function is rejected: the first pattern that is found in its name applies."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A function that is there, as FMI wants it, and refuses each call: its C, and why."""
+    """A function that is exported because FMI requires it, and returns an error on each call."""
 
     name: str
     parameters: tuple[str, ...]
@@ -45,12 +49,12 @@ class Refusal:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Return the names of the parameters."""
+        """The names of the parameters."""
         return tuple(parameter.split()[-1].strip("*[]") for parameter in self.parameters)
 
 
 def refusals(version: Version) -> Iterator[Refusal]:
-    """Yield the functions of a version that no template makes, in the order of its header."""
+    """Yield the functions of a version that are not implemented, in the order of the header."""
     file = resources.files("codegen.exchange.fmi").joinpath(
         "headers", f"fmi{version}FunctionTypes.h"
     )
@@ -66,5 +70,5 @@ def refusals(version: Version) -> Iterator[Refusal]:
 
 
 def _format_parameter(parameter: str) -> str:
-    """Return a parameter in one line, the star of a pointer beside its name."""
+    """Return a parameter on one line, with the star of a pointer beside its name."""
     return " ".join(parameter.split()).replace("* ", " *")

@@ -1,4 +1,4 @@
-"""Unit: units of a Program as FMI defines them, by exponents of the base units."""
+"""FMI units: the units of a Program as FMI defines them, by exponents of SI base units."""
 
 from __future__ import annotations
 
@@ -9,30 +9,34 @@ from language.expressions.unit_symbols import BASE_SYMBOLS
 from language.expressions.units import UnitError, display_unit, parse_unit
 
 SECOND = "s"
+"""The unit of time."""
 BASE_ORDER = ("kg", "m", "s", "A", "K", "rad")
-"""Order in which exponents are written."""
+"""The order in which exponents are written."""
 
 
 @dataclass(frozen=True)
 class UnitDefinition:
-    """A unit by its name, and the exponents of its base units that are not 0. All are SI."""
+    """An SI unit: its name and its base units with nonzero exponents."""
 
     name: str
     exponents: tuple[tuple[str, int], ...]
 
 
 def unit_name(text: str) -> str:
-    """Return the name of a unit of a Program; an empty text for a number, and for what is none."""
+    """Return the display name of a unit of a Program; empty for a pure number and for an invalid
+    unit.
+    """
     return display_unit(text) if text and _is_unit(text) else ""
 
 
 def unit_definitions(texts: Iterable[str]) -> tuple[UnitDefinition, ...]:
-    """Return the definitions of units of a Program, each once, in order of their names."""
+    """Return the definitions of units of a Program, each once, in the order of their names."""
     named = {unit_name(text): text for text in texts if unit_name(text)}
     return tuple(UnitDefinition(name, _exponents(named[name])) for name in sorted(named))
 
 
 def _is_unit(text: str) -> bool:
+    """Tell whether a text is a valid unit that is not a pure number."""
     try:
         return not parse_unit(text).dimension.is_number
     except UnitError:
@@ -40,6 +44,7 @@ def _is_unit(text: str) -> bool:
 
 
 def _exponents(text: str) -> tuple[tuple[str, int], ...]:
+    """Return the base units of a unit with their nonzero exponents."""
     dimension = parse_unit(text).dimension
     powers = dict(zip(BASE_SYMBOLS, dimension.powers, strict=True))
     powers["rad"] = dimension.angle or 0

@@ -1,4 +1,4 @@
-"""Variable: one value of an FMU - how the description tells it, where the C keeps it."""
+"""FMU variables: the attributes of a variable in the model description, and its storage in C."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Literal
 
 Version = Literal[2, 3]
 VERSIONS: tuple[Version, ...] = (2, 3)
+"""The supported versions of FMI."""
 Causality = Literal["independent", "input", "parameter", "output", "local"]
 ROLES: Mapping[str, str] = {"input": "INPUT", "parameter": "PARAMETER"}
-"""What may be set; the rest is shown."""
+"""The C constants for variables that an importer may set; all others are read only."""
 FMI_TYPES: Mapping[Version, tuple[str, ...]] = {
     2: ("Real", "Integer", "Boolean"),
     3: (
@@ -18,7 +19,9 @@ FMI_TYPES: Mapping[Version, tuple[str, ...]] = {
         *("Int64", "UInt64", "Boolean"),
     ),
 }
-"""Types that the functions of a version read and write; there are no texts and no bytes."""
+"""Types that the get and set functions of a version access; strings and binaries are not
+supported.
+"""
 FMI3_TYPE_OF: Mapping[str, str] = {
     "double": "Float64",
     "float": "Float32",
@@ -28,7 +31,7 @@ FMI3_TYPE_OF: Mapping[str, str] = {
     "uint16_t": "UInt16",
     "uint32_t": "UInt32",
 }
-"""Types of FMI 3.0 of what the C keeps."""
+"""The type of FMI 3.0 by C type."""
 TYPE_LIMITS: Mapping[str, tuple[str, str]] = {
     "double": ("-DBL_MAX", "DBL_MAX"),
     "float": ("-(double)FLT_MAX", "(double)FLT_MAX"),
@@ -37,16 +40,17 @@ TYPE_LIMITS: Mapping[str, tuple[str, str]] = {
     "uint8_t": ("0.0", "255.0"),
     "uint16_t": ("0.0", "65535.0"),
 }
-"""What a member that may be set can hold, as C."""
+"""The smallest and largest value of a settable member by C type, as C expressions."""
 
 
 @dataclass(frozen=True)
 class FmuVariable:
     """A variable of an FMU.
 
-    `kept` is the C type of the member at `place` of an image (an instance with its page), or
-    `fault` for one of its bits; `declared` names an enumeration; `range` is what is told of a
-    parameter, `low` and `high` what may be set, as C.
+    `kept` is the C type of the member at `place` in the image (an instance with its page), or
+    `fault` for a fault bit. `declared` names an enumeration type, or is empty. `range` is the range
+    of a parameter in the description; `low` and `high` are the limits of a settable value, as C
+    expressions.
     """
 
     name: str
@@ -65,12 +69,12 @@ class FmuVariable:
 
     @property
     def role(self) -> str:
-        """Return what an importer may do with it, as the C names it."""
+        """The C constant that tells whether an importer may set the variable."""
         return ROLES.get(self.causality, "SHOWN")
 
 
 def fmi_type(version: Version, storage_type: str) -> str:
-    """Return the type of FMI whose functions read a value of a C type."""
+    """Return the FMI type whose functions access a value of a C type."""
     if storage_type in ("bool", "fault"):
         return "Boolean"
     if version == 3:
@@ -79,5 +83,5 @@ def fmi_type(version: Version, storage_type: str) -> str:
 
 
 def fmi_enumeration_type(version: Version) -> str:
-    """Return the type of FMI whose functions read an enumeration."""
+    """Return the FMI type whose functions access an enumeration."""
     return "Integer" if version == 2 else "Int64"
