@@ -67,7 +67,7 @@ class FitCache:
             return _from_arrays(candidate, series, dict(np.load(io.BytesIO(path.read_bytes()))))
         self.before_fit()
         estimate = fit()
-        with suppress(OSError):  # a full disk is no reason to stop
+        with suppress(OSError):  # a full disk does not end the diagnosis
             data = io.BytesIO()
             np.savez(data, **_to_arrays(estimate))
             self.folder.mkdir(parents=True, exist_ok=True)

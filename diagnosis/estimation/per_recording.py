@@ -1,4 +1,4 @@
-"""Adaptation: what each recording has of its own - a phase, a grade - found with all else held."""
+"""Parameters per recording: re-estimation of phases, grades and the like with all else fixed."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from diagnosis.estimation.levenberg_marquardt import INITIAL_DAMPING, search_dam
 from diagnosis.model.parameter_vector import ParameterVector
 
 MAX_ITERATIONS = 5
-"""Most steps of what other recordings have of their own."""
+"""Maximum number of steps of the parameters per recording."""
 
 
 def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return a model for other recordings, with the gains that it has.
+    """Return a model for other recordings, with its own Kalman gains and shared parameters.
 
-    What all recordings share stays where it is; only what each has of its own is fitted, from the
-    best of its starts.
+    Only parameters per recording are fitted, from the better of the shared vector and their
+    declared starts. Without such parameters, or if the cost is infinite, nothing is fitted.
     """
     shared = model.point.shared
     now = evaluate_with_gains_of(
@@ -52,9 +52,11 @@ def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]
 
 
 def restart_phases(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return an estimate with what each recording has of its own where it is, or at a better start.
+    """Return an estimate with each parameter per recording at the best of its starts, if that is
+    better.
 
-    A phase that was turned while others were unknown may have come to rest at a wrong one.
+    A phase that was fitted while other parameters were wrong may be at a local optimum. The starts
+    of each parameter are compared for each recording by the sum of squared innovations.
     """
     uncertain = estimate.candidate.free_parameters
     own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]

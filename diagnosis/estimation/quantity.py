@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Quantity:
-    """A fitted number [unit] with its standard deviation."""
+    """An estimated value [unit] with its standard deviation."""
 
     value: float
     unit: str

@@ -1,4 +1,6 @@
-"""Scale: how much acts at a place, so that what is missing there can be told as a part of it."""
+"""Acting scale: the size of the torque, force or signal at a place, for comparison with a
+disturbance.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,14 @@ from language.overlays.effect_place import PlaceMismatch, find_effect_place
 
 Reals = NDArray[np.float64]
 DISTURBANCE_KIND_BY_SECTION = {"flow": "balance", "elements": "element", "outputs": "output"}
-"""Sections of places to kinds of drifts."""
+"""The kind of disturbance for each section of a document."""
 
 
 def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -> float:
-    """Return the root mean square [SI] of what acts at a place; 0 where that cannot be told.
+    """Return the root mean square [SI] of what acts at a place; 0 if it cannot be determined.
 
-    Of a balance what accelerates it, of an element its elastic torque, of an output the signal.
+    For a balance this is its inertia times the rate, for an element its elastic torque (stiffness
+    times twist without the gap), for an output the standard deviation of the measurements.
     """
     if section == "outputs":
         column = model_set.output_names.index(place)
@@ -47,14 +50,16 @@ def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -
 
 
 def disturbance_unit(model_set: ModelSet, section: str, place: str) -> str:
-    """Return the unit of what is unknown at a place."""
+    """Return the unit of a disturbance at a place; "" if none can be placed there."""
     return place_bindings(model_set, section, place).get(
         "unit" if section == "outputs" else "force", ""
     )
 
 
 def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, str]:
-    """Return what effects find at a place, as texts; nothing where no drift can be laid."""
+    """Return the names and texts that a disturbance effect binds at a place; empty if it does not
+    match.
+    """
     kind = DISTURBANCE_KIND_BY_SECTION.get(section)
     if kind is None:
         return {}
@@ -67,7 +72,7 @@ def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, s
 
 
 def _coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float | None:
-    """Return the value of a coefficient that is a parameter."""
+    """Return the fitted or declared value of a parameter; None if `text` is not one."""
     known = model.values(0).get(text)
     declared = model_set.automaton.parameters.get(text)
     if known is not None or declared is None or declared.value is None:
@@ -76,4 +81,5 @@ def _coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float
 
 
 def _rms(values: Reals) -> float:
+    """Return the root mean square; 0 for no values."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0

@@ -1,9 +1,10 @@
-"""Actor: what acts in the balance in which something is missing - a body, an input.
+"""Cause attribution: the input or body that causes a disturbance in a balance, from its time
+course.
 
-A drift in a balance is as well one of what acts there, and what it does over time tells which. What
-goes along with the acceleration is a mass's. What turns with the angle is an input's: machines and
-discs ripple, losses do not. So is what does not change with the speed, its sign, or the recording:
-a friction turns with the sign, a load on the road is another one in each recording.
+A disturbance that correlates with the acceleration belongs to a mass. One that is periodic in the
+angle belongs to an input: machines and discs have ripple, losses do not. A constant that depends
+neither on the speed, nor its sign, nor the recording belongs to an input as well: friction changes
+with the sign, and a road load differs between recordings.
 """
 
 from __future__ import annotations
@@ -21,22 +22,31 @@ from language.overlays.tree_types import formula_entries
 
 Reals = NDArray[np.float64]
 RIPPLE_CORRELATION = 0.6
-"""Correlation with an order of an angle from which on a drift ripples."""
+"""Correlation with an order of an angle above which a disturbance is a ripple."""
 MASS_CORRELATION, MASS_FRACTION = 0.6, 0.45
-"""Correlation with the acceleration, and part of what accelerates, from which on it is a mass: a
-tyre and a third inertia have 0.73 and 0.6 at least, loads 0.44 and 0.29 at most but for one."""
+"""Correlation with the acceleration, and fraction of the accelerating torque, that indicate a mass.
+
+A tyre and a third inertia have at least 0.73 and 0.6; loads have, but for one, at most 0.44 and
+0.29.
+"""
 CONSTANT_FRACTION = 0.95
-"""Part of its squares that a constant and a line over the speed have of what is steady."""
+"""Fraction of the squares that a constant and a line over the speed must explain."""
 CONSTANT_MARGIN = 0.3
-"""Part of them that the constant has alone: a line through zero is a friction."""
+"""Fraction that the constant must explain beyond the line: a line through zero is friction."""
 
 INACTIVE_AMPLITUDE, INACTIVE_ENERGY = 0.02, 0.5
-"""Part of its largest amount below which an input rests, and part of the squares of a drift that is
-most of it."""
+"""Fraction of its largest magnitude below which an input is inactive, and the fraction of the
+squares of a disturbance that counts as most of it.
+"""
 
 
 def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
-    """Yield the paths of what acts in the balance of a place, as its drift tells."""
+    """Yield the paths of inputs or elements that act in a location's balance and fit its
+    disturbance.
+
+    Elements follow for a disturbance that correlates with the acceleration, inputs for a ripple,
+    and inputs of both signs for a constant; else nothing is yielded.
+    """
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
     if _follows_acceleration(model_set, location):
         paths = [f"elements.{name}" for name in model_set.automaton.elements]
@@ -48,8 +58,9 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
 
 
 def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
-    """Tell whether an input rests while most of what is missing at a place is there: it is not the
-    error of that one.
+    """Return whether an input is near 0 during most of a disturbance, so it cannot be its cause.
+
+    `path` is `section.name`; the answer is False for other sections and unknown disturbances.
     """
     section, _, name = path.partition(".")
     if section != "inputs" or not location.disturbances:
@@ -67,7 +78,9 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return the balance in which what is at an input or at an inertia acts."""
+    """Return `flow.state` of the balance in which an input or an inertia acts, else
+    `section.place`.
+    """
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:
         return f"flow.{'.'.join(element.parts['speed'].reads)}"
@@ -79,11 +92,13 @@ def balance_of(model_set: ModelSet, section: str, place: str) -> str:
 
 
 def _is_ripple(location: Location) -> bool:
+    """Return whether the strongest correlate is an order of the angle at the place."""
     name, part = location.correlates[0] if location.correlates else ("", 0.0)
     return name in order_features(location.place) and part > RIPPLE_CORRELATION
 
 
 def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
+    """Return whether a disturbance is large and correlates with the acceleration of its balance."""
     speeds = _balance_states(location)
     if not speeds or location.fraction < MASS_FRACTION:
         return False
@@ -92,8 +107,10 @@ def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
 
 
 def _is_constant(model_set: ModelSet, location: Location) -> bool:
-    """Tell whether what is missing is a constant, more than it is a sign of the speed; a line over
-    the speed is what a friction of the base has been bent by.
+    """Return whether a disturbance is a constant rather than the sign of the speed.
+
+    A line over the speed is allowed beside it, because a fit may have changed the friction of the
+    base.
     """
     speeds = _balance_states(location)
     if not speeds:
@@ -102,6 +119,7 @@ def _is_constant(model_set: ModelSet, location: Location) -> bool:
     whole = float(unknown @ unknown)
 
     def explained(form: Reals) -> float:
+        """Return the fraction of the squares that `form` and the speed explain by least squares."""
         columns = np.stack([form, speed], axis=1)
         left = unknown - columns @ np.linalg.lstsq(columns, unknown, rcond=None)[0]
         return 1.0 - float(left @ left) / whole
@@ -112,14 +130,19 @@ def _is_constant(model_set: ModelSet, location: Location) -> bool:
 
 
 def _has_both_signs(model_set: ModelSet, path: str) -> bool:
-    """Tell whether an input has both signs: a brake, which has one, is no constant at rest."""
+    """Return whether an input takes both signs; a brake has one sign and cannot be constant at
+    rest.
+    """
     column = list(model_set.automaton.inputs).index(path.partition(".")[2])
     values = np.concatenate([one.inputs[:, column] for one in model_set.series])
     return bool(values.min() < 0.0 < values.max())
 
 
 def _balance_states(location: Location) -> list[Reals]:
-    """Return the state of a place's balance in each recording where its unknown is known."""
+    """Return the state of a location's balance where its disturbance is known, for each recording.
+
+    The list is empty for other places and unknown disturbances.
+    """
     if location.section != "flow" or location.free_model is None or not location.disturbances:
         return []
     column = location.free_model.candidate.predictor.states.index(location.place)
@@ -130,4 +153,5 @@ def _balance_states(location: Location) -> list[Reals]:
 
 
 def _stacked_disturbance(location: Location) -> Reals:
+    """Return the disturbance of all recordings, concatenated."""
     return np.concatenate([one.values for one in location.disturbances])

@@ -1,4 +1,4 @@
-"""Companion: what an unknown goes along with - a sign of a speed, its square, an order, time."""
+"""Correlates: the quantities with which a disturbance correlates, such as the sign of a speed."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from language.text.document import MappingNode, ScalarNode
 
 Reals = NDArray[np.float64]
 MAX_CORRELATES = 3
-"""Companions that are told."""
+"""Number of correlates that are reported."""
 ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
-"""Periods per turn that are looked for."""
+"""Periods per turn that are tested."""
 
 
 def find_correlates(
     model_set: ModelSet, free_model: Estimate, disturbances: Sequence[Reals]
 ) -> tuple[tuple[str, float], ...]:
-    """Return what a drift goes along with: features with their correlation, the strongest first.
+    """Return the features with which a disturbance correlates, and the correlations, strongest
+    first.
 
-    Of an order of an angle, which has a phase of its own in each recording, it is the multiple
-    correlation with its sine and cosine.
+    For an order of an angle, whose phase differs between recordings, the value is the multiple
+    correlation with its sine and cosine. At most `MAX_CORRELATES` features are returned; constant
+    ones are left out.
     """
     target = [values - np.mean(values) for values in disturbances]
     correlations = []
@@ -46,17 +48,24 @@ def find_correlates(
 
 
 def order_features(rate: str) -> dict[str, int]:
-    """Return the features that are orders of the angle of a rate, with the periods per turn."""
+    """Return the names of features that are orders of the angle of a rate, with their periods per
+    turn.
+    """
     return {f"order {order} of the angle of {rate}": order for order in ORDERS}
 
 
 def _known_parts(parts: Sequence[Reals], disturbances: Sequence[Reals]) -> list[Reals]:
-    """Return the part of each recording in which its drift is known: all but the start."""
+    """Return the last samples of each feature, as many as the disturbance has."""
     pairs = zip(parts, disturbances, strict=True)
     return [part[len(part) - len(values) :] for part, values in pairs]
 
 
 def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
+    """Return the features of states and inputs by name, one array (samples,) for each recording.
+
+    These are states with a range with sign and square, inputs with magnitude and rate, and the
+    time.
+    """
     columns: dict[str, list[Reals]] = {}
     states = free_model.candidate.predictor.states
     for one, prediction in zip(model_set.series, free_model.prediction.predictions, strict=True):
@@ -82,7 +91,10 @@ def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals
 
 
 def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
-    """Return the angles of orders of what turns: the rates that places and elements declare."""
+    """Return the angle times the order by name of the feature, one array for each recording.
+
+    The rates of the angles are declared by places and elements.
+    """
     states = free_model.candidate.predictor.states
     rates = [rate for rate in angle_rates(model_set) if rate in states]
     found = {}
@@ -99,7 +111,7 @@ def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[R
 
 
 def angle_rates(model_set: ModelSet) -> list[str]:
-    """Return what is the rate of an angle, as `elements` and `places` declare it."""
+    """Return the names of rates of angles that `places` and `elements` of a document declare."""
     rates = []
     for section in ("places", "elements"):
         node = model_set.document.root.get(section)
@@ -111,6 +123,9 @@ def angle_rates(model_set: ModelSet) -> list[str]:
 
 
 def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> float:
+    """Return the multiple correlation with the sine and cosine of angles, fitted for each
+    recording.
+    """
     whole, explained = 0.0, 0.0
     for values, angle in zip(target, angles, strict=True):
         waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
@@ -122,7 +137,9 @@ def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> floa
 
 
 def _recording_correlation(disturbances: Sequence[Reals]) -> float:
-    """Return the correlation with the mean of each recording; 0 with a single one."""
+    """Return the correlation of a disturbance with its mean in each recording; 0 for one
+    recording.
+    """
     if len(disturbances) < 2:
         return 0.0
     means = np.concatenate([np.full(len(values), np.mean(values)) for values in disturbances])

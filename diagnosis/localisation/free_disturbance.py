@@ -1,4 +1,7 @@
-"""Freedom: the base with one drift as free as the recordings ask for, all others small."""
+"""Free disturbance: a fit of the base with a large process-noise level at one place.
+
+The other disturbances stay small.
+"""
 
 from __future__ import annotations
 
@@ -17,24 +20,26 @@ from diagnosis.model.parameter_vector import extend_vector, vector_of
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
 SMALL_LEVEL = INITIAL_LEVELS[0]
-"""What all drifts have while one of them is let free."""
+"""Level of the other disturbances, in their units."""
 INITIAL_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)
-"""Levels from which parameters are fitted: a sensor's error is easily a hundred times its noise."""
+"""Levels that are tried before the parameters are fitted: a sensor error can be 100 times its
+noise.
+"""
 NEAR_LEVELS = (3.0, 30.0, 300.0)
-"""Levels that are looked at beside, when the parameters are fitted."""
+"""Levels that are tried after the parameters are fitted."""
 ALL_LEVELS = tuple(sorted((INITIAL_LEVEL, *WIDE_LEVELS, *NEAR_LEVELS)))
 MAX_ITERATIONS = 3
-"""Rounds in which the parameters are fitted to a freedom: what they have to do is little."""
+"""Iterations of the parameters; their changes are small."""
 
 
 def free_disturbance(
     model_set: ModelSet, base: Estimate, placed_effect: PlacedEffect | None = None
 ) -> Estimate:
-    """Return a model with one drift free, its parameters fitted anew; with none, all small.
+    """Return the model with the disturbance of `placed_effect` free and its parameters fitted.
 
-    They start where the model is, and where they are declared: a base that lacks something may
-    have been led far astray.
+    With None all disturbances stay small. The fit starts from the parameters of the base and from
+    the declared ones, because the fit of a deficient base may be far off. It is cached.
     """
     known = placed_effect is None or any(
         placed_effect.id == other.id for other in model_set.disturbances
@@ -45,15 +50,15 @@ def free_disturbance(
         else (*model_set.disturbances, placed_effect)
     )
     candidate = model_set.compile_candidate(base.candidate.placed_effects, drifts)
-    make = partial(_fit_free_disturbance, model_set, base, candidate, placed_effect)
-    given = [base.point, base.noise_levels, placed_effect and placed_effect.id]
-    return model_set.load_or_fit("freed", candidate, given, make)
+    fit = partial(_fit_free_disturbance, model_set, base, candidate, placed_effect)
+    dependencies = [base.point, base.noise_levels, placed_effect and placed_effect.id]
+    return model_set.load_or_fit("freed", candidate, dependencies, fit)
 
 
 def _fit_free_disturbance(
     model_set: ModelSet, base: Estimate, candidate: Candidate, placed_effect: PlacedEffect | None
 ) -> Estimate:
-    """Return a candidate with the drift of a layer free, its parameters fitted."""
+    """Return the fit of a candidate with the disturbance of `placed_effect` free."""
     name = placed_effect.qualified_name(DISTURBANCE_STATE) if placed_effect else None
     units = disturbance_units(candidate, model_set.series, base.values(0))
     levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: INITIAL_LEVEL} if name else {})
@@ -75,7 +80,10 @@ def scan_level(
     name: str | None,
     levels: Sequence[float],
 ) -> Estimate:
-    """Return an estimate with the level of one drift that foresees best, its parameters held."""
+    """Return the estimate with the best level of one disturbance among `levels`, parameters fixed.
+
+    The given estimate is one of the choices; it is returned for `name` None.
+    """
     if name is None:
         return estimate
     best = estimate
@@ -91,6 +99,6 @@ def scan_level(
 def with_disturbance_levels(
     noise_levels: NoiseLevels, units: Mapping[str, float], levels: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return noises with some drifts at levels, in their units."""
+    """Return noise levels with the named disturbances set to levels in their units."""
     sizes = {name: level * units[name] for name, level in levels.items()}
     return dataclasses.replace(noise_levels, process={**noise_levels.process, **sizes})

@@ -1,4 +1,4 @@
-"""Locus: one place where something may be missing, and what is known of it there."""
+"""Location: a place where physics may be missing, with the disturbance that is estimated there."""
 
 from __future__ import annotations
 
@@ -20,16 +20,20 @@ from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
 Reals = NDArray[np.float64]
 SIGNIFICANT_STDS = 3.0
-"""An unknown beyond this many of its standard deviations makes a window."""
+"""Standard deviations beyond which a disturbance is significant."""
 OSCILLATION_PERIOD = 0.2
-"""Period of a shuffle [s]: windows nearer than this are one, those of less than half of it none."""
+"""Period [s] of a driveline oscillation.
+
+Windows nearer than this are merged, and windows shorter than half of it are dropped.
+"""
 MAX_WINDOWS = 12
 
 
 @dataclass(frozen=True)
 class DisturbanceEstimate:
-    """An unknown torque, force or error of a recording behind its burn-in, with its standard
-    deviation [SI], (samples,) each.
+    """A torque, force or error in one recording after its burn-in, with standard deviations [SI].
+
+    `values` and `stds` have the shape (samples,).
     """
 
     values: Reals
@@ -37,17 +41,20 @@ class DisturbanceEstimate:
 
     @property
     def is_significant(self) -> NDArray[np.bool_]:
-        """The samples (samples,) at which it is not nothing."""
+        """The samples (samples,) at which the disturbance differs significantly from 0."""
         return np.abs(self.values) > SIGNIFICANT_STDS * self.stds
 
 
 @dataclass(frozen=True)
 class Location:
-    """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a
-    `part` of what acts there; its share by mode, and what it goes `along` with. At a `named` one
-    stands an effect that was accepted. `free` is a model with this freedom - its state `drift` -
-    and its parameters fitted beside it. Of the places that are told it is known over time
-    (`unknown`, for each recording), and in which `windows` (start, end, recording) it is there.
+    """A place with a free disturbance.
+
+    `gain` is its log-likelihood gain [nats], `rms` the size of the disturbance [SI] and `fraction`
+    that size relative to what acts there. `modes` gives the share of its squares in each mode,
+    `correlates` the quantities with which it correlates. `is_accepted` marks the place of an
+    accepted effect. `free_model` is the fit with this disturbance, whose state is
+    `disturbance_state`. For reported places the smoothed `disturbances` of each recording are
+    known, with their significant `windows` (start, end, recording).
     """
 
     section: str
@@ -67,14 +74,14 @@ class Location:
 
     @property
     def path(self) -> str:
-        """`section.name`, as verdicts name places."""
+        """The path `section.name`, as in a verdict."""
         return f"{self.section}.{self.place}"
 
 
 def location_of(
     model_set: ModelSet, section: str, placed_effect: PlacedEffect, free_model: Estimate
 ) -> Location:
-    """Return what the drift of a layer does at a place where it is free; the gains are not set."""
+    """Return the location of a fit with a free disturbance; its gain is 0 until it is set."""
     drifts = disturbances_of(
         model_set.series, free_model, placed_effect.qualified_name(DISTURBANCE_STATE)
     )
@@ -93,7 +100,11 @@ def location_of(
 
 
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
-    """Return a place with what is unknown there over time, from all that was recorded."""
+    """Return a location with the smoothed disturbance over time and the values that follow from it.
+
+    A location without a free model, or with known disturbances, is returned unchanged. Raises
+    ValueError if the model is unstable in every mode.
+    """
     if location.free_model is None or location.disturbances:
         return location
     column = location.free_model.candidate.predictor.states.index(location.disturbance_state)
@@ -111,7 +122,11 @@ def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Locat
 def with_disturbances(
     model_set: ModelSet, location: Location, disturbances: tuple[DisturbanceEstimate, ...]
 ) -> Location:
-    """Return a place with what follows from its unknown over time."""
+    """Return a location with a disturbance over time, and the rms, windows, modes and correlates of
+    it.
+
+    The windows are the longest ones, at most `MAX_WINDOWS`.
+    """
     assert location.free_model is not None
     values = [one.values for one in disturbances]
     pairs = zip(model_set.series, disturbances, strict=True)
@@ -134,18 +149,20 @@ def with_disturbances(
 def _relative_size(
     model_set: ModelSet, section: str, place: str, free_model: Estimate, size: float
 ) -> float:
+    """Return the size of a disturbance relative to what acts at its place; 0 if that is unknown."""
     scale = acting_rms(model_set, section, place, free_model)
     return size / scale if scale > 0.0 else 0.0
 
 
 def _rms(values: Sequence[Reals]) -> float:
+    """Return the root mean square over all recordings."""
     return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
 
 
 def disturbances_of(
     series: Sequence[SampledRecording], free_model: Estimate, name: str
 ) -> list[Reals]:
-    """Return the drift of a name [SI] in each recording (samples,) once its states are found."""
+    """Return the filtered disturbance state [SI] in each recording after its burn-in (samples,)."""
     place = free_model.candidate.predictor.states.index(name)
     runs = zip(series, free_model.prediction.predictions, strict=True)
     return [run.states[burn_in_samples(one) : run.completed, place] for one, run in runs]
@@ -154,7 +171,7 @@ def disturbances_of(
 def _significant_windows(
     disturbance: DisturbanceEstimate, series: SampledRecording
 ) -> list[tuple[float, float, str]]:
-    """Return the times [s] of a recording at which something is missing."""
+    """Return the windows (start [s], end [s], recording) in which a disturbance is significant."""
     period = float(series.period)
     start = float(series.start) + burn_in_samples(series) * period
     there = np.flatnonzero(disturbance.is_significant)
@@ -172,7 +189,7 @@ def _significant_windows(
 def _mode_shares(
     model_set: ModelSet, disturbances: Sequence[Reals], free_model: Estimate
 ) -> dict[str, float]:
-    """Return how much of the drift's squares falls into each mode."""
+    """Return the share of the disturbance's squares in each mode."""
     names = {mode.number: mode.name for mode in model_set.automaton.modes.values()}
     runs = zip(model_set.series, free_model.prediction.predictions, strict=True)
     where = np.concatenate([run.modes[burn_in_samples(one) : run.completed] for one, run in runs])

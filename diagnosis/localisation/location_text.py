@@ -1,4 +1,4 @@
-"""Place sentence: where something is missing, how much, when and with what, in one sentence."""
+"""Location text: where physics is missing, how much, when and with what, in one sentence."""
 
 from __future__ import annotations
 
@@ -23,11 +23,14 @@ SCALE_PHRASES = {
 NO_LOCATION = "nothing asks for a torque or force that the model lacks"
 MAX_WINDOWS = 2
 MIN_CORRELATION = 0.3
-"""A correlation below this is not told."""
+"""A smaller correlation is not reported."""
 
 
 def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
-    """Return where something is missing, in one sentence; the first place is told."""
+    """Return one sentence on the first location, or `NO_LOCATION` if it has no gain.
+
+    An accepted location is described even without a gain.
+    """
     best = locations[0] if locations else None
     if best is None or not (best.gain > 0.0 or best.is_accepted):
         return NO_LOCATION
@@ -41,10 +44,14 @@ def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
 
 
 def _format_percent(part: float) -> str:
+    """Return a fraction in per cent, with two digits below 100 %."""
     return f"{100.0 * part:.2g} %" if part < 1.0 else f"{100.0 * part:.0f} %"
 
 
 def _format_windows(location: Location) -> list[str]:
+    """Return the share of the main mode (if there are several) and the longest windows, as
+    phrases.
+    """
     found = []
     mode = max(location.modes, key=lambda name: location.modes[name], default="")
     if len(location.modes) > 1:
@@ -56,6 +63,7 @@ def _format_windows(location: Location) -> list[str]:
 
 
 def _format_correlates(location: Location) -> list[str]:
+    """Return the strongest correlate as a phrase."""
     if not location.correlates or abs(location.correlates[0][1]) < MIN_CORRELATION:
         return ["along with no single quantity"]
     name, correlation = location.correlates[0]

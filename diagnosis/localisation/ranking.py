@@ -1,8 +1,7 @@
-"""Location: where something is missing - the place whose drift the recordings ask for most.
+"""Localisation: places ranked by the log-likelihood gain of a free disturbance there.
 
-One drift at a time is let free beside the base; the one whose freedom explains most stands where
-the model is deficient (Kristensen, Madsen, Jorgensen 2004). Where effects were accepted, their
-places lead.
+One disturbance at a time is free beside the base; the model is deficient where that gains most
+(Kristensen, Madsen, Jorgensen 2004). The places of accepted effects come first.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
 from language.text.document import MappingNode
 
 ABSORBED_FRACTION = 0.3
-"""Part that counts of what the small drifts of the base take up as well."""
+"""Weight of the gain that the small disturbances of the base absorb as well."""
 
 
 def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
-    """Return every place with what its freedom explains, the best first, that over time.
+    """Return the locations with a finite cost by descending gain, the first one smoothed over time.
 
-    With each freedom the parameters are fitted anew: those of the base were bent by what it lacks,
-    and a place would have to explain the bending as well.
+    The gain is relative to a fit with all disturbances small. The parameters are fitted anew at
+    each place, because those of the base are biased by what it lacks.
     """
     free = [
         (section, placed_effect, free_disturbance(model_set, base, placed_effect))
@@ -50,10 +49,11 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
 
 
 def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Location]) -> float:
-    """Return what the freedom of the best place gains [nats].
+    """Return the effective log-likelihood gain [nats] of the best location.
 
-    What the base takes up with drifts as small as it may have counts little: a model has some
-    disturbance. All the same a load that acts on the road is one of these.
+    The part that the base absorbs with its own small disturbances is weighted by
+    `ABSORBED_FRACTION`, because every model has some disturbance. The result is divided by the
+    integrated autocorrelation of the innovations.
     """
     gain = max((location.gain for location in locations), default=0.0)
     taken_up = min(max(0.0, free_disturbance(model_set, base).cost - base.cost), gain)
@@ -63,7 +63,9 @@ def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Lo
 
 
 def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
-    """Return a drift for each balance of forces, each elastic element, each compared output."""
+    """Return section and disturbance for each balance of forces, elastic element and compared
+    output.
+    """
     locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
     elements = model_set.document.root.get("elements")
     for entry in elements if isinstance(elements, MappingNode) else ():
@@ -78,7 +80,11 @@ def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]
 def rank_accepted_first(
     locations: Sequence[Location], paths: Sequence[str], model_set: ModelSet
 ) -> tuple[Location, ...]:
-    """Return places in which those of accepted effects lead, each with what is known there."""
+    """Return locations with those of accepted effects (`paths`) first, in the order of the paths.
+
+    An accepted path takes over the location with its own path or with that of its balance; the
+    first one is smoothed.
+    """
     by_path = {location.path: location for location in locations}
     first: list[Location] = []
     for path in dict.fromkeys(paths):
@@ -93,10 +99,12 @@ def rank_accepted_first(
 def rank_causes_first(
     locations: Sequence[Location], nearest_paths: Iterable[str], model_set: ModelSet
 ) -> tuple[Location, ...]:
-    """Return places of something unknown, led by an input or a body that acts at the first one.
+    """Return locations of an unknown cause, led by an input or element that acts in the first
+    balance.
 
-    What it does over time tells which; else `nearest_paths`, the paths of what comes nearest to what is
-    missing and gains enough, best first.
+    The cause follows from the time course of the disturbance, else from the first of
+    `nearest_paths` (best effects first) that acts in that balance and is not inactive. Without a
+    cause the order stays.
     """
     if not locations:
         return ()

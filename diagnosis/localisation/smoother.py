@@ -1,9 +1,9 @@
-"""Smoothing: the states of a model at each sample, from what was recorded before and after it.
+"""Smoother: states of a model at each sample, from all measurements before and after it.
 
-A fixed-interval smoother in the modified Bryson-Frazier form (Bierman 1973, "Fixed interval
-smoothing with discrete measurements", Int. J. Control 18, equations of section 3), which inverts no
-covariance. It smooths the deviation from the run of the observer, whose mode is known at each
-sample: one step of a Gauss-Newton search for the likeliest run (Bell 1994, SIAM J. Optim. 4).
+It is a fixed-interval smoother in modified Bryson-Frazier form, which inverts no covariance
+(Bierman 1973, "Fixed interval smoothing with discrete measurements", Int. J. Control 18, section
+3). It smooths the deviation from the run of the observer, whose mode is known at each sample. This
+is one Gauss-Newton step towards the most likely trajectory (Bell 1994, SIAM J. Optim. 4).
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from diagnosis.estimation.kalman_gain import LocalModel, local_models
 
 Reals = NDArray[np.float64]
 AVERAGING_TIME = 1.0
-"""Seconds over which innovations are compared with what they should be."""
+"""Time [s] over which normalised squared innovations are averaged."""
 LARGEST = 1e12
-"""A deviation beyond this is no model any more."""
+"""A larger deviation is outside the range of the model."""
 
 
 @dataclass(frozen=True)
 class SmoothedStates:
-    """The states of a recording with their standard deviations [SI], (samples, states) each."""
+    """The smoothed states of a recording with standard deviations [SI], (samples, states) each."""
 
     states: Reals
     stds: Reals
@@ -35,11 +35,12 @@ class SmoothedStates:
 
 @dataclass(frozen=True)
 class SmootherInput:
-    """What recordings, side by side, are smoothed from; those that ended see nothing any more.
+    """The data of recordings that are smoothed in parallel; a recording that has ended is NaN.
 
-    `missed` (samples, recordings, seen) by the observer's run, NaN where nothing is known, which
-    `pushed` its states (samples, recordings, states); `phi`, `q` (samples, recordings, states,
-    states) to the next sample, `c` (samples, recordings, seen, states).
+    `innovations` (samples, recordings, outputs) of the observer are NaN where unknown, and
+    `corrections` (samples, recordings, states) are its updates of the states. `phi` and `q`
+    (samples, recordings, states, states) lead to the next sample; `c` has the shape (samples,
+    recordings, outputs, states).
     """
 
     innovations: Reals
@@ -51,8 +52,10 @@ class SmootherInput:
 
 @dataclass(frozen=True)
 class _MeasurementUpdate:
-    """One signal at one sample, each (recordings, ...): how it shows the states, over its variance
-    where it is known; the gain; what was missed; what that squared is of its variance.
+    """The update by one output at one sample; each array begins with the axis of recordings.
+
+    `output_row` is the row of the output matrix, `inverse_variance` the inverse of the innovation
+    variance (0 if unknown), `normalised_square` the squared innovation over its variance.
     """
 
     output_row: Reals
@@ -63,9 +66,10 @@ class _MeasurementUpdate:
 
 
 def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> list[SmoothedStates]:
-    """Return the states of a model in each recording that it was fitted to.
+    """Return the smoothed states of each recording to which a model was fitted.
 
-    Standard deviations grow where the innovations around are larger than they should be.
+    The standard deviations are scaled up where innovations are larger than their variances predict.
+    Raises ValueError if the model is unstable in every mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels
     locals_ = local_models(candidate, series, estimate.values(0), noise_levels, estimate.prediction)
@@ -90,6 +94,7 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
 def _smoother_input(
     estimate: Estimate, series: Sequence[SampledRecording], models: dict[int, LocalModel]
 ) -> SmootherInput:
+    """Return the innovations, corrections and linear models at each sample of all recordings."""
     runs, predictor = estimate.prediction.predictions, estimate.candidate.predictor
     shape = max(run.completed for run in runs), len(runs)
     innovations = np.full((*shape, len(predictor.outputs)), np.nan)
@@ -121,10 +126,10 @@ def _smoother_input(
 def smooth_deviations(
     data: SmootherInput, initial_std: Reals, noise_variances: Reals
 ) -> tuple[Reals, Reals, Reals]:
-    """Return smoothed deviations from a run and their standard deviations, (samples, recordings,
-    states) each, and what squared innovations are of their variances (samples, seen, recordings).
+    """Return smoothed deviations from the run, their standard deviations, and normalised squares.
 
-    From standard deviations `initial_std` (states,), with variances `noise_variances` (seen,) of what is seen.
+    The first two have the shape (samples, recordings, states), the last one (samples, outputs,
+    recordings). `initial_std` (states,) and `noise_variances` (outputs,) are those of the filter.
     """
     before, covariances, corrections = _forward_pass(data, initial_std, noise_variances)
     after, spread = _backward_pass(data, before, covariances, corrections)
@@ -138,10 +143,10 @@ def smooth_deviations(
 def _forward_pass(
     data: SmootherInput, initial_std: Reals, noise_variances: Reals
 ) -> tuple[Reals, Reals, list[list[_MeasurementUpdate]]]:
-    """Return the deviations and their covariances before each sample, and what corrected them.
+    """Return the deviations and covariances before each sample, and the measurement updates.
 
-    Signals correct one after the other; where one is not known its gain is 0. The deviation is from
-    the run before its own correction, which is what it was pushed by.
+    Outputs are processed one after the other (sequential Kalman update); an unknown one has the
+    gain 0. The deviation is measured from the run before the observer's own correction.
     """
     samples, recordings, states = data.corrections.shape
     means, covariances = np.empty(data.corrections.shape), np.empty(data.phi.shape)
@@ -167,6 +172,9 @@ def _forward_pass(
 def _measurement_update(
     output_row: Reals, innovation: Reals, mean: Reals, p: Reals, variance: float
 ) -> _MeasurementUpdate:
+    """Return the Kalman update of one output, with gain and weight 0 where the innovation is
+    unknown.
+    """
     known = np.isfinite(innovation)
     across = _batch_matvec(p, output_row)
     whole = _batch_dot(output_row, across) + variance
@@ -182,7 +190,10 @@ def _backward_pass(
     covariances: Reals,
     corrections: list[list[_MeasurementUpdate]],
 ) -> tuple[Reals, Reals]:
-    """Return smoothed deviations and standard deviations, (samples, recordings, states) each."""
+    """Return smoothed deviations and standard deviations, (samples, recordings, states) each.
+
+    The adjoint and its information matrix run backwards through the measurement updates.
+    """
     samples, recordings, states = means.shape
     adjoint, information = np.zeros((recordings, states)), np.zeros((recordings, states, states))
     after, spread = np.empty(means.shape), np.empty(means.shape)
@@ -208,7 +219,7 @@ def _backward_pass(
 
 
 def _moving_mean(ratios: Reals, width: int) -> Reals:
-    """Return the mean (samples,) of what is known of `ratios` (samples, seen) around each."""
+    """Return the moving mean (samples,) over all known `ratios` (samples, outputs)."""
     window = np.ones(min(width, len(ratios)))
     known = np.isfinite(ratios)
     sums = np.convolve(np.sum(np.where(known, ratios, 0.0), axis=1), window, "same")
@@ -217,9 +228,11 @@ def _moving_mean(ratios: Reals, width: int) -> Reals:
 
 
 def _batch_matvec(matrices: Reals, vectors: Reals) -> Reals:
+    """Return the product of each matrix with its vector."""
     return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def _batch_dot(first: Reals, second: Reals) -> Reals:
+    """Return the scalar product of each pair of vectors."""
     found: Reals = np.add.reduce(first * second, axis=1)
     return found

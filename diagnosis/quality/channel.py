@@ -14,34 +14,35 @@ from engine.recordings.recording import Channel, Recording
 Reals = NDArray[np.float64]
 
 GAP_FACTOR = 1.5
-"""A step of time above this many usual ones has lost samples."""
+"""A time step above this multiple of the median step has lost samples."""
 LONG_GAP_FACTOR = 10.0
-"""Usual steps of time from which a gap is told by its place."""
+"""Multiple of the median step above which a gap is reported with its place."""
 MUCH_DROPPED, SOME_DROPPED = 0.10, 0.01
-"""Shares of lost samples that are an error and a warning."""
+"""Fractions of lost samples that are an error and a warning."""
 JITTER_FRACTION = 0.5
-"""Share of a usual step of time from which the spread of the steps is told."""
+"""Fraction of the median step above which jitter is reported."""
 MUCH_REPEATED = 0.08
-"""Share of repeated values, beyond what quantisation explains, from which it is told."""
+"""Fraction of repeated values, beyond the effect of quantisation, from which it is reported."""
 MAX_REPETITIONS = 4
-"""Repetitions in a row that count: more are a signal at rest."""
+"""Longest run of repetitions that counts; in a longer one the signal is constant."""
 STUCK_SAMPLES, STUCK_TIME = 25, 0.2
-"""Samples and seconds for which a noisy signal has to keep one value to be stuck."""
+"""Samples and seconds for which a noisy signal must keep one value to count as stuck."""
 CLIPPED_FRACTION = 0.01
-"""Share of samples exactly at the largest or smallest value from which it may be a limit."""
+"""Fraction of samples at the largest or smallest value from which a signal may be clipped."""
 MIN_SAMPLES = 10
 QUANTUM_TOLERANCE = 0.02
-"""How far steps of value may be from whole multiples of the quantum, in quanta: rounding."""
+"""Largest distance, in quanta, of changes from whole multiples of the quantum (rounding)."""
 
 
 @dataclass(frozen=True)
 class ChannelCheck:
-    """Facts about one channel; times in s, values in SI, which are `factor` times those in `unit`.
+    """Properties of one channel; times in s, values in SI (`factor` times those in `unit`).
 
-    `rate` [1/s] and `jitter` (spread of the steps of time, 95 per cent) are of the usual steps;
-    `dropped` is the share of samples that lack, `gaps` the long ones; `quantum` is the step of
-    the values, 0 where there is none; `noise` the standard deviation from third differences;
-    `repeated`, `clipped` and `stuck` are shares of samples, the longest stay, and where.
+    `rate` [1/s] and `jitter` (95th percentile of deviations [s]) refer to steps without lost
+    samples. `dropped` is the fraction of missing samples and `gaps` are the long gaps. `quantum` is
+    the quantisation step, 0 if there is none; `noise` is the standard deviation from third
+    differences. `repeated` and `clipped` are fractions of samples; `stuck` is the longest constant
+    interval.
     """
 
     recording: str
@@ -66,7 +67,7 @@ class ChannelCheck:
 
 
 def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
-    """Return the facts about a channel."""
+    """Return the properties of a channel."""
     times, values = channel.seconds, channel.array
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -100,7 +101,7 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
 
 
 def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
-    """Return what is to be told of a channel."""
+    """Return the findings on a channel; a constant value is reported for compared channels only."""
     findings: list[Finding] = []
 
     def report(
@@ -134,7 +135,7 @@ def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
 
 
 def _quantum(values: Reals) -> float:
-    """Return the step of which nearly all changes are whole multiples; 0 without one."""
+    """Return the quantisation step, of which 97 % of small changes are multiples; 0 without one."""
     changes = np.abs(np.diff(values))
     scale = float(np.abs(values).max())
     changes = changes[changes > 1e-9 * scale]
@@ -149,7 +150,10 @@ def _quantum(values: Reals) -> float:
 
 
 def _noise(times: Reals, values: Reals, period: float) -> float:
-    """Return the standard deviation of white noise, by the third differences of even stretches."""
+    """Return the standard deviation of white noise from the median third difference.
+
+    Differences over uneven time steps are left out; the result is 0 for fewer than 10 values.
+    """
     if len(values) < MIN_SAMPLES:
         return 0.0
     third = np.diff(values, 3)
@@ -161,7 +165,11 @@ def _noise(times: Reals, values: Reals, period: float) -> float:
 
 
 def _repeated_fraction(values: Reals, quantum: float, noise: float) -> float:
-    """Return the share of values equal to the one before, beyond what quantisation explains."""
+    """Return the fraction of values equal to the previous one, beyond the effect of quantisation.
+
+    For white noise of standard deviation s and quantum q, equal neighbours have the probability q /
+    (2 sqrt(pi) s). Long runs do not count.
+    """
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0.0]
     if len(changes) < MIN_SAMPLES:
@@ -176,7 +184,7 @@ def _repeated_fraction(values: Reals, quantum: float, noise: float) -> float:
 
 
 def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first and last index of each run of equal values."""
+    """Return the first index and the end index of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], equal.astype(int), [0]))))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -184,7 +192,9 @@ def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _stuck_interval(
     times: Reals, values: Reals, quantum: float, noise: float
 ) -> tuple[float, float] | None:
-    """Return where a channel that is noisy elsewhere keeps one value for long, other than 0."""
+    """Return the longest interval in which a noisy channel keeps one nonzero value; None if
+    short.
+    """
     if noise <= 0.5 * quantum or noise <= 0.0:
         return None
     runs = [run for run in _runs_of_equal(np.diff(values) == 0.0) if values[run[0]] != 0.0]
@@ -196,7 +206,7 @@ def _stuck_interval(
 
 
 def _clipped_fraction(values: Reals, quantum: float, noise: float) -> float:
-    """Return the share of values exactly at an end that has no like beside it."""
+    """Return the fraction of values exactly at an extreme with fewer values near it; 0 if none."""
     span = float(values.max() - values.min())
     shares = [0.0]
     for end in (float(values.max()), float(values.min())):

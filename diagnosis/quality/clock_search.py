@@ -1,8 +1,8 @@
-"""Mistakes: columns of a recording with a wrong clock or sign, by how well the model foresees it.
+"""Clock search: columns of a recording with a wrong clock or sign, found by the prediction error.
 
-Each column is shifted against the others, or turned over; where the model as it is declared
-foresees far better then, that is what is wrong with the column. Loads that are not known, wrong
-parameters and missing physics make the forecasts worse with and without it.
+Each column is shifted in time or negated. If the declared model then predicts far better, the
+column has that error. Unknown loads, wrong parameters and missing physics increase the prediction
+errors with and without the change.
 """
 
 from __future__ import annotations
@@ -38,29 +38,30 @@ from language.text.diagnostic import MissingToolError, SpecError
 from language.text.document import Document
 
 MAX_LAG, LAG_STEP = 0.48, 0.04
-"""Largest offset of clocks looked for, and the distance of those that are tried [s]."""
+"""Largest offset that is tried, and the distance of trials [s]."""
 MIN_LAG = 0.1
-"""Offsets [s] from which they are a mistake: actuators and sensors lag by less."""
+"""Smallest offset [s] that is an error; actuators and sensors have smaller lags."""
 MIN_GAIN, MIN_GAIN_PER_SAMPLE = 100.0, 0.2
-"""Nats that undoing a mistake has to gain in a recording, and nats per sample of it."""
+"""Log-likelihood gain [nats] that a correction needs in a recording, and the gain per sample."""
 HARMLESS_GAIN_FACTOR = 1.5
-"""Times the gain of what is no mistake that it has to gain: of a small lag, of an unused input."""
+"""Factor by which the gain must exceed that of a small lag or of an unused input."""
 OTHER_COLUMN_FACTOR = 1.15
-"""The same for another column: a late torque and an early speed look alike."""
+"""The same for another column: a late torque and an early speed have similar effects."""
 SHARED_FRACTION = 0.6
-"""Share of the recordings that tell of a clock from which it is that of all of them."""
+"""Fraction of the erroneous recordings that must agree for an error to apply to all."""
 CLOCK_TOLERANCE = 0.06
-"""Lags nearer than this are one offset [s]."""
+"""Lags within this distance [s] are the same offset."""
 HIGH_PASS_TIME = 0.4
-"""Seconds over which the mean of innovations is taken out: what is slow tells no time."""
+"""Window [s] of the moving mean that is removed from innovations: slow parts carry no timing."""
 UNUSED_FACTOR = 1e-6
-"""What an input is scaled by, to see whether the model is better off without it; its sign stays."""
+"""Factor that makes an input nearly 0 but keeps its sign, to test the model without it."""
 
 
 @dataclass(frozen=True)
 class ColumnHypothesis:
-    """A column - the inputs first, then what is compared - set earlier by `lag` [s], or turned
-    over (`factor` -1), or an input not used (`factor` 0).
+    """A change of a column: advanced by `lag` [s], negated (`factor` -1) or not used (`factor` 0).
+
+    `column` counts the inputs first, then the compared outputs.
     """
 
     column: int
@@ -69,18 +70,18 @@ class ColumnHypothesis:
 
     @property
     def is_error(self) -> bool:
-        """Tell whether this is a mistake of the data, not a lag that machines have."""
+        """Whether the change corrects an error of the data rather than a usual lag."""
         return self.factor < 0 or abs(self.lag) >= MIN_LAG
 
     def is_similar(self, other: ColumnHypothesis) -> bool:
-        """Tell whether two of them are the same mistake."""
+        """Return whether two hypotheses describe the same error."""
         near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
         return near and (self.column, self.factor) == (other.column, other.factor)
 
 
 @dataclass(frozen=True)
 class ColumnError:
-    """What undoes a mistake in one recording or, where it is "", in all."""
+    """The correction of an error in one recording, or in all of them if `recording` is ""."""
 
     hypothesis: ColumnHypothesis
     recording: str
@@ -93,7 +94,9 @@ def find_clock_and_sign_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding] | None:
-    """Return the wrong clocks and signs of recordings; None where they cannot be found."""
+    """Return findings on wrong clocks and signs, or None if the model cannot be used for the
+    search.
+    """
     seen = compared_outputs(mapping, automaton)
     series = [
         one
@@ -114,6 +117,7 @@ def find_clock_and_sign_errors(
 
 
 def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
+    """Return the finding for an error of a column."""
     called = f"input `{column.name}`" if column.to else f"`{column.name}`"
     if error.hypothesis.factor < 0:
         text = f"{called} has the wrong sign: it moves against what the model gives"
@@ -126,7 +130,11 @@ def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
 def find_column_errors(
     candidate: Candidate, series: Sequence[SampledRecording]
 ) -> list[ColumnError]:
-    """Return the mistakes of all recordings, or of single ones."""
+    """Return the errors common to all recordings, or those of single recordings.
+
+    Recordings shorter than four times `MAX_LAG` are left out. An error of a single recording counts
+    only if its column has the same error wherever it has one.
+    """
     series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
     if not series:
         return []
@@ -158,7 +166,10 @@ def find_column_errors(
 def _is_uniform(
     hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
 ) -> bool:
-    """Tell whether a column is off alike wherever it is: what differs is rather physics."""
+    """Return whether a column has the same error in every recording that has one.
+
+    Different errors rather indicate missing physics.
+    """
     return all(
         one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
     )
@@ -167,9 +178,9 @@ def _is_uniform(
 def hypothesis_gains(
     candidate: Candidate, series: Sequence[SampledRecording]
 ) -> Mapping[ColumnHypothesis, Reals]:
-    """Return what undoing each mistake gains [nats] in each recording.
+    """Return the log-likelihood gain [nats] of each hypothesis in each recording (recordings,).
 
-    An input that rests in some recordings is not judged: there it has no clock.
+    Inputs that are constant in a recording are not tested.
     """
     inputs = series[0].inputs.shape[1]
     moving_inputs = [
@@ -193,9 +204,9 @@ def hypothesis_gains(
 
 
 def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
-    """Return the inner part of a recording as it would be without a mistake.
+    """Return the inner part of a recording with a hypothesis applied to its column.
 
-    The outer `LARGEST_LAG` s are not used, so that there is a value for every lag.
+    `MAX_LAG` seconds are cut off at both ends, so that every lag has values.
     """
     margin = round(MAX_LAG / float(series.period))
     late = round(hypothesis.lag / float(series.period))
@@ -214,7 +225,7 @@ def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> 
 
 
 def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return the model as it is declared, with drifts that let it follow the recordings."""
+    """Return the declared model with disturbances that let it follow the recordings."""
     noise_levels = measured_noise_levels(series, {})
     noise_levels = dataclasses.replace(
         noise_levels, process=disturbance_units(candidate, series, {})
@@ -223,7 +234,11 @@ def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording])
 
 
 def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the negative log likelihood [nats] of the quick part of each recording."""
+    """Return the negative log-likelihood [nats] of the high-pass filtered innovations
+    (recordings,).
+
+    It is infinite for a recording in which the run diverged.
+    """
     values, found = [model.values(0)] * len(series), []
     (there,) = predict_at_points(
         model.candidate, series, [values], model.gains, model.noise_levels.huber_limits
@@ -239,7 +254,7 @@ def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Rea
 
 
 def _column_means(squares: Reals) -> Reals:
-    """Return the mean of what is known of each column."""
+    """Return the mean of the known values of each column."""
     if np.isnan(squares).any():
         return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
     found: Reals = squares.sum(axis=0) / len(squares)
@@ -247,7 +262,7 @@ def _column_means(squares: Reals) -> Reals:
 
 
 def _high_pass(innovations: Reals, period: float) -> Reals:
-    """Return innovations without their slow part."""
+    """Return innovations (samples, outputs) without their moving mean."""
     width = max(1, round(HIGH_PASS_TIME / period))
     known = np.where(np.isfinite(innovations), innovations, 0.0)
     kernel = np.ones(width) / width
@@ -257,7 +272,9 @@ def _high_pass(innovations: Reals, period: float) -> Reals:
 
 
 def _finite_gains(before: Reals, after: Reals) -> Reals:
-    """Return the gains; none where the model does not follow a recording one way or the other."""
+    """Return the gains (recordings,), -inf where the model diverges with or without the
+    hypothesis.
+    """
     known = np.isfinite(before) & np.isfinite(after)
     found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
     return np.where(known, found, -np.inf)
@@ -266,7 +283,11 @@ def _finite_gains(before: Reals, after: Reals) -> Reals:
 def _clearest_hypothesis(
     gains: Mapping[ColumnHypothesis, float], min_gain: float
 ) -> ColumnHypothesis | None:
-    """Return the trial that gains most, if it undoes a mistake and nothing small gains as much."""
+    """Return the hypothesis with the largest gain; None if that is not a clear error.
+
+    Its gain must reach `min_gain` and exceed the gains of harmless changes and of other columns by
+    their factors.
+    """
     best = max(gains, key=lambda one: gains[one])
     if not best.is_error or gains[best] < min_gain:
         return None

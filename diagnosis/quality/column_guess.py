@@ -1,4 +1,4 @@
-"""Guessed map: what a file without a map seems to hold, by the names of its columns."""
+"""Column guess: a recording map for a file without one, from the names and units of its columns."""
 
 from __future__ import annotations
 
@@ -22,23 +22,27 @@ from language.text.document import ScalarNode
 
 TIME_NAME = re.compile(r"(t|time|timestamp|zeit)(_(s|ms|us))?", re.IGNORECASE)
 CHANNEL_TIME_NAME = re.compile(r"(t|time)_\w+_(s|ms|us)", re.IGNORECASE)
-"""Columns of time: of all, or of some columns (these are not looked at)."""
+"""Names of time columns: of the whole file, and of single columns (these are not read)."""
 UNIT_SUFFIXES = {
     "nm": "N*m", "rpm": "rpm", "radps": "rad/s", "rad_s": "rad/s", "kmh": "km/h", "m_s": "m/s",
     "mm_s": "mm/s", "mps": "m/s", "kn": "kN", "n": "N", "mm": "mm", "m": "m", "rad": "rad",
     "deg": "deg", "v": "V", "a": "A", "degc": "degC",
 }  # fmt: skip
-"""Units by the endings of names."""
+"""Units by the suffixes of column names."""
 INPUT_UNITS = ("N*m", "N")
-"""What has one of these units is taken for an input, everything else for an output."""
+"""Columns with these units are inputs, all others outputs."""
 MAX_COLUMNS = 12
-"""Most columns that are looked at without a map."""
+"""Maximum number of columns of a guessed map."""
 MIN_NUMBER_FRACTION = 0.2
-"""Share of cells that have to be numbers."""
+"""Fraction of cells that must be numbers."""
 
 
 def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
-    """Return a map of all columns of numbers. Raises SpecError, ToolMissing."""
+    """Return a map of up to `MAX_COLUMNS` numeric columns of a file.
+
+    Raises SpecError if there is no time column or no numeric column, and MissingToolError if the
+    format needs a package that is not installed.
+    """
     place = Span(Source(display_path(path)), 1, 1)
     found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
     second = parse_unit("s")
@@ -53,7 +57,7 @@ def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
     names = [
         n for n in dict.fromkeys(file.names) if n != time and not CHANNEL_TIME_NAME.fullmatch(n)
     ]
-    if file.is_stamped:  # of a signal that goes by two names the longer one is left out
+    if file.is_stamped:  # A signal with two names keeps the shorter one.
         names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
     kept = [name for name in names if list(file.names).count(name) == 1 and _is_number(file, name)]
     columns = {
@@ -66,6 +70,9 @@ def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:
+    """Return the first column with a name of time, else the first increasing one; "" with a
+    problem.
+    """
     named = [name for name in file.names if TIME_NAME.fullmatch(name)]
     for name in (*named, *file.names):
         if list(file.names).count(name) != 1:
@@ -79,6 +86,9 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
 
 
 def _is_number(file: RecordedFile, name: str) -> bool:
+    """Return whether more than 20 % of the cells of a column are finite numbers and few are not
+    finite.
+    """
     values = file.read(name).values
     number = sum(value is not None and math.isfinite(value) for value in values)
     bad = sum(value is not None and not math.isfinite(value) for value in values)
@@ -86,6 +96,9 @@ def _is_number(file: RecordedFile, name: str) -> bool:
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
+    """Return the mapping of a column: an input if its unit is one of `INPUT_UNITS`, else an
+    output.
+    """
     unit = _guess_unit(name, written)
     drives = any(are_compatible(unit.dimension, parse_unit(text).dimension) for text in INPUT_UNITS)
     return ColumnMapping(
@@ -104,6 +117,7 @@ def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
 
 
 def _guess_unit(name: str, written: str) -> Unit:
+    """Return the unit from the file, else from the suffix of the name, else no unit."""
     known = file_unit(written) if written else None
     if known is not None:
         return known

@@ -1,4 +1,6 @@
-"""Excitation: what the recorded manoeuvres do, and so which effects they can test at all."""
+"""Excitation: the steps, bands and ranges of recorded signals, and the effects that they
+can show.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,7 @@ EFFECT_NEEDS: Mapping[str, tuple[str, ...]] = {
     "unknown_input": ("moves",),
     "viscous_friction": ("speed_range",),
 }
-"""What each effect of the library has to see."""
+"""The needs of each effect of the library on the excitation."""
 
 NEED_DESCRIPTIONS: Mapping[str, str] = {
     "fast": "steps or a sweep to 5 Hz or more",
@@ -66,31 +68,33 @@ NEED_DESCRIPTIONS: Mapping[str, str] = {
     "power": "a large input at high and at low speed",
     "brakes": "a brake that is applied and let go",
 }
-"""What each need asks for, as a manoeuvre."""
+"""Each need in words, as a manoeuvre."""
 
 Reals = NDArray[np.float64]
 
 STEP_TIME = 0.06
-"""A change made within this time is a step [s]."""
+"""A change within this time [s] is a step."""
 
 STEP_SIZE = 0.15
-"""Least size of a step, in the range of the signal."""
+"""Smallest size of a step, relative to the range of the signal."""
 
 REVERSAL_FRACTION = 0.02
-"""How far beyond 0 a signal has to go on both sides to reverse, in its largest value."""
+"""Fraction of its largest value that a signal must exceed on both sides of 0 to reverse."""
 
 MAX_WINDOW = 512
 """Samples of a window of a spectrum."""
 
 MIN_POWER_RATIO = 10.0
-"""Power over that of the noise from which a frequency is excited."""
+"""Power relative to that of the noise from which a frequency is excited."""
 
 SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
 
 
 @dataclass(frozen=True)
 class SignalExcitation:
-    """What one signal does: its range (SI), sign changes, steps (sizes, SI), band [Hz]."""
+    """The excitation of one signal: range [SI], sign changes, step sizes [SI] and bandwidth
+    [Hz].
+    """
 
     name: str
     unit: str
@@ -103,20 +107,20 @@ class SignalExcitation:
 
 @dataclass(frozen=True)
 class EffectTestability:
-    """Whether the recordings can show an effect; `lacking` are the needs that are not met."""
+    """Whether recordings can show an effect; `lacking` are the needs that are not met, in words."""
 
     effect: str
     lacking: tuple[str, ...]
 
     @property
     def is_testable(self) -> bool:
-        """Tell whether the effect would show."""
+        """Whether all needs of the effect are met."""
         return not self.lacking
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """What the recordings do together: total time [s], inputs and speeds, and the effects."""
+    """The excitation of all recordings: total time [s], inputs, speeds and the testable effects."""
 
     duration: float
     inputs: tuple[SignalExcitation, ...]
@@ -125,7 +129,7 @@ class Excitation:
 
     @property
     def is_absent(self) -> bool:
-        """Tell whether no input does anything."""
+        """Whether there are inputs and none of them is excited."""
         idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
         return bool(idle) and all(idle)
 
@@ -133,7 +137,11 @@ class Excitation:
 def analyse_excitation(
     recordings: Sequence[Recording], checks: Sequence[ChannelCheck]
 ) -> Excitation:
-    """Return what the recordings excite."""
+    """Return the excitation of recordings, cut into the windows that are used.
+
+    `checks` give the noise of channels. Without a force input, speeds that are inputs count as
+    inputs.
+    """
     used = [
         _with_derived_speeds(piece)
         for recording in recordings
@@ -150,7 +158,7 @@ def analyse_excitation(
             speeds.append(found)
         elif column.to is not None:
             inputs.append(found)
-    if not inputs:  # a speed that is fed is all that drives
+    if not inputs:  # A speed that is an input is the only excitation.
         inputs = [s for s in speeds if used[0].channels[s.name].column.to is not None]
     met = _met_needs(used, inputs, speeds, checks)
     effects = [
@@ -164,7 +172,7 @@ def analyse_excitation(
 
 
 def _with_derived_speeds(piece: Recording) -> Recording:
-    """Return a recording with the rates of its positions as channels if it has no speed."""
+    """Return a recording with rates of its positions as channels, if it has no speed."""
     if any(is_speed(channel) for channel in piece.channels.values()):
         return piece
     found = dict(piece.channels)
@@ -182,7 +190,7 @@ def _with_derived_speeds(piece: Recording) -> Recording:
 
 
 def is_speed(channel: Channel) -> bool:
-    """Tell whether a channel is a speed, turning or straight."""
+    """Return whether a channel is a rotational or translational speed, by its unit."""
     dimension = column_dimension(channel.column)
     return any(are_compatible(dimension, parse_unit(text).dimension) for text in SPEEDS)
 
@@ -192,6 +200,7 @@ def _signal_excitation(
     channels: Sequence[tuple[Recording, Channel]],
     checks: Mapping[tuple[str, str], ChannelCheck],
 ) -> SignalExcitation:
+    """Return the excitation of one signal over all recordings that have it."""
     every = np.concatenate([channel.array for _, channel in channels])
     low, high = float(every.min()), float(every.max())
     steps: list[float] = []
@@ -208,7 +217,10 @@ def _signal_excitation(
 
 
 def _step_sizes(times: Reals, values: Reals, span: float, floor: float) -> list[float]:
-    """Return the sizes of steps: changes within `STEP_TIME` that stand out of the noise."""
+    """Return the signed sizes of steps: changes within `STEP_TIME` well above the noise `floor`.
+
+    Each step is counted once.
+    """
     if len(values) < 3 or span <= 6.0 * floor:
         return []
     later = np.minimum(np.searchsorted(times, times + STEP_TIME), len(times) - 1)
@@ -224,14 +236,14 @@ def _step_sizes(times: Reals, values: Reals, span: float, floor: float) -> list[
 
 
 def _count_sign_changes(values: Reals, largest: float, floor: float) -> int:
-    """Return how often the sign changes, beyond noise."""
+    """Return the number of sign changes beyond noise."""
     bound = max(REVERSAL_FRACTION * largest, 4.0 * floor)
     signs = np.sign(values[np.abs(values) > bound])
     return int(np.sum(np.diff(signs) != 0.0))
 
 
 def _excited_bandwidth(values: Reals, rate: float, floor: float) -> float:
-    """Return the highest frequency [Hz] at which there is clearly more than noise."""
+    """Return the highest frequency [Hz] with power well above the noise; 0 for a short signal."""
     if len(values) < 64 or not rate:
         return 0.0
     frequencies, power = spectrum(values, rate, MAX_WINDOW)
@@ -245,6 +257,7 @@ def _met_needs(
     speeds: Sequence[SignalExcitation],
     checks: Sequence[ChannelCheck],
 ) -> set[str]:
+    """Return the needs that recordings meet."""
     sizes = [abs(size) for signal in inputs for size in signal.steps]
     tests = {
         "fast": any(signal.steps or signal.band >= 5.0 for signal in inputs),
@@ -270,7 +283,7 @@ def _met_needs(
 
 
 def _is_brake(signal: SignalExcitation) -> bool:
-    """An input that is never negative and comes and goes."""
+    """Return whether an input is never negative and has at least two steps."""
     return (
         signal.high > 0.0
         and signal.low >= -REVERSAL_FRACTION * signal.high
@@ -279,6 +292,7 @@ def _is_brake(signal: SignalExcitation) -> bool:
 
 
 def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:
+    """Return the number of turns in both directions [1] by the integral of a speed's magnitude."""
     angle = 0.0
     for piece in used:
         channel = piece.channels.get(signal.name)
@@ -288,6 +302,7 @@ def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:
 
 
 def _time_moving(used: Sequence[Recording], signal: SignalExcitation) -> float:
+    """Return the time [s] for which a speed exceeds 5 % of its largest magnitude."""
     largest = max(abs(signal.low), abs(signal.high))
     time = 0.0
     for piece in used:
@@ -301,7 +316,7 @@ def _time_moving(used: Sequence[Recording], signal: SignalExcitation) -> float:
 def _paired_samples(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> tuple[Reals, Reals]:
-    """Return an input and a speed at the same times, all pieces in a row."""
+    """Return an input and a speed at the same times, all recordings concatenated."""
     one, two = [], []
     for piece in used:
         a, b = piece.channels.get(first.name), piece.channels.get(second.name)
@@ -314,7 +329,10 @@ def _paired_samples(
 def _has_both_signs_at_one_speed(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> bool:
-    """Tell whether the input has both signs at one speed: in one of eight classes of it."""
+    """Return whether an input has both signs in one of eight speed classes.
+
+    Each sign must be in more than a tenth of the class's samples.
+    """
     torque, speed = _paired_samples(used, first, second)
     if not len(torque) or second.low == second.high:
         return False
@@ -331,7 +349,7 @@ def _has_both_signs_at_one_speed(
 def _has_power_range(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> bool:
-    """Tell whether more than 60 per cent of the largest input occur at high and at low speed."""
+    """Return whether more than 60 % of the largest input occurs at high and at low speed."""
     torque, speed = _paired_samples(used, first, second)
     largest = max(abs(second.low), abs(second.high))
     strong = np.abs(torque) > 0.6 * max(abs(first.low), abs(first.high))

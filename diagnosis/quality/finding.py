@@ -1,4 +1,4 @@
-"""Finding: something about recorded data that a person should know before believing them."""
+"""Finding: a problem of recorded data that a user should know."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 Severity = Literal["error", "warning", "note"]
-"""An error makes a verdict about physics worthless, a warning may, a note does not."""
+"""An error makes a diagnosis unreliable, a warning may, a note does not."""
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
 UNGROUPED_KINDS = ("no_signal", "outlier", "leap")
-"""Kinds whose findings share a line only where they say the same."""
+"""Kinds whose findings share a line only if their texts are equal."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found: `channel` is the name in the map, empty where it is the whole recording.
+    """A finding on a channel (its name in the map), or on the whole recording if that is empty.
 
-    Kinds: too_short, no_signal, dropped, gap, jitter, repeated, stuck, clipped, no_excitation,
-    outlier, leap, time, clock_offset, sign, unit, swap, scale.
+    The kinds are too_short, no_signal, dropped, gap, jitter, repeated, stuck, clipped,
+    no_excitation, outlier, leap, time, clock_offset, sign, unit, swap and scale.
     """
 
     kind: str
@@ -30,15 +30,15 @@ class Finding:
 
 
 def sort_by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return findings without repetitions, the worst first."""
+    """Return distinct findings in the order error, warning, note; else the order stays."""
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
 def format_findings(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
-    """Return findings as lines, those of one kind together, the worst first.
+    """Return one line for each group of findings of one severity and kind, errors first.
 
-    Values and reasons that are not the same are told in another line for each.
+    A group shows the text of its first finding; kinds in `UNGROUPED_KINDS` are grouped by text too.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for finding in sort_by_severity(findings):
@@ -48,6 +48,7 @@ def format_findings(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
 
 
 def _format_group(findings: Sequence[Finding]) -> str:
+    """Return findings of one group as a line with their channels and recordings."""
     first = findings[0]
     channels = ", ".join(f"`{name}`" for name in dict.fromkeys(f.channel for f in findings) if name)
     files = ", ".join(name for name in dict.fromkeys(f.recording for f in findings) if name)

@@ -1,4 +1,4 @@
-"""Free run: an automaton alone under the recorded inputs, sampled where its outputs were."""
+"""Free run: a simulation of an automaton under recorded inputs, compared with recorded outputs."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from language.text.diagnostic import Problems, SpecError
 
 Reals = NDArray[np.float64]
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
-"""The input at whose value a state starts."""
+"""Name of the input that gives the initial value of a state."""
 
 
 @dataclass(frozen=True)
 class OutputComparison:
-    """A recorded output and the simulated one at its stamps [s], in SI, all (n_samples,)."""
+    """A recorded output and the simulated one at its time stamps [s], in SI, (samples,) each."""
 
     output: str
     times: Reals
@@ -40,18 +40,18 @@ class OutputComparison:
 
     @property
     def rms(self) -> float:
-        """Root mean square of measured minus simulated."""
+        """The root mean square of measured minus simulated values."""
         return float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
 
     @property
     def nrmse(self) -> float:
-        """`rms` over the standard deviation of what was measured."""
+        """`rms` over the standard deviation of the measured values."""
         return self.rms / float(np.std(self.measured))
 
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A simulation from `start` [s] of the recording on, and what it is compared with."""
+    """A simulation from the time `start` [s] of a recording, and its comparison by column name."""
 
     trajectory: Trajectory
     start: Fraction
@@ -59,17 +59,17 @@ class FreeRun:
 
 
 ProgramCache = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
-"""Programs made for free runs, by the inputs, those of start values as well, and which vary."""
+"""Programs of free runs, by the names of the inputs and the names of those that vary."""
 
 
 RunFunction = Callable[[System, Scenario, Mapping[str, Program]], Trajectory]
-"""What carries out a run of Programs."""
+"""A function that executes Programs under a scenario."""
 
 
 def run_interpreter(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> Trajectory:
-    """Return a run by the interpreter."""
+    """Return the trajectory of a run by the interpreter."""
     return simulate(system, scenario, programs=programs)
 
 
@@ -80,10 +80,11 @@ def simulate_free_run(
     run_program: RunFunction = run_interpreter,
     programs: ProgramCache | None = None,
 ) -> FreeRun:
-    """Simulate from the first measured values of the states on, with nothing fed back.
+    """Return a simulation under recorded inputs from the first measured states, without feedback.
 
-    The simulation's rows are one major step apart; between them it is taken as linear. Programs
-    `programs` for other recordings of the same automaton are not made again.
+    It begins when every input has a value. Between its rows, one major step apart, outputs are
+    interpolated linearly. `programs` is a cache for other recordings of the same automaton and is
+    extended. Raises SpecError if the recording ends before every input has a value.
     """
     input_channels = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]
@@ -130,7 +131,7 @@ def _simulate(
     run_program: RunFunction,
     programs: ProgramCache | None,
 ) -> Trajectory:
-    """Return what an automaton does, by Programs that were `programs` before if there are such."""
+    """Return the trajectory of an automaton, with Programs from the cache where possible."""
     system = single_instance_system(automaton)
     varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
     kind = (tuple(automaton.inputs), tuple(varying))
@@ -141,7 +142,7 @@ def _simulate(
 
 
 def _with_initial_state_inputs(automaton: Automaton, names: Collection[str]) -> Automaton:
-    """Return an automaton some states of which start at the value of an input of their own."""
+    """Return an automaton in which the named states start at the value of an additional input."""
     inputs, states = dict(automaton.inputs), dict(automaton.states)
     for name in names:
         state, own = states[name], INITIAL_INPUT_NAME.format(name)
@@ -155,6 +156,7 @@ def _with_initial_state_inputs(automaton: Automaton, names: Collection[str]) -> 
 def _recorded_inputs(
     automaton: Automaton, input_channels: list[Channel], mapping: RecordingMap, start: Fraction
 ) -> dict[str, Stimulus]:
+    """Return the stimulus of each input: recorded, constant of the map, default, or 0."""
     found = {}
     for name, thing in automaton.inputs.items():
         value = thing.default if thing.default is not None else Fraction(0)
@@ -168,12 +170,14 @@ def _recorded_inputs(
 
 
 def _value_at(channel: Channel, start: Fraction) -> Fraction:
+    """Return the latest value of a channel at a time, or its first value."""
     return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
 
 
 def _compare_output(
     automaton: Automaton, channel: Channel, trajectory: Trajectory, start: Fraction
 ) -> OutputComparison:
+    """Return a recorded output with the simulated one from `start` to the end of the trajectory."""
     output = channel.column.compare or ""
     first = bisect_left(channel.times, start)
     times = channel.seconds[first:] - float(start)

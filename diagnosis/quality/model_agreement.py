@@ -1,6 +1,6 @@
-"""Consistency: how recorded outputs move with those simulated under the recorded inputs.
+"""Model agreement: correlation of recorded outputs with those simulated under the recorded inputs.
 
-Compared are smoothed rates of change: wrong loads and start values, which drift, matter little.
+Smoothed rates of change are compared, because wrong loads and initial values cause slow drift.
 """
 
 from __future__ import annotations
@@ -21,32 +21,33 @@ from engine.recordings.recording import Channel, Recording, crop, split_by_windo
 Reals = NDArray[np.float64]
 
 GRID_STEP = 0.01
-"""Step of the grid on which rates of change are compared [s]."""
+"""Step [s] of the grid on which rates of change are compared."""
 SMOOTHING_STD = 0.04
-"""Standard deviation of the smoothing [s]: what is left is below about 4 Hz."""
+"""Standard deviation [s] of the Gaussian smoothing, which passes frequencies below about 4 Hz."""
 GAIN_SMOOTHING_STD = 0.15
-"""The same for gains, which resonances shall not change: below about 1 Hz."""
+"""The same for gains, below about 1 Hz, without resonances."""
 MAX_LAG = 1.0
-"""Largest offset of clocks looked for [s]."""
+"""Largest clock offset [s] that is tried."""
 TRANSIENT_TIME = 0.8
-"""Time after the start that is left out: start values are not those of the recording [s]."""
+"""Time [s] after the start that is left out, because initial values differ."""
 MIN_CORRELATION = 0.75
-"""Correlation from which two signals are taken for the same motion."""
+"""Correlation from which two signals are the same motion."""
 REVERSAL_MARGIN = 0.15
-"""How much better the reversed signal has to fit: half a period of a sweep looks alike."""
+"""Margin by which the negated signal must correlate better: half a period of a sweep is similar."""
 LAG_MARGIN = 0.02
-"""How much better than without a lag the correlation has to be, to believe in the lag."""
+"""Margin by which the correlation with a lag must exceed the one without."""
 MAX_PIECE, MIN_PIECE = Fraction(10), Fraction(4)
 MAX_SIMULATED_TIME = Fraction(24)
-"""Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
+"""Longest and shortest piece, and total time, that is simulated [s]."""
 
 
 @dataclass(frozen=True)
 class OutputAgreement:
-    """How a measured output goes with the simulated one: measured = gain * simulated(t - lag).
+    """The agreement of a measured output with the simulated one: measured = gain * simulated(t -
+    lag).
 
-    Of the gain of fast and of slow motion that is taken which is nearer to 1. `level` is how large
-    it is against the simulated one once both have found to each other.
+    The gain is the one of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
+    their root mean squares in the second half.
     """
 
     recording: str
@@ -59,24 +60,27 @@ class OutputAgreement:
 
     @property
     def is_clear(self) -> bool:
-        """Tell whether both are the same motion."""
+        """Whether both are the same motion."""
         return abs(self.correlation) >= MIN_CORRELATION
 
     @property
     def correlation_gain(self) -> float:
-        """How much better the correlation is with the lag."""
+        """The increase of the correlation's magnitude by the lag."""
         return abs(self.correlation) - abs(self.correlation_without_lag)
 
     @property
     def significant_lag(self) -> float:
-        """The lag [s], 0 where no lag would do as well."""
+        """The lag [s], or 0 if the signals correlate as well without a lag."""
         return self.lag if self.is_clear and self.correlation_gain > LAG_MARGIN else 0.0
 
 
 def compare_with_simulation(
     recordings: Sequence[Recording], reference: ReferenceModel
 ) -> list[OutputAgreement]:
-    """Return how the outputs of each piece go with a simulation under the recorded inputs."""
+    """Return the agreement of each output with a simulation, for a piece of each recording window.
+
+    Pieces are the most excited ones; no more than `MAX_SIMULATED_TIME` in all is simulated.
+    """
     agreements: list[OutputAgreement] = []
     remaining_time = MAX_SIMULATED_TIME
     piece_length = min(MAX_PIECE, max(MIN_PIECE, MAX_SIMULATED_TIME / max(1, len(recordings))))
@@ -94,7 +98,9 @@ def compare_with_simulation(
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
-    """Return the most lively stretch of a piece that is no longer than `max_length`."""
+    """Return the most excited part of a recording of length `max_length` [s]; all of it if
+    shorter.
+    """
     if piece.end - piece.start <= max_length:
         return piece
     count = int(2 * (piece.end - piece.start) / max_length)
@@ -104,7 +110,7 @@ def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
 
 
 def _decimate_inputs(piece: Recording) -> Recording:
-    """Return a recording with every n-th sample of its inputs: 100 Hz are enough for this."""
+    """Return a recording with every n-th sample of its inputs, at about 100 Hz."""
     channels = dict(piece.channels)
     for name, channel in piece.channels.items():
         span = channel.times[-1] - channel.times[0]
@@ -117,6 +123,9 @@ def _decimate_inputs(piece: Recording) -> Recording:
 
 
 def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
+    """Return the sum over inputs of the spread of their changes relative to that of their
+    values.
+    """
     total = 0.0
     for channel in piece.channels.values():
         inside = (channel.seconds >= float(start)) & (channel.seconds <= float(end))
@@ -129,7 +138,7 @@ def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float
 def _smoothed_rate(
     times: Reals, values: Reals, grid: Reals, spread: float = SMOOTHING_STD
 ) -> Reals:
-    """Return the smoothed rate of change on a grid."""
+    """Return the rate of change after Gaussian smoothing, on the inner part of the grid."""
     width = _kernel_size(spread) // 2
     kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID_STEP / spread) ** 2)
     even = np.interp(grid, times, values)
@@ -138,14 +147,18 @@ def _smoothed_rate(
 
 
 def _kernel_size(spread: float) -> int:
-    """Return how many samples of a grid one smoothed value is made of."""
+    """Return the number of samples of the Gaussian kernel, 4 standard deviations to both sides."""
     return 2 * math.ceil(4.0 * spread / GRID_STEP) + 1
 
 
 def compare_signals(
     recording: str, name: str, comparison: OutputComparison, spread: float = SMOOTHING_STD
 ) -> OutputAgreement | None:
-    """Return how two signals, smoothed by `spread` [s], go together; None for too short ones."""
+    """Return the agreement of two signals, smoothed by `spread` [s].
+
+    The lag of largest correlation is taken, or the one of the negated signal if that is clearly
+    better. The result is None for signals that are short, constant or not finite.
+    """
     start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
     if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
         return None
@@ -175,7 +188,7 @@ def compare_signals(
 def _low_frequency_rates(
     comparison: OutputComparison, grid: Reals, lag: int
 ) -> list[tuple[Reals, Reals]]:
-    """Return both rates below the resonances, or nothing where that takes more than there is.
+    """Return both rates below the resonances at a lag, as a list of one pair; empty if too short.
 
     A fast sweep has little there but drift.
     """
@@ -190,21 +203,24 @@ def _low_frequency_rates(
 
 
 def _spread_ratio(pair: tuple[Reals, Reals]) -> float:
-    """Return the ratio of the spreads, held within what any mistake of units makes."""
+    """Return the ratio of the standard deviations, limited to 1e-6 to 1e6."""
     return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
 
 
 def _rms(values: Reals) -> float:
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def _overlap(measured: Reals, simulated: Reals, lag: int) -> tuple[Reals, Reals]:
+    """Return the parts of two signals that coincide at a lag [samples]."""
     if lag >= 0:
         return measured[lag:], simulated[: len(simulated) - lag]
     return measured[:lag], simulated[-lag:]
 
 
 def _correlation(y: Reals, x: Reals) -> float:
+    """Return the correlation coefficient of two signals; 0 if one is constant."""
     y, x = y - y.mean(), x - x.mean()
     size = float(np.sqrt((y @ y) * (x @ x)))
     return float(y @ x) / size if size else 0.0

@@ -1,4 +1,4 @@
-"""Outlier: values that nothing measured has, and stamps of time that are far from all others."""
+"""Outliers: single values and time stamps of a recording that are far from all others."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ from language.model.automaton import Automaton
 Reals = NDArray[np.float64]
 
 MAX_VALUE = 1e15
-"""A value (SI) above this was not measured; its square still has a meaning to a computer."""
+"""A larger value [SI] was not measured; its square still fits into a double."""
 RANGE_FACTOR = 3.0
-"""Spans of all that lasts from which a value that comes and goes at once is an outlier."""
+"""Multiple of the range of the median-filtered signal from which a single value is an outlier."""
 NOISE_FACTOR = 20.0
 """The same in standard deviations of the noise."""
 MEDIAN_SAMPLES = 5
-"""Samples over which the median is taken: what lasts for less than half of them comes and goes."""
+"""Samples of the median filter, which removes what is shorter than half of them."""
 MAX_PAUSE_FRACTION = Fraction(1, 2)
-"""Share of the time of a recording from which a pause is a wrong stamp, or two recordings."""
+"""Fraction of a recording's time from which a pause is a wrong stamp, or two recordings."""
 MIN_PAUSE = 2
-"""Seconds below which no pause is one."""
+"""Shortest such pause [s]."""
 SECONDS_PER_HOUR = 3600.0
 
 
 def drop_huge_values(recording: Recording) -> Recording:
-    """Return a recording without the samples that are huge, nor channels of nothing else."""
+    """Return a recording without values above `MAX_VALUE`; channels without other values are
+    dropped.
+    """
     channels = {}
     for name, channel in recording.channels.items():
         known = np.abs(channel.array) <= MAX_VALUE
@@ -45,7 +47,10 @@ def drop_huge_values(recording: Recording) -> Recording:
 
 
 def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Finding]:
-    """Return the channels that have values which come and go at once, far from all others."""
+    """Return an error for each channel with outliers, which names the largest one.
+
+    The range of the compared state, if the automaton declares one, is added to the text.
+    """
     found = []
     for name, channel in recording.channels.items():
         huge = np.abs(channel.array) > MAX_VALUE
@@ -65,7 +70,10 @@ def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Fin
 
 
 def _is_outlier(values: Reals) -> NDArray[np.bool_]:
-    """Tell which values are far from those around them, measured by what lasts."""
+    """Return the mask of values far from the median-filtered signal (samples,).
+
+    No value is an outlier in a short signal, or if the filtered signal is constant.
+    """
     if len(values) < 4 * MEDIAN_SAMPLES:
         return np.zeros(len(values), dtype=np.bool_)
     around = np.pad(values, MEDIAN_SAMPLES // 2, mode="edge")
@@ -77,7 +85,7 @@ def _is_outlier(values: Reals) -> NDArray[np.bool_]:
 
 
 def _range_text(channel: Channel, value: float, automaton: Automaton | None, factor: float) -> str:
-    """Return what the automaton says of a value that is out of the range of its state."""
+    """Return the declared range as text if a value of a compared state is outside it, else ""."""
     output = channel.column.compare
     if automaton is None or output is None or output not in automaton.outputs:
         return ""
@@ -89,7 +97,7 @@ def _range_text(channel: Channel, value: float, automaton: Automaton | None, fac
 
 
 def find_time_leaps(recording: Recording) -> list[Finding]:
-    """Return where the stamps of a recording leap: a wrong stamp, or two recordings in one."""
+    """Return an error for the first long pause of time stamps in each window of a recording."""
     found = []
     for piece in split_by_windows(recording):
         least = max(float(MAX_PAUSE_FRACTION * (piece.end - piece.start)), MIN_PAUSE)
@@ -106,6 +114,7 @@ def find_time_leaps(recording: Recording) -> list[Finding]:
 
 
 def _format_duration(seconds: float) -> str:
+    """Return a duration in seconds, hours or days."""
     if seconds < SECONDS_PER_HOUR:
         return f"{seconds:.4g} s"
     hours = seconds / SECONDS_PER_HOUR

@@ -1,4 +1,4 @@
-"""Recording check: what recorded data are worth, before anything is concluded from them."""
+"""Recording check: whether recorded data are fit for a diagnosis, with all findings on them."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from language.model.system import RecordingMap
 
 ClockErrorSearch = Callable[[Sequence[Recording]], list[Finding] | None]
 MIN_DURATION = 2.0
-"""Time of a recording below which it tells nothing [s]: an observer needs 0.5 s to find in."""
+"""Shortest useful recording [s]; an observer needs 0.5 s of burn-in."""
 DISQUALIFYING_KINDS = ("no_signal", "too_short", "outlier", "leap", "time")
-"""Findings after which a recording is compared with nothing."""
+"""Kinds of findings after which a recording is not compared with the model."""
 MIN_SAMPLES = 100
-"""Samples of a channel below which nothing can be told apart."""
+"""Smallest useful number of samples of a channel."""
 
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """Facts about each channel, what was found (the worst first), and what is excited.
+    """Properties of each channel, findings (errors first) and the excitation.
 
-    `relations` say how recorded outputs go with simulated ones; none without an automaton.
+    `agreements` relate recorded outputs to simulated ones; there are none without an automaton.
     """
 
     channels: tuple[ChannelCheck, ...]
@@ -47,7 +47,7 @@ class RecordingCheck:
 
     @property
     def is_usable(self) -> bool:
-        """Tell whether a verdict about physics could be right."""
+        """Whether there is no error among the findings."""
         return not any(finding.severity == "error" for finding in self.findings)
 
 
@@ -58,10 +58,10 @@ def check_recordings(
     run_programs: RunFunction = run_interpreter,
     find_clock_errors: ClockErrorSearch = lambda recordings: None,
 ) -> RecordingCheck:
-    """Return what is to be known of recordings; with an automaton also units, signs and clocks.
+    """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
-    `find_clock_errors` finds wrong clocks and signs, or returns None where it cannot: what a simulation
-    tells of clocks is a hint, no more.
+    `find_clock_errors` searches wrong clocks and signs by prediction, or returns None if it cannot;
+    the clock findings of the simulation are then warnings. Sampled automata are not simulated.
     """
     early_findings = [
         f for one in recordings for f in (*find_outliers(one, automaton), *find_time_leaps(one))
@@ -106,9 +106,9 @@ def check_recordings(
 def _check_channels(
     recordings: Sequence[Recording], earlier: Sequence[Finding]
 ) -> tuple[list[ChannelCheck], list[Finding]]:
-    """Return the facts of each channel, and what was found beside what was `earlier` before.
+    """Return the properties of each channel, and the earlier findings with those on channels.
 
-    Where stamps leap, gaps are no news.
+    In recordings whose time leaps, gaps and dropped samples are not reported.
     """
     leapt = {finding.recording for finding in earlier if finding.kind == "leap"}
     channels, findings = [], list(earlier)
@@ -127,7 +127,12 @@ def _merge_clock_errors(
     recordings: Sequence[Recording],
     find_clock_errors: ClockErrorSearch,
 ) -> list[Finding]:
-    """Return what is odd between channels, found by `find_clock_errors` where that is possible."""
+    """Return findings with those on clocks and signs replaced by `find_clock_errors` where
+    possible.
+
+    A sign error of an input needs a sign finding of the simulation in that recording too. If the
+    search is impossible, clock findings become warnings.
+    """
     others = [finding for finding in findings if finding.kind not in ("clock_offset", "sign")]
     wrong = {finding.recording for finding in others if finding.severity == "error"}
     right = [one for one in recordings if "" not in wrong and one.name not in wrong]
@@ -154,10 +159,10 @@ def _find_missing_signals(
     mapping: RecordingMap,
     automaton: Automaton | None,
 ) -> list[Finding]:
-    """Channels that a recording lacks, and inputs that have one value where they must not.
+    """Return errors for channels that a recording lacks and for inputs that must not be constant.
 
-    Without an input that has no default nothing drives the model; one that is noisy in other
-    recordings cannot be without noise in this.
+    An input without a default that is constant everywhere drives nothing. One that is noisy in most
+    recordings cannot be constant in another one.
     """
     names = dict.fromkeys(name for recording in recordings for name in recording.channels)
     if automaton is not None:
@@ -188,7 +193,9 @@ def _find_missing_signals(
 
 
 def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns that an automaton reads or compares; all of them without one."""
+    """Return the columns that an automaton reads or compares; all of them without one or without
+    any.
+    """
     if automaton is None:
         return list(mapping.columns)
     return [
@@ -201,6 +208,7 @@ def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str
 def _find_insufficient_data(
     recordings: Sequence[Recording], checks: Sequence[ChannelCheck], excitation: Excitation
 ) -> list[Finding]:
+    """Return errors for recordings that are too short, and for missing excitation."""
     found = []
     total = sum(
         float(p.end - p.start) for recording in recordings for p in split_by_windows(recording)

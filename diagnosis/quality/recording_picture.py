@@ -1,4 +1,4 @@
-"""Recording picture: the channels, where the machine has been, and what the data can test."""
+"""Recording picture: channels, operating range, spectrum and testable effects of recordings."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from language.text.sanitise import escape_invisible, truncate
 Reals = NDArray[np.float64]
 
 MAX_CHANNELS = 6
-"""Most channels drawn: the picture stays on one page."""
+"""Maximum number of channels drawn, for one page."""
 MAX_POINTS = 4000
-"""Most points of a curve; beyond, the smallest and largest of each stretch are drawn."""
+"""Maximum number of points of a curve; a longer one is drawn as an envelope."""
 MAX_WINDOW = 1024
 """Samples of a window of a spectrum."""
 MAX_FINDINGS = 5
@@ -37,7 +37,9 @@ COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
 def draw_recordings(recordings: Sequence[Recording], check: RecordingCheck, title: str) -> Picture:
-    """Return the picture of checked recordings, one after another on the left."""
+    """Return the picture of checked recordings: channels on the left, summary right, findings
+    below.
+    """
     names = list(dict.fromkeys(one.name for one in check.channels))[:MAX_CHANNELS]
     count = max(1, len(format_findings(check.findings)[:MAX_FINDINGS]))
     height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * count
@@ -62,6 +64,7 @@ def _draw_channels(
     check: RecordingCheck,
     names: Sequence[str],
 ) -> None:
+    """Draw each channel over time, recordings in a row, with windows and defects."""
     rows = place.subgridspec(len(names), 1)
     axes: list[Axes] = []
     for row, name in enumerate(names):
@@ -96,6 +99,7 @@ def _draw_channels(
 
 
 def _draw_name(axis: Axes, name: str, start: float) -> None:
+    """Write the name of a recording at its start."""
     across = axis.get_xaxis_transform()
     text = escape_invisible(f" {name}")
     axis.text(start, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
@@ -103,6 +107,7 @@ def _draw_name(axis: Axes, name: str, start: float) -> None:
 
 
 def _format_facts(check: ChannelCheck) -> str:
+    """Return the title of a channel: name, unit, rate, quantisation, noise and missing samples."""
     parts = [
         f"{check.name}"
         + (f" \N{RIGHTWARDS ARROW} {check.signal}" if check.signal != check.name else "")
@@ -118,6 +123,7 @@ def _format_facts(check: ChannelCheck) -> str:
 
 
 def _draw_signal(axis: Axes, channel: Channel, shift: float, check: RecordingCheck) -> None:
+    """Draw one channel in the unit of its file, shifted in time."""
     times, values = _envelope(channel.seconds + shift, channel.array)
     factor = float(channel.column.unit.factor * channel.column.scale[0])
     colour = "#cc7a00" if channel.column.to is not None else BLUE
@@ -125,6 +131,7 @@ def _draw_signal(axis: Axes, channel: Channel, shift: float, check: RecordingChe
 
 
 def _mark_defects(axis: Axes, check: ChannelCheck, shift: float) -> None:
+    """Shade the gaps and the stuck interval of a channel."""
     for start, end in check.gaps:
         axis.axvspan(start + shift, end + shift, color=RED, alpha=0.25, lw=0)
     if check.stuck:
@@ -132,7 +139,7 @@ def _mark_defects(axis: Axes, check: ChannelCheck, shift: float) -> None:
 
 
 def _envelope(times: Reals, values: Reals) -> tuple[Reals, Reals]:
-    """Return the curve, or the ends of each stretch of one that has too many points."""
+    """Return the curve, or the minimum and maximum of each block if it has too many points."""
     if len(values) <= MAX_POINTS:
         return times, values
     size = -(-len(values) // (MAX_POINTS // 2))
@@ -144,14 +151,14 @@ def _envelope(times: Reals, values: Reals) -> tuple[Reals, Reals]:
 
 
 def _main_signal(signals: Sequence[SignalExcitation]) -> SignalExcitation | None:
-    """Return the signal that does most: most steps, then the largest band."""
+    """Return the signal with most steps, then with the largest bandwidth; None without signals."""
     return max(signals, key=lambda one: (len(one.steps), one.band), default=None)
 
 
 def _draw_operating_range(
     axis: Axes, recordings: Sequence[Recording], excitation: Excitation
 ) -> None:
-    """Draw input over speed: where the machine has been."""
+    """Draw the main input over the main speed."""
     axis.set_title("where the machine has been", loc="left", fontsize=9.5)
     first, second = _main_signal(excitation.inputs), _main_signal(excitation.speeds)
     pairs = [
@@ -176,7 +183,7 @@ def _draw_operating_range(
 
 
 def _draw_spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck) -> None:
-    """Draw what frequencies the input holds, above its noise."""
+    """Draw the amplitude spectral density of the main input, and the level of its noise."""
     axis.set_title("what the input excites", loc="left", fontsize=9.5)
     main = _main_signal(check.excitation.inputs)
     facts = [one for one in check.channels if main and one.name == main.name]
@@ -204,7 +211,7 @@ def _draw_spectrum(axis: Axes, recordings: Sequence[Recording], check: Recording
 
 
 def _draw_effects(axis: Axes, excitation: Excitation) -> None:
-    """List the effects: those that the data can test in green, the others pale."""
+    """List the effects: testable ones in green, the others pale."""
     able = sum(effect.is_testable for effect in excitation.effects)
     axis.set_title(
         f"these data can test {able} of {len(excitation.effects)} effects", loc="left", fontsize=9.5
@@ -222,6 +229,7 @@ def _draw_effects(axis: Axes, excitation: Excitation) -> None:
 
 
 def _draw_findings(axis: Axes, check: RecordingCheck) -> None:
+    """Write the first findings as lines, errors first."""
     axis.axis("off")
     lines = format_findings(check.findings)
     if not lines:
@@ -238,13 +246,16 @@ def _draw_findings(axis: Axes, check: RecordingCheck) -> None:
 
 
 def _draw_empty(axis: Axes, text: str) -> None:
+    """Write a text in the middle of empty axes."""
     axis.axis("off")
     axis.text(0.5, 0.5, text, ha="center", color=GREY, fontsize=9, transform=axis.transAxes)
 
 
 def _si_factor(channel: Channel) -> float:
+    """Return the factor from the unit of the file to SI."""
     return float(channel.column.unit.factor * channel.column.scale[0])
 
 
 def _axis_label(channel: Channel) -> str:
+    """Return the name and unit of a channel."""
     return f"{channel.column.name} [{channel.column.unit.text}]"

@@ -1,4 +1,4 @@
-"""Alike: recorded speeds that are one motion, such as a motor and its wheel; without a model."""
+"""Redundant speeds: recorded speeds of one motion, compared with each other without a model."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from diagnosis.quality.unit_sign_clock import CLOCK_TOLERANCE, OFFSET_WARNING, S
 from engine.recordings.recording import Channel, Recording, split_by_windows
 
 MIN_CORRELATION = 0.9
-"""Correlation of the rates of change from which two speeds are taken for one motion."""
+"""Correlation of the rates of change from which two speeds are one motion."""
 MAX_OFFSET = 0.6
-"""Larger ones [s] are periods of the motion rather than clocks."""
+"""A larger offset [s] is a period of the motion rather than of the clock."""
 
 
 def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
-    """Return what is to be told of speeds that go together but for a sign or a clock.
+    """Return findings on pairs of speeds that agree except for a sign or a clock offset.
 
-    What is so in most of several recordings is an error, in a single one a warning.
+    A finding in most of several recordings is an error, in a single recording a warning.
     """
     found: dict[tuple[str, str], list[OutputAgreement]] = {}
     for recording in recordings:
@@ -42,7 +42,7 @@ def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
 def _compare_speeds(
     recording: Recording, first: Channel, second: Channel
 ) -> OutputAgreement | None:
-    """Return how the second speed goes with the first in the longest piece."""
+    """Return the agreement of two speeds in the longest window; None if they hardly overlap."""
     piece = max(split_by_windows(recording), key=lambda piece: piece.end - piece.start)
     one = piece.channels.get(first.column.name)
     other = piece.channels.get(second.column.name)
@@ -62,6 +62,7 @@ def _compare_speeds(
 def _redundancy_findings(
     first: str, second: str, agreements: Sequence[OutputAgreement]
 ) -> list[Finding]:
+    """Return the finding on a pair of speeds, if most recordings agree on a sign or an offset."""
     both = f"`{first}` and `{second}` are one motion"
     severity: Severity = "error" if len(agreements) > 1 else "warning"
     where = agreements[0].recording if len(agreements) == 1 else ""

@@ -1,4 +1,6 @@
-"""Reference: the automaton that recordings are checked against, alone under their inputs."""
+"""Reference model: the automaton with which recordings are checked, simulated under their
+inputs.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +22,12 @@ from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 MAX_STEP, STABILITY_MARGIN = 0.004, 3.0
-"""Longest major step [s], and how far it stays below the largest stable one."""
+"""Longest major step [s], and the margin to the largest stable step."""
 
 
 @dataclass(frozen=True)
 class ReferenceModel:
-    """An automaton with the map of its recordings; `carry_out` runs its Programs."""
+    """An automaton with its recording map; `run_programs` executes its Programs."""
 
     automaton: Automaton
     mapping: RecordingMap
@@ -34,7 +36,7 @@ class ReferenceModel:
 
     @cached_property
     def coarse_automaton(self) -> Automaton:
-        """The automaton with as long a major step as is stable and sees motion of 4 Hz."""
+        """The automaton with the longest major step that is stable and resolves motion of 4 Hz."""
         motion = program_of(self.automaton).integration
         limits = [limit.step for limit in motion.stability_limits] if motion else []
         if not limits:
@@ -44,7 +46,7 @@ class ReferenceModel:
         return dataclasses.replace(self.automaton, step=step)
 
     def simulate(self, recording: Recording) -> FreeRun:
-        """Simulate the coarse automaton under recorded inputs. Raises SpecError."""
+        """Return a free run of the coarse automaton under recorded inputs. Raises SpecError."""
         return simulate_free_run(
             self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
         )
@@ -56,13 +58,14 @@ _cache: list[ReferenceModel] = []
 def cached_reference(
     automaton: Automaton, mapping: RecordingMap, run_programs: RunFunction
 ) -> ReferenceModel:
-    """Return what recordings are checked against: the latest one, with the Programs that it has
-    made, where it is asked for again of the same automaton and map.
+    """Return the reference model of an automaton and a map.
+
+    The latest one is cached with its Programs and returned if all arguments are identical.
     """
     if _cache:
-        kept = _cache[0]
-        same = kept.automaton is automaton and kept.mapping is mapping
-        if same and kept.run_programs is run_programs:
-            return kept
+        latest = _cache[0]
+        same = latest.automaton is automaton and latest.mapping is mapping
+        if same and latest.run_programs is run_programs:
+            return latest
     _cache[:] = [ReferenceModel(automaton, mapping, run_programs)]
     return _cache[0]

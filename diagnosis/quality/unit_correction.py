@@ -1,5 +1,6 @@
-"""Remedy: another unit of a column, or two columns exchanged, with which a recording goes with the
-model that does not go with it as it is. Each is tried: the model is run with what it makes.
+"""Unit correction: another unit of a column, or two exchanged columns, that explain a mismatch.
+
+Each correction is tested by a simulation under the corrected recording.
 """
 
 from __future__ import annotations
@@ -29,29 +30,31 @@ from language.model.system import ColumnMapping
 from language.text.diagnostic import SpecError
 
 MAX_CONSISTENT_GAIN = 1.6
-"""Gains between this and its inverse are those of a model that is right but for its parameters."""
+"""Gains between this and its inverse are explained by wrong parameters."""
 TESTED_FACTORS = (
     *UNIT_FACTORS,
     (2.0 * math.pi, "rad/s", "rad/s taken for revolutions per second"),
     (0.5 / math.pi, "rad/s", "revolutions per second taken for rad/s"),
 )
-"""Factors as in `FACTORS`; some of these are too near to others to be told without a trial."""
+"""Factors as in `UNIT_FACTORS`, with some that only a simulation can separate from others."""
 MIN_DISTANCE = 0.7
-"""Distance from the model (the logarithm of a gain of 2) that a remedy has to make up for."""
+"""Smallest distance from the model (the logarithm of a gain of 2) that a correction must remove."""
 MAX_GAIN = 6.0
-"""Gains that an output may have, or their inverse, once its unit is right: a simulation that starts
-with a speed in a wrong unit is a wild one."""
+"""Largest gain of an output, or of its inverse, after a correction of its unit.
+
+A simulation that starts with a speed in a wrong unit has large errors.
+"""
 SURE_CORRELATION = 0.9
-"""Correlation from which what the gain says of a unit needs no trial."""
+"""Correlation above which the unit that follows from the gain needs no simulation."""
 MAX_SAMPLE_TIME, MAX_SAMPLE_STEPS = 0.5, 200
-"""Seconds between samples, and steps of the model, from which milliseconds are tried."""
+"""Sample period [s] and number of model steps from which a time in milliseconds is tested."""
 MAX_TESTED_RECORDINGS = 3
-"""Recordings of those that do not go with the model in which remedies are tried."""
+"""Number of inconsistent recordings in which corrections are tested."""
 
 
 @dataclass(frozen=True)
 class ColumnCorrection:
-    """A column divided by `factor`, or exchanged with `other`."""
+    """A correction: a column divided by `factor`, or exchanged with the column `other`."""
 
     column: str
     factor: float = 1.0
@@ -59,7 +62,7 @@ class ColumnCorrection:
     reason: str = ""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return a recording as it would be without the mistake."""
+        """Return a recording with the correction applied."""
         channels = dict(recording.channels)
         one = channels[self.column]
         if self.other:
@@ -72,7 +75,7 @@ class ColumnCorrection:
         return dataclasses.replace(recording, channels=channels)
 
     def to_finding(self, recording: str) -> Finding:
-        """Return what is told of a recording, or of all if it is called ""."""
+        """Return the finding on a recording, or on all of them if the name is ""."""
         if self.other:
             text = f"`{self.column}` and `{self.other}` are exchanged: they go with the model "
             return Finding("swap", recording, self.column, text + "the other way round", "error")
@@ -87,9 +90,10 @@ def find_corrections(
     reference: ReferenceModel,
     findings: Sequence[Finding] = (),
 ) -> list[Finding]:
-    """Return the remedies of recordings that do not go with the model as they are.
+    """Return findings on corrections of recordings that do not agree with the model.
 
-    Where a unit is `findings` and all goes with the model but for it, none is tried.
+    A recording with a unit error in `findings` is skipped if all its outputs correlate well. A
+    correction that explains most of several recordings is reported once for all.
     """
     by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
     sure = {
@@ -130,9 +134,9 @@ def find_corrections(
 
 
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
-    """Return whether the time of a recording is one of milliseconds.
+    """Return a finding if the time of a recording may be in milliseconds, else an empty list.
 
-    That is sure where the recording then goes with the model; else it is asked.
+    It is an error if the recording agrees with the model after a correction, else a warning.
     """
     usual = min(
         (
@@ -159,7 +163,7 @@ def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> li
 
 
 def _scale_time(recording: Recording) -> Recording:
-    """Return a recording a thousand times as fast, without the windows of its map."""
+    """Return a recording with its time divided by 1000, without windows."""
     channels = {
         name: Channel(one.column, tuple(time / 1000 for time in one.times), one.values)
         for name, one in recording.channels.items()
@@ -173,7 +177,11 @@ def _best_correction(
     max_distance: float,
     reference: ReferenceModel,
 ) -> ColumnCorrection | None:
-    """Return the remedy after which all outputs go with the model; the one nearest to it."""
+    """Return the correction after which all outputs agree with the model, the one at least
+    distance.
+
+    The distance must be below `max_distance`; the result is None if there is no such correction.
+    """
     distances = {}
     for correction in corrections:
         try:
@@ -189,10 +197,9 @@ def _best_correction(
 def _candidate_corrections(
     recording: Recording, automaton: Automaton, agreements: Sequence[OutputAgreement]
 ) -> list[ColumnCorrection]:
-    """Return what can be tried with the columns that are used.
+    """Return the corrections that are possible for the used columns, by their dimensions.
 
-    Of an output it is `agreements` about how large it is: a factor that does not make up for that is
-    not tried.
+    A factor that leaves a gain of an output above `MAX_GAIN` is left out.
     """
     gains = {agreement.channel: agreement.gain for agreement in agreements}
     used = {
@@ -217,7 +224,7 @@ def _candidate_corrections(
 
 
 def _reason_with_unit(reason: str, column: ColumnMapping) -> str:
-    """Return a reason with the unit that it may be."""
+    """Return a reason with the likely unit added to a factor of a thousand."""
     text = column.unit.text
     if "thousand times larger" in reason and not text.startswith("k"):
         return f"{reason}, as k{text} taken for {text}"
@@ -225,23 +232,25 @@ def _reason_with_unit(reason: str, column: ColumnMapping) -> str:
 
 
 def _is_inconsistent(agreement: OutputAgreement) -> bool:
-    """Tell whether an output does not go with the model, but for its sign."""
+    """Return whether an output disagrees with the model apart from its sign."""
     return abs(math.log(abs(agreement.gain))) + 1.0 - abs(agreement.correlation) > MIN_DISTANCE
 
 
 def _is_consistent(agreement: OutputAgreement) -> bool:
+    """Return whether an output agrees with the model but for its parameters."""
     return agreement.is_clear and 1.0 / MAX_CONSISTENT_GAIN < agreement.gain < MAX_CONSISTENT_GAIN
 
 
 def _distance(agreement: OutputAgreement) -> float:
-    """Return how far an output is from what the model gives."""
+    """Return the distance of an output from the model: |log gain| + 1 - correlation."""
     return abs(math.log(abs(agreement.gain))) + 1.0 - max(agreement.correlation, 0.0)
 
 
 def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding]) -> list[Finding]:
-    """Return what is odd in recordings, with remedies in place of what follows from the mistake.
+    """Return findings with corrections in place of other findings on the same recordings.
 
-    A unit that was told already of the same column stays as it was told.
+    A unit correction of a channel that already has a unit finding is dropped. With a correction of
+    all recordings only corrections are returned.
     """
     same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
     new = [

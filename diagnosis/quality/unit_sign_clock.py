@@ -1,4 +1,4 @@
-"""Disagreement: what odd relations to the simulation say about signs, units and clocks."""
+"""Unit, sign and clock errors: conclusions from the agreement of recordings with a simulation."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
-"""Offsets of clocks [s] that are an error and a warning; actuators and sensors lag up to 0.05."""
+"""Clock offsets [s] that are an error and a warning; actuators and sensors have lags up to
+0.05 s.
+"""
 SINGLE_RECORDING_MARGIN = 0.1
-"""How much better the correlation has to be, to believe that one recording of several is late."""
+"""Increase of the correlation from which a lag in a single recording of several is reported."""
 CLOCK_TOLERANCE = 0.04
-"""Lags nearer than this are one offset [s]."""
+"""Lags within this distance [s] are the same offset."""
 SHARED_FRACTION = 0.6
-"""Share of the recordings from which a mistake is that of all of them."""
+"""Fraction of the recordings from which an error is attributed to all."""
 MAX_SCALE_RATIO = 2.5
-"""Ratio of measured to simulated above which, or below whose inverse, the scale is told."""
+"""Ratio of measured to simulated above which, or below whose inverse, the scale is reported."""
 FACTOR_TOLERANCE = 0.3
-"""Relative distance from a factor of units; parameters of a naive model are 20 per cent wrong."""
+"""Relative distance from a factor of units; parameters of a rough model are 20 % wrong."""
 SHARED_FACTOR_TOLERANCE = 0.5
-"""The same where all outputs are off alike: what the model lacks seldom does that."""
+"""The same if all outputs have the same factor, which missing physics seldom causes."""
 UNIT_FACTORS: Sequence[tuple[float, str, str]] = (
     (30.0 / math.pi, "rad/s", "rpm taken for rad/s"),
     (math.pi / 30.0, "rad/s", "rad/s taken for rpm"),
@@ -40,7 +42,7 @@ UNIT_FACTORS: Sequence[tuple[float, str, str]] = (
     (1000.0, "", "a unit a thousand times smaller than the map says"),
     (1.0e-3, "", "a unit a thousand times larger than the map says"),
 )
-"""A factor between measured and simulated, where it can occur, and what it comes from."""
+"""Factor of measured to simulated, the unit for which it can occur, and its cause."""
 
 
 def find_unit_sign_clock_errors(
@@ -49,7 +51,11 @@ def find_unit_sign_clock_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return what is to be told of the signs, units and clocks of each recording."""
+    """Return findings on signs, units and clocks, for all recordings together or for single ones.
+
+    An error that most recordings show is reported once. A clock offset of single recordings is a
+    warning and needs a clear increase of the correlation.
+    """
     own = {
         recording.name: _find_errors(
             recording.name,
@@ -81,9 +87,9 @@ def find_unit_sign_clock_errors(
     units = [f for findings in own.values() for f in findings if f.kind == "unit"]
     if 2 * len({f.recording for f in units}) >= len(recordings):
         units = [f for f in shared if f.kind == "unit"] or units
-        return units  # single recordings say which unit it is
+        return units  # Single recordings show which unit it is.
     if any(finding.kind != "clock_offset" for finding in shared):
-        return shared  # what else is odd follows from that
+        return shared  # Other findings are consequences of these.
     sure = {
         r.recording
         for r in agreements
@@ -100,10 +106,10 @@ def find_unit_sign_clock_errors(
 
 
 def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
-    """Tell whether an output is as large as others say that go with the model.
+    """Return whether the level of an output agrees with outputs that are consistent with the model.
 
-    What the model lacks may shake one output many times as much as it does the simulated one; in
-    another unit it would be as far from all others.
+    Missing physics can make one output oscillate much more than in the simulation, which looks like
+    a scale error; a wrong unit would change its level relative to the others.
     """
     if finding.kind not in ("unit", "scale"):
         return False
@@ -121,10 +127,12 @@ def _is_shared(
     by_recording: Mapping[str, Sequence[Finding]],
     agreements: Sequence[OutputAgreement],
 ) -> bool:
-    """Tell whether most recordings say the same, of those in which the channel is clear."""
+    """Return whether most of the recordings with a clear agreement of the channel have this
+    finding.
+    """
     clear = {r.recording for r in agreements if r.is_clear and r.channel == finding.channel}
     count = sum(_has_similar(findings, finding) for findings in by_recording.values())
-    if not clear:  # an input: where one output alone is clear, that one is blamed
+    if not clear:  # An input: if one output alone is clear, the finding names that output.
         clear = {r.recording for r in agreements if r.is_clear}
         kinds = _similar_kinds(finding.kind)
         count = sum(any(f.kind in kinds for f in findings) for findings in by_recording.values())
@@ -132,19 +140,21 @@ def _is_shared(
 
 
 def _weaken_clock_finding(finding: Finding) -> Finding:
-    """A clock that is off in some recordings alone may be an actuator that is slow in these."""
+    """Return a clock finding as a warning: in single recordings an actuator may be slow instead."""
     if finding.kind != "clock_offset":
         return finding
     return replace(finding, severity="warning")
 
 
 def _has_similar(findings: Sequence[Finding], finding: Finding) -> bool:
+    """Return whether findings contain one of a similar kind on the same channel."""
     return any(
         f.channel == finding.channel and f.kind in _similar_kinds(finding.kind) for f in findings
     )
 
 
 def _similar_kinds(kind: str) -> tuple[str, ...]:
+    """Return the kinds that describe the same error: unit and scale, or the kind itself."""
     return ("unit", "scale") if kind in ("unit", "scale") else (kind,)
 
 
@@ -155,7 +165,10 @@ def _find_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return what the relations of one recording or of all say; clocks if all else is right."""
+    """Return findings from the clear agreements of one recording, or of all for the name "".
+
+    Clock offsets are only reported if there are no sign and unit errors.
+    """
     clear = [agreement for agreement in agreements if agreement.is_clear]
     by_channel = {
         channel: [r for r in clear if r.channel == channel]
@@ -168,7 +181,7 @@ def _find_errors(
 
 
 class _AgreementsByChannel:
-    """The clear relations of one recording or of all of them, by channel."""
+    """The clear agreements of one recording or of all of them, by channel."""
 
     def __init__(
         self,
@@ -191,7 +204,9 @@ class _AgreementsByChannel:
         ]
 
     def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
-        """Return the channel to blame and how it is called: an input if all outputs are odd."""
+        """Return the channel to report and its name in a sentence: an input if all outputs are
+        affected.
+        """
         if len(channels) == len(self.gains) and self.inputs:
             if len(channels) > 1:
                 return self.inputs[0], f"input `{self.inputs[0]}`"
@@ -199,10 +214,11 @@ class _AgreementsByChannel:
         return channels[0], f"`{channels[0]}`"
 
     def _finding(self, kind: str, channel: str, text: str, severity: Severity) -> Finding:
+        """Return a finding on this recording."""
         return Finding(kind, self.name, channel, text, severity)
 
     def find_sign_errors(self) -> list[Finding]:
-        """Outputs that move against the simulated ones."""
+        """Return errors for outputs with a negative gain; one for the input if all are negative."""
         odd = [name for name, gain in self.gains.items() if gain < 0.0]
         if not odd:
             return []
@@ -215,7 +231,7 @@ class _AgreementsByChannel:
         return found
 
     def find_unit_errors(self) -> list[Finding]:
-        """Outputs far larger or smaller than the simulated ones."""
+        """Return findings on outputs much larger or smaller than the simulated ones."""
         sizes = {name: abs(gain) for name, gain in self.gains.items()}
         odd = [n for n, size in sizes.items() if not 1.0 / MAX_SCALE_RATIO < size < MAX_SCALE_RATIO]
         if not odd:
@@ -232,7 +248,9 @@ class _AgreementsByChannel:
         return found
 
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
-        """Tell what makes all outputs too large: an input too small, or a unit that they share."""
+        """Return the finding on all outputs: a wrong scale of the input, or a unit that
+        they share.
+        """
         size = median(abs(self.gains[name]) for name in outputs)
         if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
             reasons = {
@@ -248,6 +266,9 @@ class _AgreementsByChannel:
         return self._scale_finding(channel, subject, 1.0 / size, False)
 
     def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
+        """Return a unit error if a factor of units explains the size, else a warning on the
+        scale.
+        """
         dimension = column_dimension(self.mapping.columns[channel])
         share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
         source = _unit_error_reason(size, dimension)
@@ -258,7 +279,7 @@ class _AgreementsByChannel:
         return self._finding("scale", channel, text, "warning")
 
     def find_clock_errors(self) -> list[Finding]:
-        """Outputs that lag or lead the simulated ones by more than an actuator or sensor does."""
+        """Return findings on outputs with a larger lag than actuators and sensors have."""
         odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING]
         if not odd:
             return []
@@ -270,7 +291,7 @@ class _AgreementsByChannel:
         ]
 
     def _clock_offset_finding(self, channels: Sequence[str], is_shared: bool) -> Finding:
-        """Tell whose clock is off; an error if it is so by the same time wherever it is clear."""
+        """Return the clock finding on channels: an error if most agreements have the same lag."""
         lag = median(self.lags[name] for name in channels)
         channel, called = (
             self._attribute(channels) if is_shared else (channels[0], f"`{channels[0]}`")
@@ -278,7 +299,8 @@ class _AgreementsByChannel:
         later = (lag > 0.0) == (channel in self.lags)
         text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
         if is_shared and len(channels) == 1 and self.inputs:
-            text = f"the clocks of `{channels[0]}` and input `{self.inputs[0]}` are {abs(lag):.2f} s apart"
+            both = f"`{channels[0]}` and input `{self.inputs[0]}`"
+            text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
         steady = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each) >= SHARED_FRACTION * len(
             each
@@ -288,6 +310,7 @@ class _AgreementsByChannel:
 
 
 def _varies(recording: Recording, name: str) -> bool:
+    """Return whether a channel is recorded and not constant."""
     channel = recording.channels.get(name)
     return channel is not None and len(set(channel.values)) > 1
 
@@ -295,7 +318,9 @@ def _varies(recording: Recording, name: str) -> bool:
 def _unit_error_reason(
     size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
 ) -> str:
-    """Return what makes a channel `size` times as large as it should be; empty if not known."""
+    """Return the unit error that explains a ratio of measured to simulated, or "" if there
+    is none.
+    """
     near = [
         (abs(math.log(size / factor)), reason)
         for factor, unit, reason in UNIT_FACTORS
