@@ -1,1 +1,1 @@
-"""Reading of whole documents: automata, systems, scenarios, recording maps."""
+"""Loading of whole documents: automata, systems, scenarios, calibration pages, recording maps."""

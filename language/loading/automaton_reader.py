@@ -1,4 +1,8 @@
-"""Automaton reader: an expanded document to an Automaton, all problems of form reported."""
+"""Automaton reader: an expanded document as an unchecked Automaton.
+
+It calls the readers of the sections. Problems of form are reported; language/checks examines the
+result.
+"""
 
 from __future__ import annotations
 
@@ -41,19 +45,21 @@ KEYS = (
     *(*CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS),
 )
 DEFAULT_STEP = Fraction(1, 1000)
-"""Major step of a continuous automaton that gives none."""
+"""Default major step [s] of a continuous automaton."""
 MIN_TIME, MAX_TIME = Fraction(1, 10**9), Fraction(86400)
-"""Bounds [s] of a period and a step; beyond them is a mistake of the unit."""
+"""Bounds [s] of a period and of a step; a value outside suggests a wrong unit."""
 
 ParameterValues = Mapping[str, YamlNode]
+"""New values of parameters by name."""
 
 
 def read_automaton(
     document: Document, project: Project, values: ParameterValues | None, problems: Problems
 ) -> Automaton:
-    """Read an automaton or variant with some parameter values replaced.
+    """Return the automaton of a document with some parameter values replaced.
 
-    Problems of form are reported and reading goes on; SpecError where there is nothing to read.
+    Overlays and instances are expanded first. Problems of form are reported and the reading
+    continues. Raises SpecError if no automaton can be built.
     """
     document = expand_document(document, project, problems)
     require_kind(document, "automaton", problems)
@@ -65,7 +71,7 @@ def read_automaton(
 
 
 def _check_recording_map(tree: MappingNode, project: Project, problems: Problems) -> None:
-    """Report a map of recordings that is not there; it is read when a recording is."""
+    """Report a recording map whose file does not exist; its content is not read here."""
     node = tree.get("recording_map")
     if isinstance(node, ScalarNode):
         with problems.collect_errors():
@@ -75,7 +81,11 @@ def _check_recording_map(tree: MappingNode, project: Project, problems: Problems
 def _read_model(
     tree: MappingNode, project: Project, values: ParameterValues, problems: Problems
 ) -> tuple[MappingNode, Automaton | None]:
-    """Apply values; parameters that the model has go to the model, the rest stays."""
+    """Return the tree with its own values set, and the model, or None without a model.
+
+    Parameters of the tree that the model has replace those of the model and are removed from the
+    tree; values for them are passed to the model. A model with a model raises SpecError.
+    """
     node = tree.get("model")
     own = _parameter_table(tree)
     if not isinstance(node, ScalarNode):
@@ -99,11 +109,13 @@ def _read_model(
 
 
 def _parameter_table(tree: MappingNode) -> MappingNode:
+    """Return the section `parameters` of a tree; an empty mapping without one."""
     node = tree.get("parameters")
     return node if isinstance(node, MappingNode) else MappingNode({}, tree.span)
 
 
 def _with_entry(tree: MappingNode, key: str, node: YamlNode) -> MappingNode:
+    """Return a mapping with another node under a key; an existing key keeps its place."""
     span = tree.entries[key].span if key in tree.entries else tree.span
     return MappingNode({**tree.entries, key: Entry(key, span, node)}, tree.span)
 
@@ -115,6 +127,10 @@ def _set_values(
     known: MappingNode,
     problems: Problems,
 ) -> MappingNode:
+    """Return a tree with the values of its parameters replaced.
+
+    Unknown and derived parameters are reported; `known` gives the names for hints.
+    """
     for name, value in values.items():
         entry = parameters.entries.get(name)
         if entry is None or not isinstance(entry.node, MappingNode):
@@ -133,11 +149,12 @@ def _set_values(
 
 
 class _AutomatonReader(Reader):
-    """The sections of an automaton, one method each."""
+    """Reads the sections of an automaton."""
 
     def __init__(
         self, document: Document, tree: MappingNode, model: Automaton | None, problems: Problems
     ) -> None:
+        """Expand the transition tables of the tree and read the period."""
         super().__init__(problems)
         self.name, self.span = document.name, document.name_span
         self.model = model
@@ -148,6 +165,7 @@ class _AutomatonReader(Reader):
         self.is_sampled = self.period is not None
 
     def read(self) -> Automaton:
+        """Return the automaton; problems are reported."""
         tree, model = self.tree, self.model
         numbers = self._read_number_type()
         own = ParameterReader(self.problems, tree).read_parameters()
@@ -188,25 +206,26 @@ class _AutomatonReader(Reader):
         return automaton
 
     def _read_modes(self) -> ModeStructure:
-        """Return the modes: of a chart with their tree, else as they stand."""
+        """Return the regions of an automaton, and superstates and tree if it is a chart."""
         reader = ModeReader(self.problems, self.model, self.tree)
         if is_chart(self.tree):
             return ChartReader(reader).read(self.span)
         return ModeStructure(reader.read_regions(self.span))
 
     def _read_number_type(self) -> NumberType:
-        """A sampled automaton says what it computes in; a continuous one has float64 by default."""
+        """Return `numbers`, by default float64; a sampled automaton without it is reported."""
         node = self.tree.get("numbers")
         if node is None and self.is_sampled:
             self.read_scalar(node, "numbers", self.span)
         return cast(NumberType, self.read_choice(node, "numbers", NUMBER_TYPES, "float64"))
 
     def _read_recording_map(self) -> ScalarNode | None:
-        """The map by which recordings are read where no other is given."""
+        """Return the name of the default recording map, or None."""
         node = self.tree.get("recording_map")
         return self.read_scalar(node, "recording_map", self.span) if node else None
 
     def _check_sections(self) -> None:
+        """Report keys that only the other kind of automaton, sampled or continuous, has."""
         first = ("flow", "terms", "step", "method")
         for key in first if self.is_sampled else ("model", *FAULT_KEYS):
             node = self.tree.get(key)
@@ -216,6 +235,10 @@ class _AutomatonReader(Reader):
                 self.problems.error("form", self.tree.entries[key].span, label)
 
     def _read_time(self, what: str) -> Fraction | None:
+        """Return the time [s] under a key, or None if it is absent.
+
+        A value outside the bounds or in another dimension is reported and gives 1 ms.
+        """
         node = self.tree.get(what)
         if node is None:
             return None

@@ -1,4 +1,4 @@
-"""Page reader: calibrations that change while a system runs, by time."""
+"""Calibration page reader: values of tunable parameters that change during a simulation."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 def read_pages(
     node: YamlNode | None, system: System, problems: Problems
 ) -> tuple[ScheduledCalibration, ...]:
-    """Return the pages of `pages: {1.5 s: {est.k_hs: 6000 N*m/rad}}`, problems reported."""
+    """Return the pages at a node `{1.5 s: {est.k_hs: 6000 N*m/rad}}`; problems are reported."""
     return _PageReader(problems, system).read_pages(node)
 
 
 def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibration, ...]:
-    """Return the pages of command-line texts `1.5 s: k_hs = 6000 N*m/rad`. Raises SpecError."""
+    """Return the pages of command-line texts like `1.5 s: k_hs = 6000 N*m/rad`.
+
+    Texts of equal times form one page. Raises SpecError.
+    """
     problems = Problems()
     times: dict[str, MappingNode] = {}
     for text in texts:
@@ -43,9 +46,10 @@ def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibrat
 
 
 class _PageReader(StimulusReader):
-    """Each page is a table of tunable parameters at a time."""
+    """Reads pages; each page is a mapping of tunable parameters at a time."""
 
     def __init__(self, problems: Problems, system: System) -> None:
+        """Collect the tunable parameters and the tunable waits of all instances."""
         super().__init__(problems)
         self.system = system
         self.waits = {name: tunable_waits(i.automaton) for name, i in system.instances.items()}
@@ -59,6 +63,7 @@ class _PageReader(StimulusReader):
         }
 
     def read_pages(self, node: YamlNode | None) -> tuple[ScheduledCalibration, ...]:
+        """Return the pages in the order of the file; times that do not ascend are reported."""
         found: list[ScheduledCalibration] = []
         for entry in self.read_mapping(node, "pages"):
             error_count = len(self.problems.reported)
@@ -75,7 +80,11 @@ class _PageReader(StimulusReader):
         return tuple(found)
 
     def _read_values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
-        """A parameter of one instance, or of all that have it as a tunable one."""
+        """Return the value of an entry by instance and parameter.
+
+        Without an instance in its key the value applies to all instances that have the tunable
+        parameter. Waits and parameters that are not tunable are reported.
+        """
         owner, dot, name = entry.key.rpartition(".")
         held = [o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)]
         if held:
@@ -91,6 +100,7 @@ class _PageReader(StimulusReader):
         return {(o, name): self._read_tunable(entry, self.tunable[o][name]) for o in owners}
 
     def _read_tunable(self, entry: Entry, parameter: Parameter) -> Fraction:
+        """Return a value in SI; one outside the range of the parameter is reported."""
         value, _ = self.read_quantity(entry.node, entry.key, entry.span, parameter.unit)
         limits = parameter.range
         if limits and not limits[0] <= value <= limits[1]:
@@ -101,5 +111,5 @@ class _PageReader(StimulusReader):
 
 
 def _is_changeable(parameter: Parameter) -> bool:
-    """Tables, whole numbers, waits and words stay as they are while a system runs."""
+    """Tell whether a page may change a parameter: a tunable real without a lookup table."""
     return parameter.kind == "tunable" and parameter.type == "real" and parameter.table is None

@@ -1,4 +1,4 @@
-"""Connection reader: sensors, connections and outputs of a system, as expressions of signals."""
+"""Connection reader: the sensors, connections and outputs of a system."""
 
 from __future__ import annotations
 
@@ -33,7 +33,12 @@ SENSOR_KEYS = ("of", "filter", "delay", "noise", "quantise", "sample")
 
 
 class ConnectionReader(Reader):
-    """What is known on the wires of a system, and what reads it."""
+    """Reads the signals of a system and the expressions that read them.
+
+    Sensors have to be read before connections, and connections before outputs. `lines` are the
+    delayed signals that connections created, and `dimensions` those of outputs that are real
+    expressions.
+    """
 
     def __init__(
         self,
@@ -41,7 +46,7 @@ class ConnectionReader(Reader):
         inputs: Mapping[str, SystemInput],
         instances: Mapping[str, Instance],
     ) -> None:
-        """Read against the inputs and instances of the system."""
+        """Collect the types of the inputs of the system and of the outputs of its instances."""
         super().__init__(problems)
         self.inputs = inputs
         self.instances = instances
@@ -58,7 +63,7 @@ class ConnectionReader(Reader):
     # Sensors.
 
     def read_sensors(self, node: YamlNode | None) -> None:
-        """Read `sensors`; they are known to connections and outputs from then on."""
+        """Read `sensors` into `self.sensors`; connections and outputs can read them afterwards."""
         for entry in self.named_entries(node, "sensors"):
             if entry.key in self.inputs or entry.key in self.instances:
                 label = f"`{entry.key}` is an input or an instance of the system, too"
@@ -70,6 +75,7 @@ class ConnectionReader(Reader):
                 self.kinds[entry.key] = sensor.dimension
 
     def _read_sensor(self, entry: Entry) -> Sensor:
+        """Return one sensor; a wrong source and inconsistent stages are reported."""
         table = self.read_mapping(entry.node, f"sensors.{entry.key}", SENSOR_KEYS)
         source = self.read_scalar(table.get("of"), "of", entry.span)
         dimension = self.measurable.get(source.text, PURE_NUMBER) if source else PURE_NUMBER
@@ -107,6 +113,10 @@ class ConnectionReader(Reader):
         return sensor
 
     def _read_stage(self, table: MappingNode, stage: str, key: str, unit: Unit | None) -> Fraction:
+        """Return the value of a stage written `{key: value}`, 0 if the stage is absent.
+
+        It is a time [s] if `unit` is None, else a positive difference in SI.
+        """
         node = table.get(stage)
         if node is None:
             return Fraction(0)
@@ -119,6 +129,7 @@ class ConnectionReader(Reader):
         return self._read_positive(inner, f"{stage}.{key}", unit)
 
     def _read_sample(self, node: YamlNode | None, span: Span) -> tuple[Fraction | None, Fraction]:
+        """Return the period and the offset [s] of `sample`; the period is None without one."""
         if node is None:
             return None, Fraction(0)
         if isinstance(node, ScalarNode):
@@ -133,6 +144,10 @@ class ConnectionReader(Reader):
         return self._read_time(table.get("period"), "period"), later
 
     def _read_time(self, node: YamlNode | None, what: str) -> Fraction:
+        """Return a positive time [s], 0 for an absent node.
+
+        Another value is reported and gives 1 ms.
+        """
         if node is None:
             return Fraction(0)
         value, unit = self.read_quantity(node, what, node.span, None)
@@ -143,6 +158,7 @@ class ConnectionReader(Reader):
         return value
 
     def _read_positive(self, node: YamlNode | None, what: str, unit: Unit) -> Fraction:
+        """Return a positive difference in SI, 0 for an absent node; other values are reported."""
         if node is None:
             return Fraction(0)
         value = read_difference(self, node, what, node.span, unit)
@@ -153,7 +169,7 @@ class ConnectionReader(Reader):
     # Connections.
 
     def read_connections(self, node: YamlNode | None) -> dict[tuple[str, str], Connection]:
-        """Return what each input of an instance reads."""
+        """Return the connections by instance and input; one with a problem is left out."""
         found = {}
         for entry in self.read_mapping(node, "connections"):
             owner, _, name = entry.key.partition(".")
@@ -173,6 +189,7 @@ class ConnectionReader(Reader):
         return found
 
     def _read_connection(self, target: Instance, name: str, source: ScalarNode) -> Connection:
+        """Return the connection of an input: a constant, a signal or an expression."""
         wanted = target.automaton.inputs[name]
         to = (target.name, name)
         formula = self.read_expression(source, name, source.span)
@@ -194,6 +211,7 @@ class ConnectionReader(Reader):
         return Connection(to, Formula(tree, f"connections.{target.name}.{name}"), source.span)
 
     def _check_direct_connection(self, tree: Name, expected: ExprType) -> None:
+        """Report a signal that does not exist or whose type does not fit the input."""
         kind = self.kinds.get(tree.path)
         if kind is None:
             label = f"`{tree.path}` is not an input of the system or an output of an instance"
@@ -207,13 +225,18 @@ class ConnectionReader(Reader):
             self.problems.error("dimension", tree.span, label)
 
     def _connectable_names(self) -> list[str]:
+        """Return the names of all signals but the delayed ones, for hints."""
         return [name for name in self.kinds if name not in self.lines]
 
     def _scope(self) -> NameEnvironment:
+        """Return the name environment of expressions of the system."""
         return NameEnvironment(self.kinds, location="in this system")
 
     def _replace_delays(self, tree: SyntaxTree) -> SyntaxTree:
-        """Replace every `delay(signal, d)` by the name of a line."""
+        """Return an expression with each `delay(signal, d)` replaced by a name.
+
+        The delayed signals of these names are added to `lines`.
+        """
         if isinstance(tree, FunctionCall) and tree.function == "delay":
             return self._add_delay_line(tree)
         changed: dict[str, object] = {}
@@ -226,6 +249,10 @@ class ConnectionReader(Reader):
         return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[arg-type]
 
     def _add_delay_line(self, tree: FunctionCall) -> SyntaxTree:
+        """Add the delayed signal of a call of `delay` to `lines`, and return its name.
+
+        A delay of 0 gives the signal itself. Wrong arguments are reported and give an ErrorNode.
+        """
         match tree.arguments:
             case (Name(path, span), NumberLiteral(delay, unit, _)) if are_compatible(
                 unit.dimension, SECOND
@@ -249,7 +276,7 @@ class ConnectionReader(Reader):
     # Outputs.
 
     def read_outputs(self, node: YamlNode | None) -> dict[str, str | Formula]:
-        """Return the outputs of the system: a signal by name, or an expression."""
+        """Return the outputs of the system by name: the name of a signal, or an expression."""
         found: dict[str, str | Formula] = {}
         for entry in self.named_entries(node, "outputs"):
             source = self.read_scalar(entry.node, entry.key, entry.span)
@@ -275,6 +302,7 @@ class ConnectionReader(Reader):
         return found
 
     def _read_output(self, source: ScalarNode) -> str:
+        """Return the name of a signal; one that does not exist is reported."""
         known = [
             f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
         ]
@@ -284,6 +312,7 @@ class ConnectionReader(Reader):
         return source.text
 
     def _check_no_delay(self, tree: SyntaxTree) -> None:
+        """Report calls of `delay` in an output."""
         for part in walk(tree):
             if isinstance(part, FunctionCall) and part.function == "delay":
                 label = "an output of a system is not delayed"
@@ -291,7 +320,10 @@ class ConnectionReader(Reader):
 
 
 def output_kinds(instance: Instance) -> dict[str, ExprType]:
-    """Return what the outputs of an instance are; its mode, a number, is not among them."""
+    """Return the types of the outputs of an instance by `instance.output`.
+
+    The output `mode` has no type and is left out.
+    """
     automaton = instance.automaton
     return {
         f"{instance.name}.{name}": automaton.name_types[automaton.output_source(name)]
@@ -301,7 +333,10 @@ def output_kinds(instance: Instance) -> dict[str, ExprType]:
 
 
 def _is_connectable(source: ExprType, target: ExprType) -> bool:
-    """A connection joins equal kinds; a whole number may be read as a real number."""
+    """Tell whether an input of type `target` may read a signal of type `source`.
+
+    Types have to be equal, and reals compatible in dimension; a real may read an integer.
+    """
     if isinstance(target, Dimension):
         real = PURE_NUMBER if isinstance(source, IntType) else source
         return isinstance(real, Dimension) and are_compatible(real, target)
@@ -311,6 +346,7 @@ def _is_connectable(source: ExprType, target: ExprType) -> bool:
 
 
 def _describe_kind(kind: ExprType) -> str:
+    """Return a type as words for a message."""
     if kind == "truth":
         return "true or false"
     return f"in `{kind}`" if isinstance(kind, Dimension) else f"`{kind}`"

@@ -1,4 +1,4 @@
-"""Event name: the entry of a mode of an instance, from one mode or any."""
+"""Event names: the entry of a mode of an instance, from one mode or from any."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from language.text.document import ScalarNode
 
 @dataclass(frozen=True)
 class ModeEntryEvent:
-    """The entry of a mode of an instance, from any mode or from `source` alone."""
+    """The entry of the mode `target`; if `source` is not empty, only from that mode."""
 
     instance: str
     region: str
@@ -21,9 +21,10 @@ class ModeEntryEvent:
 
 
 def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEntryEvent | None:
-    """Return the event of `plant.no_contact`, `gap.upper`, `plant.drive -> plant.coast`.
+    """Return the event that a text like `plant.no_contact` or `plant.drive -> plant.coast` names.
 
-    None with the problem reported where there is no such mode or transition.
+    Returns None with a problem reported if a mode does not exist or no transition enters it. In a
+    chart the existence of a transition is not checked.
     """
     head, arrow, tail = (part.strip() for part in scalar.text.partition("->"))
     known = modes_by_name(system)
@@ -66,7 +67,11 @@ def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEn
 
 
 def modes_by_name(system: System) -> dict[str, tuple[str, str, str]]:
-    """Return instance, region and mode by name: `instance.mode`, `instance.region.mode`."""
+    """Return instance, region and mode by name: `instance.mode` or `instance.region.mode`.
+
+    Superstates are included. In the system of a single automaton, names without the instance are
+    included too.
+    """
     found = {}
     for name, instance in system.instances.items():
         for region in instance.automaton.all_regions:

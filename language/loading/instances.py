@@ -1,8 +1,10 @@
-"""Instance: another automaton as a parallel region of this one, read as `main.closed`.
+"""Instances of an automaton: expansion of other automata into parallel regions of the host.
 
-Its modes become the region `main`; its parameters, states, discrete variables and equations get
-names of ours, `main_closed`. What stands for one of its inputs is an expression of ours, as the
-equation `main_command`. Its period is ours, and it has neither a model nor regions itself.
+The modes of the instantiated automaton become a region with the name of the instance, such as
+`main`. Its parameters, states, discrete variables and equations get names of the host:
+`main_closed` for `closed`. Each of its inputs becomes an equation of the host, such as
+`main_command`. The host reads its outputs as `main.closed`. It has the period of the host, and
+neither a model nor regions.
 """
 
 from __future__ import annotations
@@ -28,18 +30,25 @@ FORBIDDEN_KEYS = (
     *("model", "regions", "instances", "tables", "faults", "fault_mode"),
     *("events", "order", "micro_steps"),
 )
-"""What only an automaton on its own has."""
+"""Keys that an automaton must not have if it is instantiated."""
 SECTIONS = ("parameters", "states", "discrete", "equations", "flow", "terms", "templates")
+"""Sections of the instantiated automaton that are merged into those of the host."""
 VARIABLE_SECTIONS = ("parameters", "states", "discrete", "equations", "flow", "terms")
-"""Sections whose keys are names of variables; so are those of stages and balances in modes."""
+"""Sections at the root whose keys are names of variables."""
 VARIABLE_MODE_SECTIONS = ("equations", "flow", "terms", "update", "entry", "exit", "reset")
+"""Sections of modes and transitions whose keys are names of variables."""
 REGION_SECTIONS = ("initial", "modes", "transition_table")
+"""Sections of the instantiated automaton that become keys of the region."""
 HOST_EXPRESSIONS = {**EFFECT_SITES, "instances": {"*": {"inputs": ALL_SCALARS}}}
+"""The places of expressions in the host, the inputs of its instances included."""
 
 
 @dataclass(frozen=True)
 class _InstanceDeclaration:
-    """One instance: what is asked of it, and the tree of what it is of."""
+    """An instance with its options and the tree of the instantiated automaton.
+
+    `names` gives the host name of each name in that tree.
+    """
 
     entry: Entry
     options: MappingNode
@@ -48,11 +57,12 @@ class _InstanceDeclaration:
 
     @property
     def name(self) -> str:
+        """The name of the instance."""
         return self.entry.key
 
     @property
     def host_names_of_outputs(self) -> dict[str, str]:
-        """What its outputs are to us: `main.closed` is `main_closed`."""
+        """The host variable of each output: `main_closed` for `main.closed`."""
         outputs = self.tree.get("outputs")
         found: dict[str, str] = {}
         for item in outputs.nodes if isinstance(outputs, SequenceNode) else ():
@@ -66,7 +76,10 @@ class _InstanceDeclaration:
 
 
 def expand_instances(tree: MappingNode, project: Project, problems: Problems) -> MappingNode:
-    """Return an automaton's tree with its instances as regions. Raises SpecError."""
+    """Return an automaton's tree with its instances replaced by regions. Raises SpecError.
+
+    A tree without instances is returned unchanged.
+    """
     node = tree.get("instances")
     if node is None:
         return tree
@@ -90,9 +103,10 @@ def expand_instances(tree: MappingNode, project: Project, problems: Problems) ->
 
 
 def _rename_output_reads(tree: MappingNode, reads: Mapping[str, str]) -> MappingNode:
-    """Return a tree in which outputs of instances are read by their names among ours."""
+    """Return a tree in which outputs of instances are read by the names of their host variables."""
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Return an expression with outputs of instances replaced."""
         text, found = substitute_reads(scalar.text, reads)
         return ScalarNode(text, scalar.span) if found else scalar
 
@@ -107,6 +121,7 @@ def _rename_output_reads(tree: MappingNode, reads: Mapping[str, str]) -> Mapping
 
 
 def _rename_scalar(node: YamlNode, new: Mapping[str, str]) -> YamlNode:
+    """Return a scalar with its text replaced if `new` has it; another node unchanged."""
     return (
         ScalarNode(new.get(node.text, node.text), node.span)
         if isinstance(node, ScalarNode)
@@ -115,15 +130,16 @@ def _rename_scalar(node: YamlNode, new: Mapping[str, str]) -> YamlNode:
 
 
 class _InstanceReader(Reader):
-    """Reads the instances of one automaton's tree."""
+    """Reads and merges the instances of one automaton's tree."""
 
     def __init__(self, problems: Problems, tree: MappingNode, project: Project) -> None:
+        """Report into `problems`; `tree` is the tree of the host."""
         super().__init__(problems)
         self.tree = tree
         self.project = project
 
     def read_instance(self, entry: Entry) -> _InstanceDeclaration | None:
-        """Return an instance with the tree of what it is of, None where that cannot be one."""
+        """Return an instance with the tree of its automaton, or None with a problem reported."""
         check_region_name(entry.key, entry.span, self.problems)
         asked = self.read_mapping(entry.node, f"instances.{entry.key}", ("of", "inputs", "values"))
         of = self.read_scalar(asked.get("of"), "of", entry.span)
@@ -138,6 +154,8 @@ class _InstanceReader(Reader):
         return _InstanceDeclaration(entry, asked, root, names)
 
     def _read_root(self, reference: ScalarNode) -> MappingNode | None:
+        """Return the expanded tree of an instantiated automaton, or None with a problem reported.
+        """
         with self.problems.collect_errors():
             document = read_document(self.project.path_of(reference.text, reference.span))
             document = expand_document(document, self.project, self.problems)
@@ -146,6 +164,10 @@ class _InstanceReader(Reader):
         return None
 
     def _check_document(self, document: Document, reference: ScalarNode) -> None:
+        """Report a document that cannot be instantiated in the host.
+
+        It must be an automaton without forbidden keys and with the period of the host.
+        """
         if document.kind != "automaton":
             label = f"`{document.name}` is a {document.kind}, not an automaton"
             self.problems.error("form", reference.span, label)
@@ -161,13 +183,18 @@ class _InstanceReader(Reader):
             self.problems.error("form", reference.span, label, hint)
 
     def _read_period(self, tree: MappingNode) -> object:
+        """Return the period [s] of a tree, or None if it is continuous."""
         node = tree.get("period")
         return self.read_quantity(node, "period", node.span, None)[0] if node else None
 
     def merge_instance(
         self, tree: MappingNode, instance: _InstanceDeclaration, options: MappingNode
     ) -> MappingNode:
-        """Return our tree with one instance in it; `options` has its inputs as we read them."""
+        """Return the host's tree with an instance merged into it.
+
+        `options` are the options of the instance in `tree`, whose input expressions already read
+        host variables.
+        """
         entry, names = instance.entry, instance.names
         for final in names.values():
             self._check_host_name(tree, final, entry)
@@ -196,6 +223,7 @@ class _InstanceReader(Reader):
         return put_node(tree, ("regions", entry.key), MappingNode(region, entry.span))
 
     def _check_host_name(self, tree: MappingNode, host_name: str, entry: Entry) -> None:
+        """Report a host name that is too long, taken or not valid."""
         taken = [*added_names(tree), *self.read_mapping(tree.get("inputs"), "inputs").entries]
         if not NAME_PATTERN.fullmatch(host_name):
             label = f"`{entry.key}` would have a name `{host_name}` of {len(host_name)} characters"
@@ -207,6 +235,10 @@ class _InstanceReader(Reader):
             check_name(host_name, entry.span, self.problems)
 
     def _apply_values(self, body: MappingNode, options: MappingNode) -> MappingNode:
+        """Return the tree `body` with the parameter values of the instance.
+
+        Unknown and derived parameters are reported.
+        """
         parameters = self.read_mapping(body.get("parameters"), "parameters").entries
         for value in self.read_mapping(options.get("values"), "values"):
             known = parameters.get(value.key)
@@ -224,7 +256,10 @@ class _InstanceReader(Reader):
     def _input_expressions(
         self, body: MappingNode, options: MappingNode, entry: Entry
     ) -> dict[str, ScalarNode]:
-        """Return what stands for each input: an expression of ours, or its default."""
+        """Return the expression of each input in `body`: that of the instance, or the default.
+
+        Unknown inputs and inputs without a value are reported.
+        """
         declared = self.read_mapping(body.get("inputs"), "inputs").entries
         given = self.read_mapping(options.get("inputs"), "inputs").entries
         for name, own in given.items():
@@ -245,7 +280,10 @@ class _InstanceReader(Reader):
 
 
 def _requirements_entry(entry: Entry, body: MappingNode) -> dict[str, Entry]:
-    """Return `req` of an instance: its own, and all of what it is of that becomes nothing else."""
+    """Return `req` of an instance as an entry; empty if there are no requirements.
+
+    These are the requirements of the instance and of the sections of `body` that are not merged.
+    """
     kept = {
         key: each for key, each in body.entries.items() if key not in (*SECTIONS, *REGION_SECTIONS)
     }
@@ -255,14 +293,16 @@ def _requirements_entry(entry: Entry, body: MappingNode) -> dict[str, Entry]:
 
 
 def _equation_names(mode: MappingNode) -> Iterator[str]:
+    """Yield the names of the equations of a mode."""
     table = mode.get("equations")
     yield from table.entries if isinstance(table, MappingNode) else ()
 
 
 def _rename_to_host(body: MappingNode, instance: _InstanceDeclaration) -> MappingNode:
-    """Return a tree whose names are ours, where they are read and where they are written."""
+    """Return the tree of an instantiated automaton with all its names replaced by host names."""
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Return an expression with host names."""
         text = rename_names(scalar.text, instance.names)
         return ScalarNode(text, scalar.span) if text != scalar.text else scalar
 
@@ -270,6 +310,7 @@ def _rename_to_host(body: MappingNode, instance: _InstanceDeclaration) -> Mappin
 
 
 def _rename_keys(table: MappingNode, instance: _InstanceDeclaration, path: KeyPath) -> MappingNode:
+    """Return a mapping whose keys, and names of templates, are host names, at any depth."""
     made = {}
     for entry in table:
         key, node = entry.key, entry.node

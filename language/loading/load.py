@@ -1,4 +1,4 @@
-"""Load: from a name or path to a checked Automaton, and from that to its Program."""
+"""Loading: from a name or path to a checked Automaton, and from there to its Program."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def automaton_of(
     values: Mapping[str, YamlNode] | None = None,
     problems: Problems | None = None,
 ) -> Automaton:
-    """Return the checked automaton of a document; warnings are left in `problems`.
+    """Return the checked automaton of a document with some parameter values replaced.
 
-    Raises SpecError with all problems.
+    Warnings are added to `problems`. Raises SpecError with all problems.
     """
     problems = problems or Problems()
     return check_automaton(read_automaton(document, project, values, problems), problems)
@@ -39,15 +39,15 @@ def load_automaton(
 
 
 def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
-    """Return the Program of a checked automaton; `varying` inputs change inside its steps.
+    """Return the optimised Program of a checked automaton.
 
-    Raises SpecError.
+    `varying` are the inputs that change inside a step of a continuous automaton. Raises SpecError.
     """
     return run_passes(lower_automaton(automaton, varying))
 
 
 def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Program:
-    """Return the Program of a checked automaton before it is optimised. Raises SpecError."""
+    """Return the Program of a checked automaton before the passes. Raises SpecError."""
     problems = Problems()
     check_numbers(automaton, problems)
     if automaton.is_sampled:
@@ -56,7 +56,7 @@ def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Prog
 
 
 def command_line_value(text: str, option: str = "--set", name: str = "") -> ScalarNode:
-    """Return a value given on the command line, as a scalar with a place in `name=value`."""
+    """Return a value of the command line as a scalar; problems point into `name=text`."""
     shown = f"{name}={text}" if name else text
     place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
     return ScalarNode(text, place)

@@ -1,4 +1,4 @@
-"""Pairing: which columns of a map an automaton reads or compares, and what does not fit."""
+"""Map pairing: the columns of a recording map that an automaton uses, and mismatches."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from language.text.diagnostic import Problems, suggest_name
 def pair_columns(
     automaton: Automaton, mapping: RecordingMap, problems: Problems
 ) -> tuple[list[str], list[str]]:
-    """Return the columns of a map that an automaton reads or compares, and those left out.
+    """Return the names of the columns that an automaton reads or compares, and of the others.
 
-    Reported are an input without a column, one that is fed twice, a wrong dimension, an unknown
-    output. Columns and constants for inputs that it lacks are for others that the map serves.
+    Columns and constants for inputs that the automaton lacks are no problem, because a map may
+    serve several automata. Reported are inputs without a value, inputs that are fed twice, wrong
+    dimensions and unknown outputs.
     """
     used, left_out = [], []
     fed = set(mapping.constants)
@@ -42,9 +43,10 @@ def pair_columns(
 
 
 def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
-    """Report what keeps recordings from being compared with an automaton.
+    """Report what prevents the comparison of recordings with an automaton.
 
-    Here every column is for it: one for an input that it lacks is most often a name misspelt.
+    In addition to the problems of `pair_columns`, these are columns for unknown inputs, outputs
+    that are compared twice, and a map that compares no output.
     """
     _, left_out = pair_columns(automaton, mapping, problems)
     for name in left_out:
@@ -70,6 +72,7 @@ def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problem
 
 
 def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problems) -> None:
+    """Report a column that is compared with an unknown output or one of another dimension."""
     output = column.compare or ""
     if output in automaton.outputs:
         want = automaton.dimensions.get(automaton.output_source(output), PURE_NUMBER)
@@ -82,12 +85,14 @@ def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problem
 def _check_dimension(
     column: ColumnMapping, expected: Dimension, what: str, problems: Problems
 ) -> None:
+    """Report a column of another dimension than `expected`; `what` names its target."""
     if not are_compatible(column_dimension(column), expected):
         label = f"column `{column.name}` is in `{column_dimension(column).display_name}`"
         problems.error("dimension", column.span, label, f"{what} is in `{expected.display_name}`")
 
 
 def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
+    """Report constants of another dimension than the input of the same name."""
     for name, (_, dimension) in mapping.constants.items():
         thing = automaton.inputs.get(name)
         if thing and not are_compatible(dimension, thing.unit.dimension):

@@ -1,4 +1,4 @@
-"""Map reader: how the columns of a recording become signals."""
+"""Recording map reader: the assignment of the columns of a recording to signals."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COLUMN_KEYS = (
 
 
 def read_map(document: Document, project: Project) -> RecordingMap:
-    """Read a map. Raises SpecError with all problems."""
+    """Return the recording map of a document. Raises SpecError with all problems."""
     document = expand_document(document, project)
     problems = Problems()
     require_kind(document, "map", problems)
@@ -47,14 +47,15 @@ def read_map(document: Document, project: Project) -> RecordingMap:
 
 
 def read_map_table(root: MappingNode, name: str, span: Span, problems: Problems) -> RecordingMap:
-    """Return the map that a mapping of a file holds; what is wrong is reported."""
+    """Return the recording map in a mapping; problems are reported."""
     return _MapReader(problems).read(root, name, span)
 
 
 class _MapReader(Reader):
-    """The sections of a map."""
+    """Reads the sections of a recording map."""
 
     def read(self, root: MappingNode, name: str, span: Span) -> RecordingMap:
+        """Return the recording map; without `time` the unit of time is s."""
         tree = self.read_mapping(root, f"map {name}", MAP_KEYS)
         time = self.read_mapping(tree.get("time"), "time", ("column", "unit"))
         has_time = "time" in tree.entries
@@ -84,11 +85,11 @@ class _MapReader(Reader):
         )
 
     def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
-        """One DBC file or a list of them."""
+        """Return the names of DBC files: a single one or a list."""
         return (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
 
     def _read_windows(self, node: YamlNode | None) -> dict[str, tuple[Window, ...]]:
-        """A list of windows for every file, or a mapping from file names to such lists."""
+        """Return the windows by file name; a bare list applies to all files."""
         if node is None:
             return {}
         if not isinstance(node, MappingNode):
@@ -96,6 +97,7 @@ class _MapReader(Reader):
         return {entry.key: self._read_window_list(entry.node) for entry in node}
 
     def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
+        """Return the windows of a list; windows must be ordered and must not overlap."""
         found: list[Window] = []
         if not isinstance(node, SequenceNode) or not node.nodes:
             label = "`windows` is a list like `[[1 s, 8 s]]`, or such a list for each file"
@@ -117,12 +119,14 @@ class _MapReader(Reader):
         return tuple(found)
 
     def _read_time(self, node: YamlNode) -> Fraction:
+        """Return a time [s]; another dimension is reported."""
         value, unit = self.read_quantity(node, "a window", node.span, None)
         if value and not are_compatible(unit.dimension, SECOND):
             self.problems.error("dimension", node.span, "a window is in time, like `[1 s, 8 s]`")
         return value
 
     def _read_column(self, entry: Entry) -> ColumnMapping:
+        """Return one column of the map; contradictory and missing keys are reported."""
         what = f"columns.{entry.key}"
         table = self.read_mapping(entry.node, what, COLUMN_KEYS)
         mean = table.get("mean")
@@ -166,6 +170,7 @@ class _MapReader(Reader):
         )
 
     def _read_scale(self, table: MappingNode) -> tuple[Fraction, Dimension]:
+        """Return the factor of `scale` in SI and its dimension; 1 without it."""
         node = table.get("scale")
         formula = self.read_expression(node, "scale", node.span) if node else None
         if formula:
@@ -175,5 +180,5 @@ class _MapReader(Reader):
 
 
 def column_dimension(column: ColumnMapping) -> Dimension:
-    """Return the dimension of what a column gives: its unit times its scale."""
+    """Return the dimension of the signal of a column: its unit times its scale."""
     return dimension_product(column.unit.dimension, column.scale[1])

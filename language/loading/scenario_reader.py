@@ -1,4 +1,4 @@
-"""Scenario reader: inputs over time, start values, horizon and what is recorded."""
+"""Scenario reader: inputs over time, initial values, horizon and recorded signals."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ SCENARIO_KEYS = tuple(
 )
 RECORDING_KEYS = ("file", "map", *(key for key in MAP_KEYS if key not in ("language", "map")))
 MAX_HORIZON = Fraction(86400)
-"""Longest horizon: a day; longer is a mistake of the unit."""
+"""Longest horizon [s]: one day; a longer one suggests a wrong unit."""
 LARGEST_SEED = 2**31 - 1
 
 
 def read_scenario(document: Document, project: Project, system: System) -> Scenario:
-    """Read a scenario for a system. Raises SpecError with all problems."""
+    """Return the scenario of a document for a system. Raises SpecError with all problems."""
     document = expand_document(document, project)
     problems = Problems()
     require_kind(document, "scenario", problems)
@@ -47,15 +47,17 @@ def read_scenario(document: Document, project: Project, system: System) -> Scena
 
 
 class _ScenarioReader(StimulusReader):
-    """The sections of a scenario, one method each."""
+    """Reads the sections of a scenario."""
 
     def __init__(self, problems: Problems, project: Project, system: System) -> None:
+        """Report into `problems`; the recording map is set while the scenario is read."""
         super().__init__(problems)
         self.project = project
         self.system = system
         self.mapping: RecordingMap | None = None
 
     def read(self, document: Document) -> Scenario:
+        """Return the scenario; problems are reported."""
         tree = self.read_mapping(document.root, f"scenario {document.name}", SCENARIO_KEYS)
         at = document.name_span
         recording = self._read_recording(document, tree)
@@ -77,6 +79,7 @@ class _ScenarioReader(StimulusReader):
         )
 
     def _read_horizon(self, tree: MappingNode, at: Span) -> Fraction | None:
+        """Return the horizon [s]; None for `horizon: recording`."""
         node = tree.get("horizon")
         if isinstance(node, ScalarNode) and node.text == "recording":
             if self.mapping is None and not self.problems.has_errors:
@@ -89,7 +92,10 @@ class _ScenarioReader(StimulusReader):
         return horizon
 
     def _read_recording(self, document: Document, tree: MappingNode) -> RecordingSource | None:
-        """A file with a map: by name, or written here."""
+        """Return the recording with its map, or None without a recording.
+
+        The map is named, or it is written in the scenario.
+        """
         node = tree.get("recording")
         if node is None:
             return None
@@ -117,6 +123,12 @@ class _ScenarioReader(StimulusReader):
     def _resolve_recording(
         self, file: ScalarNode | None, mapping: RecordingMap
     ) -> RecordingSource | None:
+        """Return the recording with the path of its file, or None without a file.
+
+        The file is searched beside the scenario, in the working directory and in the directory of
+        the environment variable for recordings. A file outside the project is reported. A file that
+        does not exist keeps its name.
+        """
         if file is None:
             return None
         folders = [
@@ -131,6 +143,7 @@ class _ScenarioReader(StimulusReader):
         return RecordingSource(found[0] if found else Path(file.text), mapping, file.span)
 
     def _read_signals(self, items: Sequence[ScalarNode]) -> tuple[str, ...]:
+        """Return the names of the signals to record; unknown and repeated names are reported."""
         known = self.system.signals
         found: dict[str, None] = {}
         for item in items:
@@ -144,11 +157,18 @@ class _ScenarioReader(StimulusReader):
         return tuple(found)
 
     def _qualified_name(self, name: str) -> str:
-        """In a scenario of an automaton the one instance need not be named."""
+        """Return a name prefixed by its instance.
+
+        In the system of a single automaton a name without a dot gets that instance.
+        """
         alone = self.system.sole_instance
         return f"{alone}.{name}" if alone and "." not in name else name
 
     def _read_initial_values(self, tree: MappingNode) -> dict[str, Fraction | str]:
+        """Return the initial values by `instance.state`: a value in SI or the name of a column.
+
+        Unknown states are reported and left out.
+        """
         found: dict[str, Fraction | str] = {}
         instances = self.system.instances
         known = [f"{i.name}.{s}" for i in instances.values() for s in i.automaton.states]
@@ -167,12 +187,14 @@ class _ScenarioReader(StimulusReader):
         return found
 
     def _read_initial_value(self, tree: SyntaxTree, unit: Unit) -> Fraction | str:
+        """Return a value in SI, or the name of the column for `column(name)`."""
         match tree:
             case FunctionCall("column", (Name(path, span),), _):
                 return self._check_column(path, span, unit.dimension, "the state")
         return self._read_constant(tree, unit)
 
     def _check_column(self, name: str, span: Span, expected: Dimension, what: str) -> str:
+        """Return the name of a column; an unknown one or a wrong dimension is reported."""
         columns = self.mapping.columns if self.mapping else {}
         if name not in columns:
             label = f"`{name}` is not a column of the scenario's recording"
@@ -185,6 +207,7 @@ class _ScenarioReader(StimulusReader):
         return name
 
     def _read_constant(self, tree: SyntaxTree, unit: Unit) -> Fraction:
+        """Return a constant in SI; a wrong dimension is reported, but 0 fits each unit."""
         value, dimension = evaluate_literal(tree)
         if not are_compatible(dimension, unit.dimension) and not getattr(
             tree, "is_bare_zero", False
@@ -200,6 +223,11 @@ class _ScenarioReader(StimulusReader):
         return {period for period in periods if period is not None}
 
     def _read_inputs(self, tree: MappingNode, at: Span) -> dict[str, Stimulus]:
+        """Return the stimulus of each input: from the recording, the scenario or its default.
+
+        Unknown inputs, inputs without a value, and inputs that the recording gives too are
+        reported.
+        """
         known = self.system.inputs
         found = self._recorded_stimuli()
         for entry in self.read_mapping(tree.get("inputs"), "inputs"):
@@ -223,7 +251,7 @@ class _ScenarioReader(StimulusReader):
         return found
 
     def _recorded_stimuli(self) -> dict[str, Stimulus]:
-        """The inputs that the recording gives: columns and constants of its map."""
+        """Return the stimuli of the inputs that columns or constants of the recording map give."""
         found: dict[str, Stimulus] = {}
         known = self.system.inputs
         if self.mapping is None:

@@ -1,4 +1,4 @@
-"""Signal kind: what each signal of a system is."""
+"""Signal types: the type of each signal of a system."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from language.typecheck.types import ExprType
 
 
 def signal_kinds(system: System) -> dict[str, ExprType]:
-    """Return what each signal of a system is: inputs, outputs of instances, sensors, outputs."""
+    """Return the types of the inputs, outputs of instances, sensors and outputs of a system.
+
+    Outputs without a known type, such as modes, are left out.
+    """
     found: dict[str, ExprType] = {
         name: declared_kind(thing) for name, thing in system.inputs.items()
     }

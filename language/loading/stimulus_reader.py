@@ -1,4 +1,4 @@
-"""Stimulus reader: an input over time - a value, steps, a ramp, a chirp, a table, a formula."""
+"""Stimulus reader: an input over time as a value, steps, ramp, chirp, table, pulses or formula."""
 
 from __future__ import annotations
 
@@ -34,13 +34,18 @@ from language.typecheck.infer import TypeChecker
 FORMS = ("steps", "ramp", "chirp", "table", "pulses")
 INPUT_KEYS = ("start", *FORMS, "hold")
 DISCONTINUOUS = (Conditional, Relation, Logic, Not, BoolLiteral)
+"""Nodes of expressions that make a formula of time discontinuous."""
 TIME = Unit("s", Fraction(1), SECOND)
 PER_SECOND = parse_unit("1/s")
 Breakpoint = tuple[Fraction, Fraction]
+"""A time [s] and the value (SI) at that time."""
 
 
 def linear_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
-    """Return the pieces of a function that is linear between points and held outside them."""
+    """Return the pieces of a piecewise linear function through points in ascending order of time.
+
+    It is constant before the first and after the last point.
+    """
     pieces = [] if points[0][0] <= 0 else [StimulusPiece(Fraction(0), points[0][1])]
     for (start, value), (end, later) in itertools.pairwise(points):
         pieces.append(StimulusPiece(start, value, (later - value) / (end - start)))
@@ -48,18 +53,24 @@ def linear_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
 
 
 def constant_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
-    """Return the pieces of a function that keeps each value until the next point."""
+    """Return the pieces of a piecewise constant function: each value holds until the next point.
+
+    Before the first point it has the first value.
+    """
     first = () if points[0][0] <= 0 else (StimulusPiece(Fraction(0), points[0][1]),)
     return (*first, *(StimulusPiece(*point) for point in points))
 
 
 class StimulusReader(Reader):
-    """The forms of an input in a scenario, one method each."""
+    """Reads the forms of an input in a scenario."""
 
     def read_stimulus(
         self, entry: Entry, declaration: SystemInput, periods: Collection[Fraction] = ()
     ) -> Stimulus:
-        """Return the stimulus of an input that automata of some periods [s] read."""
+        """Return the stimulus of an input.
+
+        `periods` [s] are those of the sampled automata that read it; `pulses` need exactly one.
+        """
         unit, truth = declaration.unit, declaration.is_bool
         if isinstance(entry.node, ScalarNode):
             return Stimulus((self._read_piece(entry.key, entry.node, declaration),), is_bool=truth)
@@ -89,6 +100,7 @@ class StimulusReader(Reader):
         return Stimulus((first, *self._read_steps(entry, table, declaration)), is_bool=truth)
 
     def _read_piece(self, name: str, node: ScalarNode, declaration: SystemInput) -> StimulusPiece:
+        """Return a value as a piece from time 0; for a real input also a formula of `time`."""
         formula = self.read_expression(node, "input", node.span)
         if formula and declaration.type == "real" and names(formula.tree):
             return StimulusPiece(
@@ -97,6 +109,7 @@ class StimulusReader(Reader):
         return StimulusPiece(Fraction(0), self._read_value(node, name, node.span, declaration))
 
     def _check_formula(self, formula: Formula, unit: Unit) -> Formula:
+        """Return a formula of `time`; a wrong dimension and discontinuities are reported."""
         check = TypeChecker(
             NameEnvironment({"time": SECOND}, location="in an input"), self.problems
         )
@@ -113,6 +126,7 @@ class StimulusReader(Reader):
     def _read_value(
         self, node: YamlNode | None, what: str, span: Span, declaration: SystemInput
     ) -> Fraction:
+        """Return a value of the type of an input as a number; a bool is 0 or 1."""
         if not declaration.is_bool:
             return self.read_typed_value(
                 node, what, span, declaration.unit, declaration.type, declaration.values
@@ -126,7 +140,10 @@ class StimulusReader(Reader):
     def read_time(
         self, node: YamlNode | None, what: str, span: Span, lower_bound: str = "above"
     ) -> Fraction:
-        """Return a time above zero, or of at least zero."""
+        """Return a time [s] above zero, or with `lower_bound="at least"` of at least zero.
+
+        Another value gives 1 s; it is reported unless there are errors already.
+        """
         value, unit = self.read_quantity(node, what, span, None)
         fine = value > 0 or (value == 0 and lower_bound == "at least")
         if not fine or (value and not are_compatible(unit.dimension, SECOND)):
@@ -140,6 +157,7 @@ class StimulusReader(Reader):
     def _read_steps(
         self, entry: Entry, table: MappingNode, declaration: SystemInput
     ) -> list[StimulusPiece]:
+        """Return one piece for each step; times that do not ascend are reported."""
         found: list[StimulusPiece] = []
         for step in self.read_mapping(table.get("steps"), f"inputs.{entry.key}.steps"):
             time = self.read_time(ScalarNode(step.key, step.span), "the time of a step", step.span)
@@ -156,7 +174,10 @@ class StimulusReader(Reader):
         declaration: SystemInput,
         periods: Collection[Fraction],
     ) -> list[StimulusPiece]:
-        """Return what is true for one period of its reader from each time on: for one tick."""
+        """Return the pieces of a bool input that is true for one tick of its readers at each time.
+
+        Adjacent pulses are merged, overlapping ones are reported.
+        """
         found = [StimulusPiece(Fraction(0), Fraction(0))]
         node = table.entries["pulses"]
         if not declaration.is_bool or len({*periods}) != 1:
@@ -182,6 +203,10 @@ class StimulusReader(Reader):
     def _read_table(
         self, entry: Entry, table: MappingNode, unit: Unit
     ) -> tuple[StimulusPiece, ...]:
+        """Return the pieces through the points of a table.
+
+        They are linear, or constant with `hold: previous`. Problems give the constant 0.
+        """
         hold = self.read_choice(table.get("hold"), "hold", ("linear", "previous"), "linear")
         points: list[Breakpoint] = []
         for point in self.read_mapping(table.get("table"), f"inputs.{entry.key}.table"):
@@ -201,6 +226,7 @@ class StimulusReader(Reader):
         return linear_pieces(points) if hold == "linear" else constant_pieces(points)
 
     def _read_time_span(self, table: MappingNode, what: str) -> tuple[Fraction, Fraction]:
+        """Return `from` and `to` [s]; an end that is not after the begin is reported."""
         begin = self.read_time(table.get("from"), "from", table.span, "at least")
         end = self.read_time(table.get("to"), "to", table.span)
         if end <= begin and not self.problems.has_errors:
@@ -210,6 +236,7 @@ class StimulusReader(Reader):
     def _read_ramp(
         self, table: MappingNode, first: StimulusPiece, unit: Unit
     ) -> tuple[StimulusPiece, ...]:
+        """Return the pieces of a ramp from the start value to `value`."""
         ramp = self.read_mapping(table.get("ramp"), "ramp", ("from", "to", "value"))
         begin, end = self._read_time_span(ramp, "ramp")
         value, _ = self.read_quantity(ramp.get("value"), "value", ramp.span, unit)
@@ -219,7 +246,11 @@ class StimulusReader(Reader):
     def _read_chirp(
         self, table: MappingNode, first: StimulusPiece, unit: Unit
     ) -> tuple[StimulusPiece, ...]:
-        """`start` + amplitude * sin(2 pi (f_0 s + (f_1 - f_0) s^2 / (2 T))), s from 0 to T."""
+        """Return the pieces of a linear chirp: start value, sweep, start value.
+
+        The sweep is start + amplitude * sin(2 pi (f0 s + (f1 - f0) s^2 / (2 T))) with s = t - from,
+        T = to - from and `frequency: [f0, f1]`.
+        """
         node = table.get("chirp")
         chirp = self.read_mapping(node, "chirp", ("from", "to", "amplitude", "frequency"))
         begin, end = self._read_time_span(chirp, "chirp")
@@ -245,12 +276,15 @@ class StimulusReader(Reader):
 
 
 def _number(value: Fraction, span: Span) -> NumberLiteral:
+    """Return a literal without a unit."""
     return NumberLiteral(value, NO_UNIT, span)
 
 
 def _product(left: SyntaxTree, right: SyntaxTree) -> SyntaxTree:
+    """Return the expression left * right."""
     return Arithmetic("*", left, right, left.span)
 
 
 def _sum(left: SyntaxTree, right: SyntaxTree) -> SyntaxTree:
+    """Return the expression left + right."""
     return Arithmetic("+", left, right, left.span)

@@ -1,4 +1,4 @@
-"""System reader: instances of automata, connected, in the order in which they run."""
+"""System reader: instances of automata, their connections, and the order in which they run."""
 
 from __future__ import annotations
 
@@ -27,15 +27,18 @@ SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type", "values")
 INSTANCE_KEYS = ("of", "values", "offset")
 
 Connections = Mapping[tuple[str, str], Connection]
+"""Connections by instance and input."""
 ExecutionOrder = tuple[str, ...]
+"""Names of instances and sensors in the order in which they run at one instant."""
 Overrides = Mapping[str, ScalarNode]
 """Parameter values from the command line, by `parameter` or `instance.parameter`."""
 
 
 def read_system(document: Document, project: Project, overrides: Overrides | None = None) -> System:
-    """Read a system with all its automata, checked. Raises SpecError with all problems.
+    """Return the system of a document with all its automata checked.
 
-    An automaton is read as a system of its own: see `around`.
+    An automaton gives a system of one instance (see `single_instance_system`). Raises SpecError
+    with all problems.
     """
     plain, document = document, expand_document(document, project)
     problems = Problems()
@@ -60,7 +63,7 @@ def with_number_type(system: System, numbers: NumberType) -> System:
 
 
 def single_instance_system(automaton: Automaton) -> System:
-    """Return the system of one instance, named as its automaton, with the same inputs."""
+    """Return a system of one instance that has the name and the inputs of an automaton."""
     name, at = automaton.name, automaton.span
     return System(
         name=name,
@@ -80,11 +83,12 @@ def single_instance_system(automaton: Automaton) -> System:
 
 
 class _SystemReader(Reader):
-    """The sections of a system, one method each."""
+    """Reads the sections of a system."""
 
     def __init__(
         self, problems: Problems, project: Project, overrides: dict[str, ScalarNode]
     ) -> None:
+        """Report into `problems`; `overrides` are the parameter values from the command line."""
         super().__init__(problems)
         self.project = project
         self.overrides = overrides
@@ -93,6 +97,7 @@ class _SystemReader(Reader):
         self.automaton_cache: dict[tuple[object, ...], Automaton] = {}
 
     def read(self, document: Document) -> System:
+        """Return the system. Raises SpecError."""
         tree = self.read_mapping(document.root, f"system {document.name}", SYSTEM_KEYS)
         inputs = {
             e.key: self._read_input(e) for e in self.named_entries(tree.get("inputs"), "inputs")
@@ -125,6 +130,7 @@ class _SystemReader(Reader):
         )
 
     def _read_input(self, entry: Entry) -> SystemInput:
+        """Return one input of the system."""
         table = self.read_mapping(entry.node, f"inputs.{entry.key}", SYSTEM_INPUT_KEYS)
         kind, values = self.read_type(table, entry.key)
         unit = self.read_unit(table.get("unit"))
@@ -132,6 +138,7 @@ class _SystemReader(Reader):
         return SystemInput(entry.key, unit, default, entry.span, kind, values)
 
     def _read_instance(self, entry: Entry) -> Instance:
+        """Return one instance; values of the command line take precedence. Raises SpecError."""
         key = f"instances.{entry.key}"
         table = self.read_mapping(entry.node, key, INSTANCE_KEYS)
         of = self.read_scalar(table.get("of"), "of", entry.span)
@@ -155,7 +162,10 @@ class _SystemReader(Reader):
         return Instance(entry.key, automaton, offset, key, entry.span)
 
     def _read_automaton(self, reference: ScalarNode, values: Mapping[str, YamlNode]) -> Automaton:
-        """Return a checked automaton; instances of one with equal values share it."""
+        """Return a checked automaton.
+
+        Instances with the same reference and the same values share one object.
+        """
         wanted = (reference.text, *((name, format_inline(value)) for name, value in values.items()))
         if wanted not in self.automaton_cache:
             path = self.project.path_of(reference.text, reference.span)
@@ -166,6 +176,10 @@ class _SystemReader(Reader):
         return self.automaton_cache[wanted]
 
     def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, ScalarNode]:
+        """Return the command-line values for an instance by parameter, and mark them as used.
+
+        A value with the name of the instance takes precedence over one without.
+        """
         found = {}
         for name, value in sorted(self.overrides.items(), key=lambda item: "." in item[0]):
             owner, _, parameter = name.rpartition(".")
@@ -175,6 +189,7 @@ class _SystemReader(Reader):
         return found
 
     def _report_unused_overrides(self, instances: Mapping[str, Instance]) -> None:
+        """Report command-line values whose parameter no instance has."""
         known = {
             name
             for instance in instances.values()
@@ -191,6 +206,7 @@ class _SystemReader(Reader):
         connections: Mapping[tuple[str, str], Connection],
         instances: Mapping[str, Instance],
     ) -> None:
+        """Report inputs of instances without a connection and without a default."""
         for instance in instances.values():
             for name, thing in instance.automaton.inputs.items():
                 if (instance.name, name) not in connections and thing.default is None:
@@ -201,7 +217,10 @@ class _SystemReader(Reader):
     def _execution_order(
         self, wires: ConnectionReader, connections: Connections, span: Span
     ) -> ExecutionOrder:
-        """Instances at one instant run in the order of direct feed-through (rule 19)."""
+        """Return instances and sensors in topological order of direct feed-through (rule 19a).
+
+        A cycle is reported; the instances are then in the order of the file.
+        """
         instances = wires.instances
         edges: dict[str, list[str]] = {name: [] for name in (*instances, *wires.sensors)}
         for sensor in wires.sensors.values():
@@ -227,7 +246,10 @@ class _SystemReader(Reader):
     def _check_continuous_read(
         self, wires: ConnectionReader, read: str, target: Instance, at: Connection
     ) -> None:
-        """Refuse what a continuous automaton would read inside its integration."""
+        """Report signals that a continuous automaton cannot read inside its integration.
+
+        These are sensors without `sample` and outputs of another continuous automaton.
+        """
         if target.automaton.is_sampled:
             return
         sensor = wires.sensors.get(read)
@@ -242,6 +264,7 @@ class _SystemReader(Reader):
             self._report_both_continuous(owner, target, at)
 
     def _report_both_continuous(self, owner: Instance, target: Instance, at: Connection) -> None:
+        """Report a connection between two continuous automata."""
         if not owner.automaton.is_sampled and not target.automaton.is_sampled:
             label = f"`{owner.name}` and `{target.name}` are both continuous"
             hint = "this version connects a continuous automaton to sampled ones only"

@@ -1,1 +1,1 @@
-"""Overlays on a document: variants, effects, calibrations, values at points."""
+"""Overlays on a document: variants, effects, calibrations and other values of parameters."""

@@ -1,4 +1,9 @@
-"""Laying: an effect laid at a place of an automaton's tree (docs/language.md)."""
+"""Application of an effect at a place of an automaton's tree (docs/language.md).
+
+An effect is a partial tree with holes such as `$x`. This module fills the holes with the values of
+the place, gives the names of the effect a suffix, redirects reads, moves summands, and merges the
+result into the tree.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +32,9 @@ from language.text.node_edit import entries, find_node, put_node, replace_source
 from language.text.overlay import apply_overlay
 
 HOLE_PATTERN = re.compile(r"\$([A-Za-z]\w*)")
+"""A hole in a key or expression of an effect; group 1 is its name."""
 VARIABLE_SECTIONS = ("parameters", "states", "discrete", "equations")
+"""Sections of an effect whose keys are names of variables that it adds."""
 ASSIGNING_SECTIONS = ("equations", "update", "entry", "exit", "reset", "flow", "terms")
 """Sections of a mode or transition whose keys are names of variables."""
 
@@ -35,10 +42,10 @@ ASSIGNING_SECTIONS = ("equations", "update", "entry", "exit", "reset", "flow", "
 def apply_effect(
     tree: MappingNode, application: EffectApplication, problems: Problems
 ) -> MappingNode:
-    """Return the tree with an effect laid over it. Raises SpecError.
+    """Return the tree with an effect applied at its place. Raises SpecError.
 
-    In this order: redirections (the effect's own lines are not among what they reach), what
-    builds on a `base`, what moves, what is added.
+    The order is: redirections, equations that use `base`, moved summands, additions. Redirections
+    therefore do not reach the formulas that the effect adds.
     """
     place = find_effect_place(tree, application.effect, application.place)
     if isinstance(place, PlaceMismatch):
@@ -51,12 +58,13 @@ def apply_effect(
 def _report_mismatch(
     application: EffectApplication, mismatch: PlaceMismatch, problems: Problems
 ) -> None:
+    """Report at the place of an application why the effect cannot be applied."""
     label = f"`{application.effect.name}` cannot be laid here: {mismatch.reason}"
     problems.error("effect", application.place_span, label, mismatch.help)
 
 
 class _EffectApplier:
-    """One effect at one place: its body with holes filled, then what it does to the tree."""
+    """The application of one effect at one place of a tree."""
 
     def __init__(
         self,
@@ -65,6 +73,10 @@ class _EffectApplier:
         tree: MappingNode,
         problems: Problems,
     ) -> None:
+        """Choose the names that the effect gets in the tree.
+
+        Raises SpecError for a wrong name or hole.
+        """
         self.application = application
         self.place = place
         self.tree = tree
@@ -79,6 +91,7 @@ class _EffectApplier:
         problems.raise_if_errors()
 
     def apply(self) -> MappingNode:
+        """Return the tree with the effect applied. Raises SpecError."""
         body = self._fill_holes(self.body)
         tree = self._apply_redirects(self.tree, body)
         tree = self._rewrite_equations(tree, body)
@@ -88,7 +101,10 @@ class _EffectApplier:
         return apply_overlay(tree, self._set_values(body), self.problems)
 
     def _select_additions(self, body: MappingNode) -> MappingNode:
-        """Return what is new: not the equations that the effect builds on."""
+        """Return the sections that the effect adds to the tree.
+
+        Rewritten equations of the tree are not among them.
+        """
         added = {key: entry for key, entry in body.entries.items() if key in ADDED_SECTIONS}
         body = MappingNode(added, body.span)
         table = body.get("equations")
@@ -101,6 +117,11 @@ class _EffectApplier:
     # Names.
 
     def _choose_private_names(self) -> dict[str, str]:
+        """Return the name in the tree of each name that the effect adds.
+
+        It is the name with the suffix of the application, or the name under `rename`. Names that
+        are taken or not valid are reported, also those of elements and regions.
+        """
         own = {name: f"{name}_{self.application.suffix}" for name in added_names(self.body)}
         for name, entry in self.application.rename.items():
             if name in own and isinstance(entry.node, ScalarNode):
@@ -123,6 +144,7 @@ class _EffectApplier:
         return own
 
     def _check_private_name(self, name: str, private_name: str, is_taken: bool, span: Span) -> None:
+        """Report a name of the effect that is too long, taken or not valid in the tree."""
         if not NAME_PATTERN.fullmatch(private_name):
             label = f"`{name}` of the effect would be called `{private_name}`: {len(private_name)} characters"
             self.problems.error("effect", span, label, "`as: ...` gives a shorter ending")
@@ -133,9 +155,11 @@ class _EffectApplier:
             check_name(private_name, span, self.problems)
 
     def _with_suffix(self, name: str) -> str:
+        """Return a name with the suffix of the application."""
         return f"{name}_{self.application.suffix}"
 
     def _check_holes(self) -> None:
+        """Report the first hole of the body for which the place has no value."""
         name = self.place.name
         for hole in _holes_in(self.body):
             if hole not in self.place.holes:
@@ -152,13 +176,14 @@ class _EffectApplier:
     # Filling.
 
     def _fill_holes(self, body: MappingNode) -> MappingNode:
-        """Return the body with its holes filled and its own names made private."""
+        """Return the body with its holes filled and its own names replaced by those in the tree."""
         new = {**self.private_names}
         new.update(
             {f"${hole}": self._first_value(value) for hole, value in self.place.holes.items()}
         )
 
         def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+            """Return an expression with the new names; exceptions of redirections stay."""
             if path[:2] == ("redirect", "except"):
                 return scalar
             text = rename_names(scalar.text, new)
@@ -171,9 +196,11 @@ class _EffectApplier:
         return self._fill_keys(map_formulas(body, EFFECT_SITES, change), ())
 
     def _first_value(self, value: Hole) -> str:
+        """Return the value of a hole; of a list its first item, or `0` if the list is empty."""
         return value if isinstance(value, str) else (value[0] if value else "0")
 
     def _fill_keys(self, table: MappingNode, path: KeyPath) -> MappingNode:
+        """Return a mapping with holes in keys and texts filled, and keys renamed."""
         made = {}
         for entry in table:
             node = entry.node
@@ -186,6 +213,10 @@ class _EffectApplier:
         return MappingNode(made, table.span)
 
     def _fill_key(self, key: str, path: KeyPath) -> tuple[str, ...]:
+        """Return the keys that replace a key: several if its hole is a list, else one.
+
+        `path` is the path of the mapping that contains the key.
+        """
         if "$" in key:
             found = HOLE_PATTERN.search(key)
             value = self.place.holes[found.group(1)] if found else ""
@@ -198,6 +229,7 @@ class _EffectApplier:
         return (self.private_names.get(key, key) if names or inside else key,)
 
     def _fill_text(self, text: str) -> str:
+        """Return a text with its holes filled."""
         return HOLE_PATTERN.sub(
             lambda match: self._first_value(self.place.holes[match.group(1)]), text
         )
@@ -205,6 +237,7 @@ class _EffectApplier:
     # What an effect does.
 
     def _apply_redirects(self, tree: MappingNode, body: MappingNode) -> MappingNode:
+        """Return the tree with all entries of `redirect` applied; `body` is the filled body."""
         node, raw = body.get("redirect"), self.body.get("redirect")
         if not isinstance(node, MappingNode) or not isinstance(raw, MappingNode):
             return tree
@@ -226,6 +259,11 @@ class _EffectApplier:
         excepted: KeyPath,
         pairs: MappingNode,
     ) -> MappingNode:
+        """Return the tree with one entry of `redirect` applied at its key paths.
+
+        A path without an expression, a source that is no name, and a redirection without any hit
+        are reported. If the path comes from a list of places, it may have no hit.
+        """
         for path in paths:
             if not has_formula_at(tree, path):
                 _report_mismatch(
@@ -252,7 +290,11 @@ class _EffectApplier:
         return tree
 
     def _rewrite_equations(self, tree: MappingNode, body: MappingNode) -> MappingNode:
-        """Rewrite equations of the tree that the effect builds on."""
+        """Return the tree with the equations rewritten that the effect names by a hole.
+
+        A key such as `$torque` names an equation of the tree, and `base` in its formula stands for
+        the old one. Unknown equations are reported.
+        """
         for entry in entries(self.body.get("equations")):
             if not entry.key.startswith("$"):
                 continue
@@ -269,6 +311,12 @@ class _EffectApplier:
     def _move_summands(
         self, tree: MappingNode, body: MappingNode
     ) -> tuple[MappingNode, MappingNode]:
+        """Return tree and body with the summands under `move` moved to balances of the body.
+
+        The summands of the place's balance that read a given name go to the balance of a state of
+        the effect. Problems are reported if the target is no such state, if the balance differs
+        between modes, or if no summand reads the name.
+        """
         source = self.place.balance_state
         for entry in entries(self.body.get("move")):
             target = entry.node.text if isinstance(entry.node, ScalarNode) else ""
@@ -290,6 +338,7 @@ class _EffectApplier:
         return tree, body
 
     def _set_values(self, body: MappingNode) -> MappingNode:
+        """Return the body with the parameter values of the application. Raises SpecError."""
         raw = self.body.get("parameters")
         own = raw.entries if isinstance(raw, MappingNode) else {}
         for name, entry in self.application.values.items():
@@ -308,7 +357,7 @@ class _EffectApplier:
 
 
 def _used_names(tree: MappingNode) -> Iterator[str]:
-    """Yield the names of variables, and those of regions, which can be read as them."""
+    """Yield the names of parameters, inputs, states, discrete variables, regions and equations."""
     for section in ("parameters", "inputs", "states", "discrete", "regions"):
         for entry in entries(tree.get(section)):
             yield entry.key
@@ -317,9 +366,11 @@ def _used_names(tree: MappingNode) -> Iterator[str]:
 
 
 def _holes_in(body: MappingNode) -> list[str]:
+    """Return the names of the holes in the body of an effect, each once."""
     found: dict[str, None] = {}
 
     def look(node: YamlNode | None) -> None:
+        """Collect the holes of a node."""
         match node:
             case ScalarNode():
                 found.update(dict.fromkeys(HOLE_PATTERN.findall(node.text)))

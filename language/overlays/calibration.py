@@ -1,4 +1,4 @@
-"""Calibration: parameter values with where they come from, apart from the structure they fit."""
+"""Calibration: parameter values with their origin, stored apart from the automaton."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
 
 @dataclass(frozen=True)
 class CalibratedValue:
-    """A value of a parameter, its standard deviation and its origin as texts (empty: not told).
+    """A value of a parameter with its standard deviation, origin and date as texts.
 
-    Of a table the value is `{points: ...}`.
+    A missing text is empty. The value of a lookup table is a mapping `{points: ...}`.
     """
 
     name: str
@@ -34,7 +34,7 @@ class CalibratedValue:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Values of the parameters of an automaton or system; `of` names it."""
+    """Values of the parameters of the automaton or system that `of` names."""
 
     name: str
     of: ScalarNode
@@ -43,7 +43,10 @@ class Calibration:
 
 
 def read_calibration(document: Document, problems: Problems) -> Calibration:
-    """Read a calibration; its names are looked up by who uses it. Raises SpecError."""
+    """Return the calibration of a document. Raises SpecError.
+
+    Whether its parameters exist is checked when the calibration is applied.
+    """
     require_kind(document, "calibration", problems)
     return _CalibrationReader(problems).read(document)
 
@@ -57,8 +60,9 @@ def apply_calibration(
 ) -> MappingNode:
     """Return the tree of an automaton with the values of a calibration.
 
-    `parameters` are its parameters by name, those of its model too, `instance_parameters` those of its instances: the
-    instance and the parameter. Unknown ones are problems.
+    `parameters` are the parameters of the automaton and of its model by name. `instance_parameters`
+    gives the instance and the parameter for names like `k1_t_close`. Unknown and derived parameters
+    are reported.
     """
     for name, value in calibration.values.items():
         if name in instance_parameters:
@@ -77,9 +81,9 @@ def apply_calibration(
 
 
 def set_instance_value(tree: MappingNode, place: tuple[str, str], value: YamlNode) -> MappingNode:
-    """Return the tree of a system or automaton in which an instance has another value.
+    """Return the tree of a system or automaton with another value for a parameter of an instance.
 
-    `place` is the instance and the parameter.
+    `place` is the instance and the parameter. Points of a lookup table are merged.
     """
     path = ("instances", place[0], "values", place[1])
     return put_node(tree, path, overlay_value(find_node(tree, path), value))
@@ -91,15 +95,16 @@ def report_unknown_parameter(
     candidates: Mapping[str, object],
     problems: Problems,
 ) -> None:
-    """Report a value of a parameter that is not there."""
+    """Report a value whose parameter does not exist; the hint is a similar name of `candidates`."""
     label = f"`{calibration.of.text}` has no parameter `{value.name}`"
     problems.error("name", value.span, label, suggest_name(value.name, candidates))
 
 
 class _CalibrationReader(Reader):
-    """The sections of a calibration."""
+    """Reads the sections of a calibration."""
 
     def read(self, document: Document) -> Calibration:
+        """Return the calibration of a document. Raises SpecError."""
         tree = self.read_mapping(document.root, f"calibration {document.name}", CALIBRATION_KEYS)
         of = self.read_scalar(tree.get("of"), "of", document.name_span)
         origin, date = self._read_origin_and_date(tree)
@@ -113,6 +118,10 @@ class _CalibrationReader(Reader):
         return Calibration(document.name, of, values, document.name_span)
 
     def _read_value(self, entry: Entry, origin: str, date: str) -> CalibratedValue | None:
+        """Return one value; by default it has the origin and date of the file.
+
+        Returns None if the value is missing (reported). A negative standard deviation is reported.
+        """
         what = f"parameters.{entry.key}"
         if isinstance(entry.node, ScalarNode):
             return CalibratedValue(entry.key, entry.node, "", origin, date, entry.span)
@@ -135,6 +144,7 @@ class _CalibrationReader(Reader):
     def _read_points(
         self, entry: Entry, table: MappingNode, origin: str, date: str
     ) -> CalibratedValue:
+        """Return the values of a lookup table; keys of single values beside them are reported."""
         for key in ("value", "std"):
             if key in table.entries:
                 label = f"a table has `points`, no `{key}`"
@@ -144,6 +154,7 @@ class _CalibrationReader(Reader):
         return CalibratedValue(entry.key, points, "", own or origin, own_date or date, entry.span)
 
     def _read_origin_and_date(self, table: MappingNode) -> tuple[str, str]:
+        """Return the texts of `from` and `date`, empty if absent; a wrong date is reported."""
         texts = []
         for key in ("from", "date"):
             node = table.get(key)

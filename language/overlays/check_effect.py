@@ -1,4 +1,4 @@
-"""Check of an effect on its own: what would be wrong with it at every place where it is laid."""
+"""Checks of an effect on its own: errors that do not depend on the place of application."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ HOLE_PATTERN = re.compile(r"\$[A-Za-z]\w*")
 KEY_HOLE_SECTIONS = ("terms", "equations", "redirect", "move")
 """Sections whose keys may be holes."""
 UNIT_SECTIONS = ("parameters", "states", "discrete")
-"""Sections of what has a unit, which may be a hole."""
+"""Sections of declarations whose unit may be a hole."""
 QUANTITY_KEYS = ("value", "range", "neutral", "plain", "starts")
-"""Keys of a parameter that are numbers in its unit."""
+"""Keys of a parameter whose values are quantities in its unit."""
 
 
 def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -> None:
-    """Report keys and units with a hole that no place of the effect has."""
+    """Report holes in keys and units that no place of the effect has."""
     texts = [
         (entry.key, entry.span)
         for section in KEY_HOLE_SECTIONS
@@ -43,14 +43,14 @@ def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -
 
 
 def report_unknown_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
-    """Report a hole that no place of the effect has."""
+    """Report a hole that no place of the effect has; the hint is a similar hole or `has`."""
     label = f"`{hole}` is not a hole of the places where this effect fits"
     hint = suggest_name(hole, holes) or f"or `has: [{hole[1:]}]` says that it is"
     problems.error("effect", span, label, hint)
 
 
 def check_functions(tree: SyntaxTree, problems: Problems) -> None:
-    """Report functions that are none, or that take another number of arguments."""
+    """Report unknown functions and wrong numbers of arguments in an expression, at any depth."""
     if isinstance(tree, FunctionCall):
         if tree.function not in FUNCTION_NAMES:
             hint = (
@@ -66,7 +66,7 @@ def check_functions(tree: SyntaxTree, problems: Problems) -> None:
 
 
 def check_parameters(tree: MappingNode, problems: Problems) -> None:
-    """Report values, ranges and starts of parameters that are none or do not go together."""
+    """Report wrong or inconsistent values, ranges and starts of the parameters of an effect."""
     known = tree.get("parameters")
     if isinstance(known, MappingNode):
         made = {entry.key: _remove_hole_unit(entry) for entry in known}
@@ -77,10 +77,10 @@ def check_parameters(tree: MappingNode, problems: Problems) -> None:
 
 
 def _remove_hole_unit(entry: Entry) -> Entry | None:
-    """Return a parameter whose unit, where it is a hole, is a number.
+    """Return a parameter without its unit if the unit contains a hole.
 
-    None for one whose units are known where the effect is laid alone: it mixes a hole with units
-    of its own, or has a table with holes.
+    Returns None if the parameter cannot be checked before the place is known: it has a lookup table
+    with holes, or quantities with units beside a unit that is a hole.
     """
     table = entry.node
     if not isinstance(table, MappingNode) or not HOLE_PATTERN.search(format_inline(table)):
@@ -96,6 +96,7 @@ def _remove_hole_unit(entry: Entry) -> Entry | None:
 
 
 def _has_unit(node: YamlNode | None) -> bool:
+    """Tell whether one of the literals at a node has a unit."""
     reader = Reader(Problems())
     own = [reader.read_quantity(item, "value", item.span, None)[1] for item in scalars_of(node)]
     return any(unit not in (NO_UNIT, UNKNOWN_UNIT) for unit in own)

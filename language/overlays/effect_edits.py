@@ -1,4 +1,4 @@
-"""Redirect: within parts of an automaton's tree, what is read under one name becomes another."""
+"""Edits that an effect makes in a tree: redirected reads, rewritten equations, moved summands."""
 
 from __future__ import annotations
 
@@ -23,11 +23,16 @@ from language.text.node_edit import entries, find_node, put_node
 MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
 
 PathPredicate = Callable[[KeyPath], bool]
+"""Tells whether an edit applies to the expression at a key path."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Redirection:
-    """A part of a tree in which reads are redirected: `new` by old name; asked for at `span`."""
+    """A replacement of names in the expressions at `paths`, except at `exceptions`.
+
+    `replacements` gives the new name for each old one. `span` is the place of the redirection in
+    the effect.
+    """
 
     paths: tuple[str, ...]
     exceptions: tuple[str, ...]
@@ -38,14 +43,16 @@ class Redirection:
 def redirect_reads(
     tree: MappingNode, redirection: Redirection
 ) -> tuple[MappingNode, frozenset[str]]:
-    """Return a tree with the reads in a part redirected, and the names that were found there.
+    """Return a tree with the reads at some paths redirected, and the old names that were found.
 
-    In an equation the redirection reaches those that it alone reads, too: they are parts of it.
+    A path `everywhere` stands for all expressions and outputs. A redirection in an equation also
+    applies to the equations that only this equation reads, directly or indirectly.
     """
     redirected_names: set[str] = set()
     applies_to = _path_predicate(tree, redirection)
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Return the scalar with its reads redirected if the redirection applies to its path."""
         if not applies_to(path):
             return scalar
         text, hits = substitute_reads(scalar.text, redirection.replacements)
@@ -66,14 +73,18 @@ def redirect_reads(
 
 
 def rewrite_scalar(scalar: ScalarNode, text: str, span: Span) -> ScalarNode:
-    """Return a scalar with another text, made so by the overlay at `span`."""
+    """Return a scalar with another text; the span of the overlay is added to its changes."""
     return dataclasses.replace(scalar, text=text, changes=(*scalar.changes, span))
 
 
 def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> MappingNode:
-    """Return a tree whose equation of a name is a formula; `base` in it is what it was."""
+    """Return a tree with the formula of an equation replaced in every mode.
+
+    The name `base` in the new formula stands for the old one.
+    """
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Return the new formula if the path is that of the equation."""
         if not _matches_key(path, f"equations.{name}"):
             return scalar
         text, _ = substitute_reads(formula.text, {"base": scalar.text})
@@ -83,12 +94,16 @@ def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> Mappi
 
 
 def has_formula_at(tree: MappingNode, key: str) -> bool:
-    """Tell whether an expression stands under a key path such as `flow.w_w`."""
+    """Tell whether there is an expression at or below a key path such as `flow.w_w`, in any mode.
+
+    It is always true for `everywhere` and `outputs`.
+    """
     if key in ("everywhere", "outputs"):
         return True
     matches = []
 
     def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Record whether the path matches; return the scalar unchanged."""
         matches.append(_matches_key(path, key))
         return scalar
 
@@ -97,6 +112,7 @@ def has_formula_at(tree: MappingNode, key: str) -> bool:
 
 
 def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicate:
+    """Return the predicate of the paths to which a redirection applies."""
     if "everywhere" in redirection.paths:
         return lambda path: not any(_matches_key(path, key) for key in redirection.exceptions)
     keys = [name for path in redirection.paths for name in _equation_keys(tree, path)]
@@ -104,7 +120,7 @@ def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicat
 
 
 def _matches_key(path: KeyPath, key: str) -> bool:
-    """Tell whether a path is a key path or below it; `flow.w` is that of the modes, too."""
+    """Tell whether a path is a key path or below it; `flow.w` also matches in each mode."""
     wanted = tuple(key.split("."))
     if path[: len(wanted)] == wanted:
         return True
@@ -112,7 +128,10 @@ def _matches_key(path: KeyPath, key: str) -> bool:
 
 
 def _equation_keys(tree: MappingNode, key: str) -> list[str]:
-    """Return an equation's key path with those of the equations that only it reads."""
+    """Return the key path of an equation and of the equations that only it reads.
+
+    Equations that only those read are included in turn. Another key path is returned alone.
+    """
     section, _, name = key.partition(".")
     if section != "equations":
         return [key]
@@ -120,6 +139,7 @@ def _equation_keys(tree: MappingNode, key: str) -> list[str]:
     equations = {equation for equation, _ in formula_entries(tree, "equations")}
 
     def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Record the readers of each name; return the scalar unchanged."""
         reader = path[-1] if path[-2:-1] == ("equations",) else ".".join(path)
         if path[0] not in ("elements", "places"):
             for read in names_in_text(scalar.text):
@@ -138,6 +158,7 @@ def _equation_keys(tree: MappingNode, key: str) -> list[str]:
 def _redirect_outputs(
     outputs: MappingNode, redirection: Redirection
 ) -> tuple[MappingNode, set[str]]:
+    """Return the outputs with their variables replaced, and the old names that were found."""
     entries, hits = {}, set()
     for entry in outputs:
         node = entry.node
@@ -150,7 +171,11 @@ def _redirect_outputs(
 
 @dataclass(frozen=True)
 class MovedSummands:
-    """A tree without the summands that left, and these with their signs; terms by name."""
+    """Summands that were removed from a balance, and the tree without them.
+
+    `summands` are pairs of sign and text, `terms` are named terms, and `source` is the place of the
+    balance.
+    """
 
     tree: MappingNode
     summands: list[tuple[str, str]]
@@ -161,9 +186,10 @@ class MovedSummands:
 def remove_summands(
     tree: MappingNode, state: str, names: set[str], span: Span
 ) -> MovedSummands | None:
-    """Take the top-level summands that name some variables out of the balance of a state.
+    """Remove the top-level summands that read one of `names` from the balance of a state.
 
-    Its terms count as summands. None where the balance is not the same in every mode.
+    Terms of the balance count as summands. Returns None if the root has no balance of the state,
+    because then it is not the same in every mode.
     """
     balance = find_node(tree, ("flow", state))
     if not isinstance(balance, ScalarNode):
@@ -189,7 +215,7 @@ def remove_summands(
 
 
 def insert_summands(body: MappingNode, state: str, moved: MovedSummands) -> MappingNode:
-    """Return an effect's body with the summands that moved in the balance of its state."""
+    """Return the body of an effect with moved summands and terms in the balance of a state."""
     balance = find_node(body, ("flow", state))
     if isinstance(balance, ScalarNode) and moved.summands:
         left, right = split_balance(balance.text)

@@ -1,4 +1,4 @@
-"""Place: where in an automaton's tree an effect is laid, and what its holes are there."""
+"""Effect place: the place of an automaton's tree at which an effect is applied, and its holes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from language.text.document import MappingNode, ScalarNode
 from language.text.node_edit import scalars_of
 
 Hole = str | tuple[str, ...]
+"""The text that fills a hole, or several texts."""
 
 
 @dataclass(frozen=True)
 class EffectPlace:
-    """A place that an effect fits: `balanced` is the state whose balance it belongs to."""
+    """A place that an effect fits, with the values of its holes.
+
+    `balance_state` is the state of the balance that the place belongs to, or None.
+    """
 
     name: str
     holes: Mapping[str, Hole]
@@ -28,14 +32,17 @@ class EffectPlace:
 
 @dataclass(frozen=True)
 class PlaceMismatch:
-    """Why an effect cannot be laid at a place, and what would help."""
+    """The reason why an effect does not fit a place, and a hint."""
 
     reason: str
     help: str = ""
 
 
 def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPlace | PlaceMismatch:
-    """Return the place of that name where the effect fits, or why there is none."""
+    """Return the place of a name that an effect fits, or the reasons why there is none.
+
+    The patterns of the effect are tried in their order, and the first match counts.
+    """
     known = TreeTypes(tree)
     misfits = []
     for fit in effect.place_patterns:
@@ -51,6 +58,7 @@ def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPla
 
 
 def _missing_hole(pattern: PlacePattern, name: str, key: str) -> PlaceMismatch:
+    """Return the mismatch of a place that lacks a hole that the pattern requires."""
     if pattern.kind == "element":
         return PlaceMismatch(
             f"element `{name}` has no `{key}`", f"`elements.{name}.{key}` would do"
@@ -62,6 +70,11 @@ def _missing_hole(pattern: PlacePattern, name: str, key: str) -> PlaceMismatch:
 def _find_balance(
     tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
 ) -> EffectPlace | PlaceMismatch:
+    """Return the balance of the state `name` as a place, or a mismatch.
+
+    The holes are the state, its unit, the unit of the balance (`force`), and units that follow from
+    both. `inertia` is the coefficient of the derivative if it is the same in all modes.
+    """
     balances = list(formula_entries(tree, "flow"))
     found = [scalar for state, scalar in balances if state == name]
     if not found:
@@ -94,6 +107,7 @@ def _find_balance(
 def _find_input(
     tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
 ) -> EffectPlace | PlaceMismatch:
+    """Return the input `name` as a place with the hole `u`, or a mismatch."""
     table = tree.get("inputs")
     names = table.entries if isinstance(table, MappingNode) else {}
     if name not in names:
@@ -104,6 +118,10 @@ def _find_input(
 def _find_output(
     tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
 ) -> EffectPlace | PlaceMismatch:
+    """Return the output `name` as a place with the hole `y`, the variable that it reads.
+
+    Returns a mismatch if there is no such output.
+    """
     node = tree.get("outputs")
     outputs = outputs_as_mapping(node) if node else MappingNode({}, tree.span)
     source = outputs.get(name)
@@ -115,6 +133,11 @@ def _find_output(
 def _signal_place(
     tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str, hole: str, read_name: str
 ) -> EffectPlace | PlaceMismatch:
+    """Return an input or output as a place with its unit and the unit of its rate.
+
+    `read_name` is the variable that fills `hole`. Returns a mismatch if it is no quantity or has
+    the wrong unit.
+    """
     kind = known.type_of_name(read_name)
     if not isinstance(kind, Dimension):
         return PlaceMismatch(f"`{name}` is no quantity")
@@ -130,6 +153,7 @@ def _signal_place(
 def _find_element(
     tree: MappingNode, known: TreeTypes, pattern: PlacePattern, name: str
 ) -> EffectPlace | PlaceMismatch:
+    """Return the element `name` as a place whose holes are its keys, or a mismatch."""
     table = tree.get("elements")
     elements = table.entries if isinstance(table, MappingNode) else {}
     element = elements[name].node if name in elements else None
@@ -160,7 +184,11 @@ def _find_element(
 
 
 def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
-    """Return the units that follow from the parts of an element."""
+    """Return the units of the parts of an element, and of angle, force, stiffness and damping.
+
+    Angle and force follow from twist and torque, for an inertia from speed and inertia: angle =
+    speed * s, force = inertia * speed / s. Without them the units that depend on them are left out.
+    """
     units = dict(kinds)
     angle, force = kinds.get("twist"), kinds.get("torque")
     if of == "inertia" and {"speed", "inertia"} <= set(kinds):
@@ -183,7 +211,11 @@ def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
 
 
 def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
-    """Return the stretch of the spring alone, and the rate of the gap beside it (0 without)."""
+    """Return the deflection of the spring without the gap, and the rate of the gap.
+
+    Without a gap they are the twist and `0`. The rate is left out unless one balance `der(gap) =
+    rate` gives it.
+    """
     twist, gap = holes.get("twist"), holes.get("gap")
     if twist is None or gap is None:
         return {"stretch": twist, "gap_rate": "0"} if twist else {}
@@ -197,7 +229,7 @@ def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
 
 
 def _declared_holes(tree: MappingNode, name: str) -> dict[str, Hole]:
-    """Return the keys that `places` declares for a balance, input or output."""
+    """Return the keys that `places` declares for a balance, input or output, with their texts."""
     places = tree.get("places")
     table = places.get(name) if isinstance(places, MappingNode) else None
     entries = table if isinstance(table, MappingNode) else ()
@@ -205,18 +237,20 @@ def _declared_holes(tree: MappingNode, name: str) -> dict[str, Hole]:
 
 
 def _balance_coefficient(balance: str, state: str) -> str:
+    """Return the coefficient of the derivative in a balance as text; `1` without one."""
     left, _ = split_balance(balance)
     factor = left.replace(f"der({state})", "").strip().strip("*").strip()
     return factor or "1"
 
 
 def _multiply_dimensions(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
-    """Return a product (or quotient) whose power of the angle is counted."""
+    """Return a * b**sign with the power of the angle, which other products leave undefined."""
     powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
     return Dimension(powers, (a.angle or 0) + sign * (b.angle or 0))
 
 
 def _text_or_none(hole: Hole | None) -> str | None:
+    """Return a hole with a single text, or None."""
     return hole if isinstance(hole, str) else None
 
 
@@ -226,4 +260,4 @@ PLACE_FINDERS = {
     "output": _find_output,
     "element": _find_element,
 }
-"""How a place of each kind is found."""
+"""The function that finds a place, by kind of pattern."""

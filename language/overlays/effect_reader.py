@@ -1,4 +1,4 @@
-"""Effect: a named piece of physics with holes, read from its file."""
+"""Effect reader: a named piece of physics with holes, and its application in a variant."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from language.text.document import Document, Entry, MappingNode, ScalarNode, Yam
 from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
 
 EffectLookup = Callable[[str, Span], Document]
-"""From an effect's name (asked for at a place) to its document."""
+"""Returns the document of the effect of a name; the span is where the name is written."""
 
 DESCRIPTION_KEYS = ("signature", "confused_with", "separated_by", "references")
+"""Keys of an effect with texts for reports."""
 ADDED_SECTIONS = (
     "parameters",
     "states",
@@ -34,6 +35,7 @@ ADDED_SECTIONS = (
     "elements",
     "regions",
 )
+"""Sections of an effect that add entries to the tree."""
 EFFECT_KEYS = (
     "language",
     "effect",
@@ -50,10 +52,12 @@ PLACE_PATTERN_KEYS = {
     "output": ("unit", "has"),
     "element": ("kind", "unit", "has"),
 }
+"""Keys of `at` by kind of place."""
 ELEMENT_PARTS = (
     *("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
     *("speed", "inertia"),
 )
+"""Keys of an element that become holes."""
 HOLES_BY_PLACE_KIND = {
     "balance": ("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
     "input": ("u", "unit", "unit_rate"),
@@ -63,12 +67,15 @@ HOLES_BY_PLACE_KIND = {
         *(f"{part}_unit" for part in ELEMENT_PARTS),
     ),
 }
-"""Holes of each kind of place; those that a place declares in `places` are named in `has`."""
+"""Holes of each kind of place; further ones, declared in `places`, are named in `has`."""
 
 
 @dataclass(frozen=True)
 class PlacePattern:
-    """One kind of place where an effect fits."""
+    """A kind of place that an effect fits, with the unit and the holes that the place needs.
+
+    `of` is `rate` for a balance of a speed, the kind of an element, or empty.
+    """
 
     kind: str
     of: str
@@ -79,7 +86,7 @@ class PlacePattern:
 
 @dataclass(frozen=True)
 class Effect:
-    """A parametrised overlay: where it fits, what it does, and texts for a report."""
+    """A parametrised overlay: the places that it fits, its body, and texts for reports."""
 
     name: str
     about: str
@@ -94,7 +101,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class EffectApplication:
-    """An effect with the place where it is asked for: one entry of `effects`."""
+    """An entry of `effects`: an effect with a place, a suffix, new names and values."""
 
     effect: Effect
     place: str
@@ -105,17 +112,20 @@ class EffectApplication:
 
     @property
     def place_span(self) -> Span:
-        """Where the place is written, behind the `@`."""
+        """The span of the place in the key, after the `@`."""
         return self.span.subspan(len(self.effect.name) + 1, len(self.place))
 
     @property
     def layer_name(self) -> str:
-        """The name of the layer."""
+        """The name of the overlay in messages, like `effect coulomb_friction@w_em`."""
         return f"effect {self.effect.name}@{self.place}"
 
 
 def read_effect(document: Document, problems: Problems) -> Effect:
-    """Read an effect; what is wrong with it on its own is reported. Raises SpecError."""
+    """Return the effect of a document; errors of the effect itself are reported.
+
+    Raises SpecError for a document of another kind.
+    """
     require_kind(document, "effect", problems)
     return _EffectReader(problems).read(document)
 
@@ -123,7 +133,10 @@ def read_effect(document: Document, problems: Problems) -> Effect:
 def read_effect_application(
     entry: Entry, lookup: EffectLookup, problems: Problems
 ) -> EffectApplication:
-    """Read one entry of `effects`: `name@place: {values: ..., as: ..., rename: ...}`."""
+    """Return the application of an entry `name@place: {values: ..., as: ..., rename: ...}`.
+
+    The suffix is `as`, by default the place. Raises SpecError.
+    """
     reader = Reader(problems)
     name, sign, place = entry.key.partition("@")
     if not (name and sign and place):
@@ -142,7 +155,11 @@ def read_effect_application(
 
 
 def added_names(body: MappingNode) -> dict[str, Span]:
-    """Return the names that an effect adds and expressions may read."""
+    """Return the names that an effect or automaton adds and that expressions may read.
+
+    These are parameters, states, discrete variables and equations, those of regions included; keys
+    with a hole are left out. The result gives the place of each name.
+    """
     spans: dict[str, Span] = {}
     for section in ("parameters", "states", "discrete", "equations"):
         for entry in _entries(body.get(section)):
@@ -154,10 +171,14 @@ def added_names(body: MappingNode) -> dict[str, Span]:
 
 
 def external_names(body: MappingNode) -> list[str]:
-    """Return the names that expressions of an effect read, neither holes nor its own."""
+    """Return the names that expressions of an effect read and that are neither holes nor its own.
+
+    They are in the order of their first use; `base` is left out.
+    """
     own, found = added_names(body), dict[str, None]()
 
     def look(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+        """Collect the external names of an expression."""
         for name in (
             name for part in _parse_formula(path, scalar, Problems()) for name in names(part)
         ):
@@ -170,6 +191,7 @@ def external_names(body: MappingNode) -> list[str]:
 
 
 def _region_equations(node: YamlNode | None) -> Iterator[Entry]:
+    """Yield the equations of regions and modes, at any depth."""
     for owner in _entries(node):
         if isinstance(owner.node, MappingNode):
             yield from _entries(owner.node.get("equations"))
@@ -177,11 +199,13 @@ def _region_equations(node: YamlNode | None) -> Iterator[Entry]:
 
 
 def _entries(node: YamlNode | None) -> Iterator[Entry]:
+    """Yield the entries of a mapping; nothing for another node."""
     if isinstance(node, MappingNode):
         yield from node
 
 
 def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> dict[str, Entry]:
+    """Return the entries of a mapping by key; entries that are no scalars are reported."""
     found = {}
     for entry in reader.read_mapping(node, what):
         if reader.read_scalar(entry.node, entry.key, entry.span):
@@ -190,9 +214,10 @@ def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> di
 
 
 class _EffectReader(Reader):
-    """The sections of an effect, one method each."""
+    """Reads the sections of an effect."""
 
     def read(self, document: Document) -> Effect:
+        """Return the effect of a document; problems are reported."""
         tree = self.read_mapping(document.root, f"effect {document.name}", EFFECT_KEYS)
         check_name(document.name, document.name_span, self.problems)
         fits = self._read_place_patterns(tree.get("at"), document.name_span)
@@ -214,9 +239,11 @@ class _EffectReader(Reader):
         )
 
     def _read_texts(self, tree: MappingNode, key: str) -> tuple[str, ...]:
+        """Return the texts of a list."""
         return tuple(item.text for item in self.read_list(tree.get(key), key))
 
     def _read_place_patterns(self, node: YamlNode | None, span: Span) -> tuple[PlacePattern, ...]:
+        """Return the patterns of `at` in the order of the file; an empty `at` is reported."""
         table = self.read_mapping(node, "at", PLACE_PATTERN_KEYS)
         if not table.entries:
             self.problems.error("missing", span, "an effect says `at` what place it fits")
@@ -225,6 +252,7 @@ class _EffectReader(Reader):
         )
 
     def _read_place_pattern(self, entry: Entry) -> PlacePattern:
+        """Return one pattern of `at`; an element pattern without a kind is reported."""
         what = f"at.{entry.key}"
         table = self.read_mapping(entry.node, what, PLACE_PATTERN_KEYS[entry.key])
         of = self.read_choice(table.get("of"), "of", ("rate",), "")
@@ -236,7 +264,10 @@ class _EffectReader(Reader):
         return PlacePattern(entry.key, of, unit, has, entry.span)
 
     def _check_sections(self, tree: MappingNode) -> None:
-        """Names are names, and only what is named is changed."""
+        """Report keys that are no valid names, and balances of unknown states.
+
+        An effect may have balances of its own states only.
+        """
         for section in ("parameters", "states", "discrete", "elements", "regions", "flow"):
             for entry in self.read_mapping(tree.get(section), section):
                 check_name(entry.key, entry.span, self.problems)
@@ -255,7 +286,10 @@ class _EffectReader(Reader):
         self.read_mapping(tree.get("move"), "move")
 
     def _check_names(self, tree: MappingNode, fits: tuple[PlacePattern, ...]) -> None:
-        """Expressions read what the effect brings, holes, and what it `reads` of a model."""
+        """Report unknown names and functions in the expressions of an effect.
+
+        Known names are holes, names that the effect adds, and those in `reads`.
+        """
         own = added_names(tree)
         reads = {item.text: item for item in self.read_list(tree.get("reads"), "reads")}
         for name, item in reads.items():
@@ -267,6 +301,7 @@ class _EffectReader(Reader):
         check_holes(tree, known, self.problems)
 
         def check(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+            """Check one expression; `base` is allowed in the rewrite of an equation."""
             if path[:2] == ("redirect", "except"):
                 return scalar
             allowed = {*known, *own, *reads}
@@ -281,6 +316,7 @@ class _EffectReader(Reader):
         map_formulas(tree, EFFECT_SITES, check)
 
     def _check_name_is_known(self, name: Name, allowed: set[str]) -> None:
+        """Report a name that is not allowed; dotted names are not checked."""
         if name.path in allowed or "." in name.path:
             return
         if name.path.startswith("$"):
@@ -294,6 +330,10 @@ class _EffectReader(Reader):
 
 
 def _parse_formula(path: KeyPath, scalar: ScalarNode, problems: Problems) -> tuple[SyntaxTree, ...]:
+    """Return the parsed expression of a scalar, or both sides of a balance.
+
+    Returns an empty tuple after a reported problem.
+    """
     with problems.collect_errors():
         if path[0] == "flow" or path[-2:-1] == ("flow",):
             return parse_balance(scalar)

@@ -1,4 +1,4 @@
-"""Project: a document with what it extends: variants, effects and calibrations laid over a base."""
+"""Expansion of a document: variants, effects and calibrations are applied to their base."""
 
 from __future__ import annotations
 
@@ -33,17 +33,18 @@ __all__ = [
 ]
 
 OVERLAY_KEYS = ("effects", "calibrations")
-"""What a layer asks for beside its body: effects first, then calibrations."""
+"""Keys of a document that name overlays: effects are applied first, then calibrations."""
 MAX_OVERLAYS = 20
-"""Most variants laid over each other."""
+"""Largest number of variants in a chain of `extends`."""
 
 
 def expand_document(
     document: Document, project: Project, problems: Problems | None = None
 ) -> Document:
-    """Return a variant laid over its base, as a document of the base's kind.
+    """Return a document with its variants, effects and calibrations applied to the base.
 
-    Warnings are left in `problems`. Raises SpecError.
+    The result has the kind of the base and the name of the document. Warnings are added to
+    `problems`. Raises SpecError.
     """
     problems = problems or Problems()
     *variants, base = _extension_chain(document, project)
@@ -56,9 +57,10 @@ def expand_document(
 def apply_variant(
     base: Document, variant: Document, project: Project, problems: Problems
 ) -> Document:
-    """Return `base` with the variant `variant` laid over it, under the name of the base.
+    """Return `base` with `variant` applied, under the name of the base.
 
-    The variant must extend the base or something that the base was made from.
+    The variant must extend the base or a document from which the base was derived; otherwise raises
+    SpecError.
     """
     assert variant.kind == "variant"
     wanted = _base_name_of(variant)
@@ -73,12 +75,15 @@ def apply_variant(
 
 
 def lineage(document: Document, project: Project) -> list[str]:
-    """Return the names of a document and of everything that it extends."""
+    """Return the names of a document and of the documents that it extends, the base last."""
     return [layer.name for layer in _extension_chain(document, project)]
 
 
 def _extension_chain(document: Document, project: Project) -> list[Document]:
-    """Return a document and all that it extends, the base last. Raises SpecError for a circle."""
+    """Return a document and the documents that it extends, the base last.
+
+    Raises SpecError for a cycle and for a chain of more than `MAX_OVERLAYS` documents.
+    """
     chain = [document]
     while chain[-1].kind == "variant":
         extends = _base_name_of(chain[-1])
@@ -100,7 +105,10 @@ def _extension_chain(document: Document, project: Project) -> list[Document]:
 def _apply_variant_body(
     base: Document, variant: Document, project: Project, problems: Problems
 ) -> Document:
-    """Return a variant with its effects laid over its expanded base, with the variant's name."""
+    """Return an expanded base with the body, effects and calibrations of a variant applied.
+
+    The result has the name of the variant.
+    """
     body = without_keys(variant.root, "language", "variant", "extends", *OVERLAY_KEYS)
     root = apply_overlay(base.root, body, problems)
     problems.raise_if_errors()
@@ -112,7 +120,10 @@ def _apply_variant_body(
 
 
 def add_calibrations(document: Document, names: Sequence[str], option: str) -> Document:
-    """Return a document that is calibrated further, as an option of a command asks for it."""
+    """Return a document with the calibrations `names` added after its own.
+
+    `option` is the command-line option that names them; problems are placed there.
+    """
     node = document.root.get("calibrations")
     own = node.nodes if isinstance(node, SequenceNode) else ()
     span = Span(Source(option, (" ".join(names),)), 1, 1)
@@ -125,7 +136,10 @@ def add_calibrations(document: Document, names: Sequence[str], option: str) -> D
 
 
 def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]:
-    """Return the parameters of an automaton's tree, those of its model too."""
+    """Return the mappings of the parameters of an automaton's tree and of its model, by name.
+
+    A parameter of the automaton replaces one of the model with the same name.
+    """
     result: dict[str, MappingNode] = {}
     model = tree.get("model")
     if isinstance(model, ScalarNode):
@@ -138,7 +152,10 @@ def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]
 
 
 def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tuple[str, str]]:
-    """Return instance and parameter of the instances in an automaton's tree, by `k1_t_close`."""
+    """Return the instance and parameter for each parameter of the instances in an automaton's tree.
+
+    The keys are names like `k1_t_close`: instance, underscore, parameter.
+    """
     result: dict[str, tuple[str, str]] = {}
     for entry in entries(tree.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
@@ -152,7 +169,10 @@ def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tup
 def _apply_effects_and_calibrations(
     merged: Document, layer: Document, project: Project, problems: Problems
 ) -> Document:
-    """Return a document with the effects, then the calibrations, of one of its layers."""
+    """Return a document with the effects, then the calibrations, of one of its overlays.
+
+    `layer` is the document whose keys name them. Raises SpecError.
+    """
     merged = _apply_effects(merged, layer, project, problems)
     node = layer.root.get("calibrations")
     if node is None:
@@ -175,7 +195,7 @@ def _apply_effects_and_calibrations(
 
 
 def _model_names(tree: MappingNode, project: Project) -> list[str]:
-    """Return the names of the model of a sampled automaton's tree and of what that extends."""
+    """Return the names of the model of an automaton's tree and of the documents that it extends."""
     model = tree.get("model")
     if not isinstance(model, ScalarNode):
         return []
@@ -189,7 +209,12 @@ def _calibrate_system(
     project: Project,
     problems: Problems,
 ) -> MappingNode:
-    """Give the values to the instances of what the calibration is of; or by `instance.name`."""
+    """Return the tree of a system with the values of a calibration set at its instances.
+
+    A calibration of an automaton sets its parameters at all instances of that automaton. A
+    calibration of the system names them `instance.parameter`. Unknown parameters, and a calibration
+    of something else, are reported.
+    """
     found: dict[str, tuple[str, str]] = {}
     is_applicable = calibration.of.text in names
     for entry in entries(root.get("instances")):
@@ -218,6 +243,7 @@ def _calibrate_system(
 def _report_wrong_target(
     calibration: Calibration, name: str, span: Span, problems: Problems
 ) -> None:
+    """Report that a calibration is of another automaton or system than `name`."""
     label = f"calibration `{calibration.name}` is of `{calibration.of.text}`, not of `{name}`"
     problems.error("values", span, label)
 
@@ -225,7 +251,10 @@ def _report_wrong_target(
 def _apply_effects(
     merged: Document, layer: Document, project: Project, problems: Problems
 ) -> Document:
-    """Return a document with the effects of one of its layers laid in their order."""
+    """Return a document with the effects of one of its overlays applied in their order.
+
+    Raises SpecError; the problems of all effects are collected first.
+    """
     node = layer.root.get("effects")
     if node is None:
         return merged
@@ -248,6 +277,7 @@ def _apply_effects(
 
 
 def _base_name_of(document: Document) -> ScalarNode:
+    """Return the name under `extends`. Raises SpecError if it is missing."""
     node = document.root.get("extends")
     if isinstance(node, ScalarNode):
         return node

@@ -1,4 +1,4 @@
-"""Written: a value in SI as the shortest text of the language that has the same bits."""
+"""Literal format: values in SI as the shortest texts of the language with the same bits."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from language.text.document import Entry, MappingNode, ScalarNode
 from language.typecheck.lookup_table import Axis
 
 MAX_DIGITS = 60
-"""Most digits that are tried; a unit with an offset may need many near its zero."""
+"""Largest number of digits that is tried; a unit with an offset needs many near its zero."""
 PLAIN_EXPONENTS = range(-5, 16)
-"""Decimal exponents of values that are written without one."""
+"""Decimal exponents of values that are written without an exponent."""
 
 
 def format_value_in_unit(parameter: Parameter, value: float, number_type: NumberType) -> str:
-    """Return a value [SI] of a number type as a literal in the unit of a parameter.
+    """Return a value [SI] as a literal in the unit of a parameter.
 
-    Where no literal in that unit is near enough it is in SI. Read again it is the same value.
+    The literal gives the same value when it is read and rounded to `number_type`. If no literal in
+    the unit does, it is in the SI unit. Raises ValueError if there is none there either.
     """
     if parameter.type == "bool":
         return "true" if value else "false"
@@ -39,14 +40,15 @@ def format_value_in_unit(parameter: Parameter, value: float, number_type: Number
 def table_points(
     parameter: Parameter, values: Sequence[float], number_type: NumberType, span: Span
 ) -> MappingNode:
-    """Return values [SI] of a table as `{points: {...}}`, in the order that a page has them.
+    """Return the values [SI] of a lookup table as `{points: {...}}`; the last axis varies fastest.
 
-    The last axis varies fastest. Values are as `value_in_unit` writes them, points as the spec.
+    Values are formatted by `format_value_in_unit`, points as in the spec.
     """
     assert parameter.table
     texts = iter([format_value_in_unit(parameter, value, number_type) for value in values])
 
     def rows(axes: Sequence[Axis]) -> MappingNode:
+        """Return the nested mapping of the remaining axes; take its values from the iterator."""
         axis, *inner = axes
         found = {}
         for key in axis.point_texts:
@@ -58,9 +60,10 @@ def table_points(
 
 
 def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
-    """Tell whether the exact value of a real is that of the literal which it would be written as.
+    """Tell whether the exact value of a real parameter is that of its shortest literal.
 
-    Another one has more digits than its type: `0.06000000001` in float32.
+    It is false for a value with more digits than its type holds, such as `0.06000000001` in
+    float32.
     """
     assert parameter.value is not None
     found, unit = _shortest_in_any_unit(
@@ -72,7 +75,10 @@ def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
 def format_calibration(
     name: str, of: str, origin: str, date: str, values: Mapping[str, str]
 ) -> str:
-    """Return a calibration file; `values` are literals by parameter, empty texts are left out."""
+    """Return the text of a calibration file; `values` are literals by parameter.
+
+    An empty `origin` or `date` is left out.
+    """
     lines = ["language: 1", f"calibration: {name}", f"of: {of}"]
     lines += [f"from: {json.dumps(origin, ensure_ascii=False)}"] if origin else []
     lines += [f"date: {date}"] if date else []
@@ -82,12 +88,15 @@ def format_calibration(
 
 
 def format_exact(number: Fraction) -> str:
-    """Return a number that has a finite decimal of `MOST_DIGITS` as the language writes it."""
+    """Return a number as a decimal literal, rounded to `MAX_DIGITS` significant digits."""
     return _format_decimal(_round_to_digits(number, MAX_DIGITS))
 
 
 def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
-    """Return a value [SI] exactly, in a unit, or in SI where it has no decimal there."""
+    """Return a value [SI] exactly as a literal in a unit.
+
+    If it has no decimal of `MAX_DIGITS` digits in that unit, the literal is in the SI unit.
+    """
     number = (value - unit.offset) / unit.factor
     if Fraction(_round_to_digits(number, MAX_DIGITS)) == number:
         return f"{format_exact(number)} {unit.text}"
@@ -97,7 +106,10 @@ def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
 def _shortest_in_any_unit(
     parameter: Parameter, value: float, number_type: NumberType
 ) -> tuple[Decimal, Unit]:
-    """Return the shortest decimal of a value, and the unit that it is in."""
+    """Return the shortest decimal of a value and its unit: that of the parameter, else the SI unit.
+
+    Raises ValueError if there is none in either.
+    """
     own, limits = parameter.unit, parameter.range
     for unit in (own, Unit(str(own.dimension), Fraction(1), own.dimension)):
         found = _shortest_decimal(value, unit, number_type, limits)
@@ -109,7 +121,11 @@ def _shortest_in_any_unit(
 def _shortest_decimal(
     value: float, unit: Unit, number_type: NumberType, limits: Range | None
 ) -> Decimal | None:
-    """Return the decimal with fewest digits that is the value again, inside of the limits."""
+    """Return the decimal with the fewest digits that gives `value` again, within the limits.
+
+    Returns None if none with less than `MAX_DIGITS` digits does, or if its exponent is too large
+    for a literal.
+    """
     target = Fraction(value)
     if limits:
         target = min(max(target, limits[0]), limits[1])
@@ -124,13 +140,13 @@ def _shortest_decimal(
 
 
 def _round_to_digits(exact: Fraction, digits: int) -> Decimal:
-    """Return a number rounded to so many significant digits."""
+    """Return a number rounded to a number of significant digits, without trailing zeros."""
     context = Context(prec=digits)
     return context.divide(Decimal(exact.numerator), Decimal(exact.denominator)).normalize(context)
 
 
 def _format_decimal(number: Decimal) -> str:
-    """Return a decimal as the language writes it: `0.05`, `1.0e-7`."""
+    """Return a decimal as a literal of the language, such as `0.05` or `1.0e-7`."""
     exponent = number.adjusted() if number else 0
     if exponent in PLAIN_EXPONENTS:
         return f"{number:f}"

@@ -1,4 +1,7 @@
-"""Points: other values at the points of a table, as calibrations and commands give them."""
+"""Parameter override: other values of parameters and of points of lookup tables.
+
+Calibrations, effects, instances and command-line options give such values.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,11 @@ from language.text.node_edit import put_node
 def override_points(
     parameter: MappingNode, overrides: MappingNode, problems: Problems
 ) -> MappingNode:
-    """Return a parameter with other values at some points of its table; none is new.
+    """Return a parameter with other values at some points of its lookup table.
 
-    A point may be written in another unit than the table's, `500 ms` for `0.5 s`; where it has no
-    unit there it has none here.
+    A point may be written in another unit than in the table, such as `500 ms` for `0.5 s`. A number
+    without a unit matches only a point without a unit. Unknown points and a parameter without a
+    table are reported.
     """
     reader = Reader(problems)
     points = reader.read_mapping(overrides, "a table's values", ("points",)).get("points")
@@ -38,6 +42,7 @@ def override_points(
 
 
 def _merge_points(own: MappingNode, overrides: MappingNode, reader: Reader) -> MappingNode:
+    """Return the points of an axis with other values; unknown and repeated points are reported."""
     entries = dict(own.entries)
     first: dict[str, Entry] = {}
     for entry in overrides:
@@ -58,7 +63,10 @@ def _merge_points(own: MappingNode, overrides: MappingNode, reader: Reader) -> M
 
 
 def _override_value(own: YamlNode, entry: Entry, reader: Reader) -> YamlNode:
-    """Return what stands at a point: a value, or a row of them."""
+    """Return the new value at a point, or the merged row of a table with two axes.
+
+    A value of the wrong form is reported, and the old one is returned.
+    """
     if isinstance(own, MappingNode) and isinstance(entry.node, MappingNode):
         return _merge_points(own, entry.node, reader)
     if isinstance(own, MappingNode) or not isinstance(entry.node, ScalarNode):
@@ -69,11 +77,15 @@ def _override_value(own: YamlNode, entry: Entry, reader: Reader) -> YamlNode:
 
 
 def _unknown_point_hint(key: str, own: MappingNode, known: str) -> str:
+    """Return a similar point, or the list of all points, as a hint."""
     return suggest_name(key, own.entries) or f"its points are {known}: change them in a variant"
 
 
 def _find_point_key(own: MappingNode, entry: Entry, reader: Reader) -> str | None:
-    """Return the key of the point that an entry is at."""
+    """Return the key of the point that an entry denotes, or None.
+
+    The texts are compared first, then the values.
+    """
     if entry.key in own.entries:
         return entry.key
     given = reader.read_quantity(ScalarNode(entry.key, entry.span), entry.key, entry.span, None)
@@ -89,6 +101,7 @@ def _find_point_key(own: MappingNode, entry: Entry, reader: Reader) -> str | Non
 
 
 def _is_same_point(given: Quantity, point: Quantity) -> bool:
+    """Tell whether two points have the same dimension and, in float64, the same value."""
     (value, unit), (other, known) = given, point
     if (unit is NO_UNIT) != (known is NO_UNIT) or unit.dimension != known.dimension:
         return False
@@ -96,7 +109,7 @@ def _is_same_point(given: Quantity, point: Quantity) -> bool:
 
 
 def overlay_value(old: YamlNode | None, new: YamlNode) -> YamlNode:
-    """Return what is given for a parameter over what was before: of a table point by point."""
+    """Return the later of two values of a parameter; the points of lookup tables are merged."""
     before = old.get("points") if isinstance(old, MappingNode) else None
     after = new.get("points") if isinstance(new, MappingNode) else None
     if not (
@@ -109,6 +122,7 @@ def overlay_value(old: YamlNode | None, new: YamlNode) -> YamlNode:
 
 
 def _overlay_points(before: MappingNode, after: MappingNode, reader: Reader) -> MappingNode:
+    """Return earlier points overwritten by later ones, at any depth; new points are added."""
     entries = dict(before.entries)
     for entry in after:
         key = _find_point_key(before, entry, reader) or entry.key
@@ -121,7 +135,10 @@ def _overlay_points(before: MappingNode, after: MappingNode, reader: Reader) -> 
 
 
 def override_parameter(parameter: MappingNode, value: YamlNode, problems: Problems) -> MappingNode:
-    """Return a parameter with another value, or with values at points of its table."""
+    """Return a parameter with another value, or with other values at points of its table.
+
+    A value of the wrong form is reported, and the parameter is returned unchanged.
+    """
     if isinstance(value, ScalarNode) and "table" in parameter.entries:
         label = "this parameter is a table: its values are `{points: {...}}`"
         problems.error("form", value.span, label)
@@ -137,7 +154,7 @@ def override_parameter(parameter: MappingNode, value: YamlNode, problems: Proble
 
 
 def set_parameter_value(parameter: MappingNode, value: ScalarNode) -> MappingNode:
-    """Return a parameter with another value; a bare real is in the unit of the old one."""
+    """Return a parameter with another value; a bare number is in the unit of the old value."""
     entries = dict(parameter.entries)
     old, kind = parameter.get("value"), parameter.get("type")
     is_real = not isinstance(kind, ScalarNode) or kind.text == "real"

@@ -1,4 +1,4 @@
-"""Known: dimensions of the names of an automaton's tree, before it is read as a model."""
+"""Tree types: the types of the names in an automaton's tree, before it is read as a model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from language.typecheck.types import EnumType, ExprType, IntType
 
 
 def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
-    """Yield the tables of all modes of an automaton's tree, those inside modes and regions too."""
+    """Yield the mappings of all modes and templates of a tree, at any depth."""
     for key in ("modes", "templates"):
         for entry in _child_mappings(tree.get(key)):
             yield entry
@@ -26,7 +26,7 @@ def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
 
 
 def formula_entries(tree: MappingNode, section: str) -> Iterator[tuple[str, ScalarNode]]:
-    """Yield the scalars of a section (`equations`, `flow`) at the root and in every mode."""
+    """Yield name and scalar of a section (`equations`, `flow`) of the root, then of every mode."""
     for owner in (tree, *mode_mappings(tree)):
         table = owner.get(section)
         for entry in table if isinstance(table, MappingNode) else ():
@@ -35,10 +35,10 @@ def formula_entries(tree: MappingNode, section: str) -> Iterator[tuple[str, Scal
 
 
 class TreeTypes:
-    """The dimensions of parameters, inputs, states, discrete variables and equations."""
+    """The types of parameters, inputs, states, discrete variables and equations of a tree."""
 
     def __init__(self, tree: MappingNode) -> None:
-        """Look at declarations; equations are looked at when they are asked for."""
+        """Read the declarations; the types of equations are inferred on request."""
         self.tree = tree
         self.types: dict[str, ExprType | None] = {}
         self.equations: dict[str, list[ScalarNode]] = {}
@@ -49,7 +49,10 @@ class TreeTypes:
                 self.types[name] = self._declared_type(table)
 
     def type_of_name(self, name: str) -> ExprType | None:
-        """Return what a name is; None where that cannot be told."""
+        """Return the type of a name, or None if it is unknown.
+
+        Of several formulas of an equation, one with a dimension other than a number is preferred.
+        """
         if name not in self.types:
             self.types[name] = None
             found = (self.type_of_formula(scalar) for scalar in self.equations.get(name, ()))
@@ -59,14 +62,14 @@ class TreeTypes:
         return self.types[name]
 
     def type_of_formula(self, scalar: ScalarNode) -> ExprType | None:
-        """Return what an expression is; None where that cannot be told."""
+        """Return the type of an expression, or None if it cannot be parsed or inferred."""
         try:
             return self._infer_tree(parse_expression(scalar), scalar.text)
         except SpecError:
             return None
 
     def balance_dimension(self, state: str, balance: ScalarNode) -> Dimension | None:
-        """Return the dimension of the sides of a balance."""
+        """Return the dimension of the left side of the balance of a state, or None if unknown."""
         try:
             left, _ = parse_balance(balance)
         except SpecError:
@@ -82,10 +85,15 @@ class TreeTypes:
         return dimension_product(factor, rate) if isinstance(factor, Dimension) else None
 
     def _infer_tree(self, tree: SyntaxTree, text: str) -> ExprType | None:
+        """Return the inferred type of an expression; problems are discarded."""
         scope = NameEnvironment({name: self.type_of_name(name) for name in names_in_text(text)})
         return TypeChecker(scope, Problems()).infer_type(tree)
 
     def _declared_type(self, table: MappingNode) -> ExprType | None:
+        """Return the type that a declaration gives.
+
+        Without `type` and `unit` it is the type of the value, or a number.
+        """
         kind = table.get("type")
         if isinstance(kind, ScalarNode) and kind.text == "bool":
             return "truth"
@@ -101,7 +109,7 @@ class TreeTypes:
 
 
 def dimension_of_unit(text: str) -> Dimension | None:
-    """Return the dimension of a unit's text; None where it is no unit."""
+    """Return the dimension of the text of a unit, or None if it is no unit."""
     try:
         return parse_unit(text).dimension
     except UnitError:
@@ -109,12 +117,15 @@ def dimension_of_unit(text: str) -> Dimension | None:
 
 
 def format_si_unit(dimension: Dimension) -> str:
-    """Return the SI unit of a dimension as it is written in a spec."""
+    """Return the SI unit of a dimension as a spec writes it; an undefined angle counts as 0."""
     return str(Dimension(dimension.powers, dimension.angle or 0))
 
 
 def _derivative_coefficient(left: SyntaxTree) -> SyntaxTree | None:
-    """Return the factor beside der(x), None where there is none."""
+    """Return the factor of der(x) in the left side of a balance; None for der(x) alone.
+
+    Another form gives an ErrorNode.
+    """
     match left:
         case Arithmetic("*", FunctionCall("der", _, _), other, _):
             return other
@@ -127,11 +138,13 @@ def _derivative_coefficient(left: SyntaxTree) -> SyntaxTree | None:
 
 
 def _child_mappings(node: object) -> Iterator[MappingNode]:
+    """Yield the values of a mapping that are mappings; nothing for another node."""
     for _, table in _named_mappings(node):
         yield table
 
 
 def _named_mappings(node: object) -> Iterator[tuple[str, MappingNode]]:
+    """Yield key and value for the values of a mapping that are mappings."""
     for entry in node if isinstance(node, MappingNode) else ():
         if isinstance(entry.node, MappingNode):
             yield entry.key, entry.node
