@@ -1,9 +1,10 @@
-"""Motion: flow of a field over `work.h` up to the first crossing, located inside the step.
+"""Continuous steps: integration over `work.h` up to the first crossing, which is located.
 
-A method gives three things: a block `step_<mode>` from the states to `work.end_<state>`, a block
+An integration method supplies a block `step_<mode>` from the states to `work.end_<state>`, a block
 `series_<mode>` that fills `work.series_<state>` with a polynomial through the step, and the number
-of its terms. What is here is common: look at the guards at the end, and where one changed, halve
-the bracket on the polynomial; the upper end is kept, so the guard is true where it is committed.
+of its terms. This module adds the common part: the guards are evaluated at the end of the step; if
+one has changed, the crossing is located by bisection on the polynomial. The upper end of the
+bracket is committed, so the guard is true there (rules 9 and 10).
 """
 
 from __future__ import annotations
@@ -42,21 +43,28 @@ from language.model.automaton import Mode
 from language.model.constant_states import constant_states, ever_varying_states
 
 MERGE_ULPS = 4096
-"""Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
+"""Events that are closer than this are one instant (rule 10).
+
+Rounding moves a crossing by about ten units in the last place.
+"""
 RUN_BISECTIONS = 24
-"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 an ULP."""
+"""Bisections inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 one unit in the last place."""
 FLOW_BISECTIONS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
-"""Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
-float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
+"""Bisections in a step of a continuous automaton.
+
+1 ms / 2^44 is below one unit in the last place of a time of 1 s. In float32 a time within a step
+has 24 bits; after 24 bisections the middle of the bracket equals one of its ends.
+"""
 
 ArmedGuards = Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class IntegrationMethod:
-    """A method of integration for one field; `norms` are |A h| of each mode, where it has them.
+    """The blocks of an integration method for one vector field.
 
-    `resting` are the states that move in no mode: they have no polynomial.
+    `step_norms` is |A h| of each mode if the method computes it. `constant_states` are the states
+    whose rate is 0 in all modes; they have no polynomial.
     """
 
     blocks: dict[str, Block]
@@ -68,23 +76,26 @@ class IntegrationMethod:
 
 
 def hold_constant_states(field: VectorField, mode: str) -> list[Op]:
-    """Return the ends of a step of the states that rest in a mode."""
+    """Return the assignments work.end_x = state.x of the states whose rate is 0 in a mode."""
     still = constant_states(field.automaton.modes[mode])
     return [Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in field.states if n in still]
 
 
 def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]:
-    """Return the polynomials of a mode's step of the states that rest in this mode, not in all."""
+    """Return the assignments of a zero polynomial to the states whose rate is 0 in a mode.
+
+    States whose rate is 0 in all modes have no polynomial and are left out.
+    """
     still = constant_states(field.automaton.modes[mode])
     names = [name for name in ever_varying_states(field.automaton) if name in still]
     return [Store(f"work.series_{n}", integer(k), real(0.0)) for n in names for k in range(terms)]
 
 
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
-    """Return the time [s] within which events are one instant, at a time since the start.
+    """Return the time [s] within which events are one instant (rule 10).
 
-    In float64 ULPs of the time: 0.9 ps at 1 s. A float32 knows the time within the step only, and
-    its states are as coarse: ULPs of the step, 0.5 us in 1 ms.
+    In float64 it is MERGE_ULPS units in the last place of the larger of step and time: 0.9 ps at 1
+    s. In float32 it is that of the step, 0.5 us in 1 ms, since times are relative to the step.
     """
     whole = max(time, step) if number == "float64" else step
     return float(whole) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
@@ -99,11 +110,12 @@ def continuous_step_blocks(
     armed: Callable[[Mode], ArmedGuards | None],
     is_wait: Expr | None = None,
 ) -> dict[str, Block]:
-    """Return `point`, and `look_<mode>`, `locate_<mode>` and `move_<mode>` of every mode.
+    """Return the block `point` and `look_<mode>`, `locate_<mode>`, `move_<mode>` of each mode.
 
-    `flows` are the blocks of the field. What crosses within `merge` [s] is one instant; `armed`
-    gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
-    crosses just after it is at that instant.
+    `flows` are the blocks of the field. Crossings within `merge` [s] are one instant. `armed` gives
+    the variables of the earlier truth of a mode's guards, or None if any true guard is a crossing.
+    `is_wait` is the condition that a wait ends with the step: then a crossing shortly after the end
+    is at that instant.
     """
     paths = DenseOutput(method.terms, method.constant_states)
     blocks = {"point": paths.evaluate(field.states)}
@@ -116,7 +128,7 @@ def continuous_step_blocks(
 
 
 def continuous_step_variables(field: VectorField, method: IntegrationMethod) -> list[Variable]:
-    """Return the work variables of a motion."""
+    """Return the `work` variables of a continuous step and of the method."""
     found = [
         Variable("work.h", "real", "s", about="step to flow over"),
         Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
@@ -146,7 +158,10 @@ def continuous_step_variables(field: VectorField, method: IntegrationMethod) -> 
 def _bisect_crossing(
     field: VectorField, mode: Mode, crossed: Expr, bisections: int, merge: Expr
 ) -> Block:
-    """Halve (low, high]: a guard has changed at high, none has at low."""
+    """Return the operations that halve (low, high]: a guard has changed at high and none at low.
+
+    `work.elapsed` becomes the upper end, and `work.end_<state>` the states there.
+    """
     low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_before_end"
     middle = add(low, multiply(real(0.5), subtract(high, low)))
     body: Block = (
@@ -169,8 +184,10 @@ def _bisect_crossing(
 
 
 def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Block:
-    """Take the point at the upper end where that lies inside, and read the guards there if more
-    than one may change.
+    """Return the operations that take the upper end of the bracket as the end of the step.
+
+    They do so only if it lies before the end. With two or more guards, the guards are evaluated
+    there.
     """
     high = Ref("work.high")
     kept = (Assign("work.s", high), *_accept_point(field))
@@ -184,19 +201,21 @@ def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Bl
 
 
 def _evaluate_guards_at(mode: Mode, time: Expr, comment: str = "") -> Block:
-    """Read the guards at `time`."""
+    """Return the operations that evaluate the guards of a mode at `time` [s] of the step."""
     return (Assign("work.s", time, comment), RunBlock(f"look_{mode.name}"))
 
 
 def _accept_point(field: VectorField) -> Block:
-    """Take the point at `work.s` for the end."""
+    """Return the operations that set the end of the step to the polynomial at `work.s`."""
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     return (RunBlock("point"), *keep)
 
 
 def _merge_close_events(field: VectorField, mode: Mode, merge: Expr) -> Block:
-    """Where another guard changes within `merge` after the first, take both as one instant; what
-    they are at the first is known.
+    """Return the operations that merge a crossing of another guard within `merge` [s].
+
+    The guards at the first crossing are stored; one that is false there and true `merge` later
+    moves the end to the later time. A mode with a single guard has no such operations.
     """
     watched = guard_slots(mode)
     if len(watched) < 2:
@@ -220,6 +239,10 @@ def _merge_close_events(field: VectorField, mode: Mode, merge: Expr) -> Block:
 def _lower_continuous_step(
     field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None
 ) -> Block:
+    """Return the block `move_<mode>`: one step, cut at the first crossing.
+
+    A mode without guards makes the whole step.
+    """
     watched = guard_slots(mode)
     ops: list[Op] = [RunBlock(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
     if watched:
@@ -240,7 +263,10 @@ def _lower_continuous_step(
 def _merge_event_after_wait(
     field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr
 ) -> Block:
-    """A guard that changes within `merge` after the end of a wait changes at that instant."""
+    """Return the operations that test for a crossing within `merge` [s] after the end of a wait.
+
+    Such a crossing is at the end of the wait.
+    """
     look = (RunBlock(f"series_{mode.name}"), *_evaluate_guards_at(mode, add(Ref("work.h"), merge)))
     change = Branch(crossed, (Assign("work.crossed", Value(True)), *_accept_point(field)))
     return (Branch(is_wait, (*look, change)),)

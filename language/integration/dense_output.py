@@ -1,7 +1,8 @@
-"""Look: the point of a polynomial through a step, and the guards there - of what they read alone.
+"""Dense output: the polynomial through a step, and the evaluation of guards on it.
 
-Where a guard is a conjunction, one part of which reads few states, those come first: inside a gap
-the angle says that no side is reached, whatever the speeds are.
+Only states that the guards read are evaluated. If each guard is a conjunction with a part that
+reads states only, these parts are tested first; while all of them are false, the remaining states
+and the guards are not evaluated.
 """
 
 from __future__ import annotations
@@ -33,20 +34,23 @@ from language.ir.traversal import expr_names, names_used, reachable_blocks
 from language.model.automaton import Mode
 
 MAX_UNROLLED_TERMS = 8
-"""Terms of a polynomial that is written out; a longer one is a loop."""
+"""The largest number of terms of a polynomial without a loop."""
 CONSTANT_PREFIXES = ("constant.", "calibration.", "derived.")
 GUARD_PREFIX, POINT_PREFIX = "work.guard_", "work.at_"
 
 
 @dataclass(frozen=True)
 class DenseOutput:
-    """The polynomials of a step with their number of `terms`; what is `resting` has none."""
+    """The polynomials of a step, with their number of terms; constant states have none."""
 
     terms: int
     constant_states: frozenset[str]
 
     def evaluate(self, states: Sequence[str]) -> Block:
-        """Return what puts states where they are at `work.s`, where they are at the start first."""
+        """Return the operations that set `work.at_<state>` at `work.s`.
+
+        Constant states come first and get their present value.
+        """
         still = [name for name in states if name in self.constant_states]
         ops = [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in still]
         return (
@@ -58,7 +62,7 @@ class DenseOutput:
 
 
 def _evaluate_polynomials(states: Sequence[str], terms: int) -> Block:
-    """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
+    """Return x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s` by Horner's rule, for each state."""
     s = Ref("work.s")
     if terms <= MAX_UNROLLED_TERMS:
         return tuple(_unroll_horner(name, terms) for name in states)
@@ -75,6 +79,7 @@ def _evaluate_polynomials(states: Sequence[str], terms: int) -> Block:
 
 
 def _unroll_horner(name: str, terms: int) -> Assign:
+    """Return Horner's rule for one state as a single assignment."""
     s, series = Ref("work.s"), f"work.series_{name}"
     total: Expr = Item(series, integer(terms - 1))
     for term in reversed(range(terms - 1)):
@@ -85,7 +90,14 @@ def _unroll_horner(name: str, terms: int) -> Assign:
 def event_search_block(
     field: VectorField, mode: Mode, dense_output: DenseOutput, flows: Mapping[str, Block]
 ) -> Block:
-    """Return what reads the guards of a mode at `work.s`; `flows` are the blocks of the field."""
+    """Return the block that evaluates the guards of a mode at `work.s`.
+
+        point; guards    ->    states of the condition; if condition: other states; guards
+                               else: guards = false
+
+    `flows` are the blocks of the field. The condition is that of `_necessary_condition`; without
+    one the first form is used.
+    """
     guards = f"guards_{mode.name}"
     read = _names_used(guards, flows)
     needed = [name for name in field.states if f"{POINT_PREFIX}{name}" in read]
@@ -103,16 +115,22 @@ def event_search_block(
 
 
 def _names_used(name: str, flows: Mapping[str, Block]) -> set[str]:
-    """Return all that a block reads or writes, with the blocks that it runs."""
+    """Return all names that a block reads or writes, including the blocks that it runs."""
     return names_used(flows[run] for run in reachable_blocks(name, flows))
 
 
 def _guard_assignments(block: Block) -> Iterator[Assign]:
+    """Yield the assignments of guards of a block."""
     return (op for op in block if isinstance(op, Assign) and op.target.startswith(GUARD_PREFIX))
 
 
 def _necessary_condition(field: VectorField, block: Block) -> Expr | None:
-    """Return what is false only where every guard is, and reads states alone; None if nothing."""
+    """Return a condition on states alone that is true whenever a guard of the block is true.
+
+    It is the disjunction of one part of each guard, that with the fewest states. The result is None
+    if a guard has no such part or the block has operations other than assignments of equations and
+    guards.
+    """
     states = {f"{POINT_PREFIX}{name}" for name in field.states}
     if not all(
         isinstance(op, Assign) and op.target.startswith((GUARD_PREFIX, POINT_PREFIX))
@@ -129,6 +147,7 @@ def _necessary_condition(field: VectorField, block: Block) -> Expr | None:
 
 
 def _conjuncts(guard: Expr) -> list[Expr]:
+    """Return the parts of a conjunction, from left to right."""
     match guard:
         case Binary("and", left, right):
             return [*_conjuncts(left), *_conjuncts(right)]
@@ -136,7 +155,7 @@ def _conjuncts(guard: Expr) -> list[Expr]:
 
 
 def _reads_only(part: Expr, states: set[str]) -> bool:
-    """Tell whether an expression reads some states and what is fixed, nothing else."""
+    """Return whether an expression reads at least one of the states, and else constants only."""
     names = set(expr_names(part))
     return bool(names & states) and all(
         n in states or n.startswith(CONSTANT_PREFIXES) for n in names

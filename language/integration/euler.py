@@ -1,7 +1,7 @@
-"""Euler: the explicit method of one stage (Euler 1768), a straight line inside the step.
+"""Explicit Euler method (Euler 1768) with linear dense output.
 
-Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, I.7. The line is of the order
-of the method; a curve through more rates would promise what the end of the step does not have.
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section I.7. The linear
+polynomial has the order of the method, so a polynomial of higher degree would not be more accurate.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from language.ir.ops import Assign, Block, Op, Ref, RunBlock, Store, add, intege
 from language.model.constant_states import never_varying_states, varying_states
 
 TERMS = 1
+"""The number of terms of the polynomial."""
 
 
 def euler_method(field: VectorField) -> IntegrationMethod:
-    """Return the method for a field, for the states that move in each mode."""
+    """Return the Euler method for a field; in each mode only states with a rate are integrated."""
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes:
         names = varying_states(field.automaton, mode)
@@ -32,7 +33,7 @@ def euler_method(field: VectorField) -> IntegrationMethod:
 
 
 def _step_block(field: VectorField, mode: str) -> Block:
-    """x + h f(x)."""
+    """Return the block of one step: x + h f(x)."""
     ops: list[Op] = [
         *set_point_to_state(field),
         *set_point_time(field, real(0.0)),

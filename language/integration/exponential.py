@@ -1,7 +1,8 @@
-"""Exponential: the part linear in the states exactly, the rest by its value at the middle.
+"""Exponential midpoint rule and exact propagation of affine flows (rule 17e).
 
-Exponential midpoint rule: Hochbruck and Ostermann 2010 (Acta Numerica 19, 209-286), eq. (2.40b).
-Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number of terms (rule 17e).
+x' = A x + r. The linear part is propagated by e^(A h); the remainder r is held at its value in the
+middle of the step (Hochbruck and Ostermann 2010, Acta Numerica 19, 209-286, eq. 2.40b). Inside a
+step the solution is a Taylor sum with a fixed number of terms.
 """
 
 from __future__ import annotations
@@ -50,14 +51,14 @@ from language.numerics.matrix import Matrix, expm as matrix_exponential, expm_in
 from language.text.diagnostic import Problems, Span
 
 MAX_STEP_NORM = 4.0
-"""|A h| up to which the Taylor sum is accurate and short (rule 17e)."""
+"""The largest |A h| for which the Taylor sum is accurate and short (rule 17e)."""
 
 
 @dataclass(frozen=True)
 class ExponentialContext:
-    """What a method knows before it runs: constants, the step [s], the rates of each mode.
+    """The input of an exponential method: constants, step [s] and rates of each mode.
 
-    `corners` are the constants at the ends of the ranges of the tunables in `depends_on`.
+    `corners` are the constants at the ends of the ranges of the tunable parameters in `depends_on`.
     """
 
     point: LinearisationPoint
@@ -68,13 +69,13 @@ class ExponentialContext:
     number_type: NumberType
 
     def state_matrix(self, field: VectorField, mode: str) -> Matrix:
-        """Return A (n, n) of a mode: see `jacobian`."""
+        """Return A (n, n) of a mode [unit_i/(unit_j s)], the Jacobian of its rates."""
         return jacobian(self.rates[mode], field.states, self.point.constant_values)
 
     def scaled_step_matrices(self, field: VectorField, mode: str) -> list[Matrix]:
-        """Return A h of a mode in units of the ranges, also at the ends of those of the tunables.
+        """Return A h of a mode in units of the ranges, for the nominal constants and each corner.
 
-        An entry that is largest between them is not seen.
+        An extreme value between two corners is not considered.
         """
         rates, states, h = self.rates[mode], field.states, float(self.step)
         known = (self.point.constant_values, *self.corners)
@@ -83,7 +84,7 @@ class ExponentialContext:
         ]
 
     def states_with_remainder(self, field: VectorField, mode: str) -> frozenset[str]:
-        """Return the states whose rate is more than its row of A, whatever the calibration."""
+        """Return the states whose rate is not its row of A times x, for some calibration."""
         known = self.point.constant_values.items()
         fixed = {name: value for name, value in known if name.startswith("constant.")}
         parts = affine_forms(self.rates[mode], field.states, fixed)
@@ -93,7 +94,7 @@ class ExponentialContext:
 def exponential_method(
     field: VectorField, context: ExponentialContext, span: Span, problems: Problems
 ) -> IntegrationMethod:
-    """Return the method for a field."""
+    """Return the exponential midpoint method for a field; a step that is too long is reported."""
     return build_exponential_method(field, context, _step_blocks, span, problems)
 
 
@@ -104,8 +105,11 @@ def build_exponential_method(
     span: Span,
     problems: Problems,
 ) -> IntegrationMethod:
-    """Return a method that has the linear part solved; `step_blocks` makes the blocks of a mode's."""
-    made: dict[str, Block] = {}
+    """Return an exponential method; `step_blocks` returns the step blocks of one mode.
+
+    A mode with |A h| above MAX_STEP_NORM is reported. The matrices are solved constants.
+    """
+    blocks: dict[str, Block] = {}
     constants: list[Constant] = []
     norms: dict[str, float] = {}
     steps: dict[str, list[Matrix]] = {}
@@ -119,27 +123,27 @@ def build_exponential_method(
             problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
             continue
         constants += _solved_constants(field, name, context)
-        made.update(step_blocks(field, name, context))
-        made[f"pull_{name}"] = _remainder_block(field, name, context)
-        made[f"whole_{name}"] = _propagate(field, name, ("end", "E", "F"), context)
+        blocks.update(step_blocks(field, name, context))
+        blocks[f"pull_{name}"] = _remainder_block(field, name, context)
+        blocks[f"whole_{name}"] = _propagate(field, name, ("end", "E", "F"), context)
     bounded = [
         step for name, norm in norms.items() if norm <= MAX_STEP_NORM for step in steps[name]
     ]
     terms = max((taylor_term_count(step, context.number_type) for step in bounded), default=1)
     for name in field.automaton.modes:
-        made[f"series_{name}"] = _taylor_series(field, name, context, terms)
+        blocks[f"series_{name}"] = _taylor_series(field, name, context, terms)
     variables = [
         Variable(f"work.pull_{name}", "real", str(rate_dimension(state.unit.dimension)))
         for name, state in field.automaton.states.items()
     ]
     number = Variable("work.order", "real", about="order of a term")
-    return IntegrationMethod(made, terms, tuple(constants), (*variables, number), norms)
+    return IntegrationMethod(blocks, terms, tuple(constants), (*variables, number), norms)
 
 
 def _solved_matrices(
     field: VectorField, mode: str, context: ExponentialContext
 ) -> dict[str, Matrix]:
-    """Return A, and E = e^(A h) with F = its integral over the step and over half of it."""
+    """Return A, E = e^(A h), F = integral of e^(A s) over [0, h], and Eh, Fh for half the step."""
     a, h = context.state_matrix(field, mode), float(context.step)
     return {
         "A": a,
@@ -151,10 +155,12 @@ def _solved_matrices(
 
 
 def _entry_name(mode: str, letter: str, row: str, column: str) -> str:
+    """Return the name of a solved constant: `solved.<mode>_<letter>.<row>.<column>`."""
     return f"solved.{mode}_{letter}.{row}.{column}"
 
 
 def _solved_constants(field: VectorField, mode: str, context: ExponentialContext) -> list[Constant]:
+    """Return the nonzero entries of the solved matrices of a mode as constants."""
     found = []
     for letter, matrix in _solved_matrices(field, mode, context).items():
         for i, row in enumerate(field.states):
@@ -169,7 +175,7 @@ def _solved_constants(field: VectorField, mode: str, context: ExponentialContext
 def _row_products(
     field: VectorField, mode: str, letter: str, matrix: Matrix, i: int, values: Mapping[str, Expr]
 ) -> list[Expr]:
-    """Return the products of one row of a matrix with values by state, zeros left out."""
+    """Return the products of row i of a matrix with values by state; zero entries are left out."""
     row = field.states[i]
     return [
         multiply(Ref(_entry_name(mode, letter, row, column)), values[column])
@@ -179,12 +185,13 @@ def _row_products(
 
 
 def _remainder_refs(field: VectorField, mode: str, context: ExponentialContext) -> dict[str, Expr]:
+    """Return the variables of the remainders of a mode, by state, if they are not always 0."""
     pulled = context.states_with_remainder(field, mode)
     return {name: Ref(f"work.pull_{name}") for name in field.states if name in pulled}
 
 
 def _remainder_block(field: VectorField, mode: str, context: ExponentialContext) -> Block:
-    """pull = rate - A x at the point: what is not linear."""
+    """Return the block that evaluates the remainder: pull = rate - A x at the point."""
     a, pulled = context.state_matrix(field, mode), context.states_with_remainder(field, mode)
     at: dict[str, Expr] = {name: Ref(f"work.at_{name}") for name in field.states}
     ops: list[Op] = [RunBlock(f"rates_{mode}")]
@@ -199,12 +206,15 @@ def _remainder_block(field: VectorField, mode: str, context: ExponentialContext)
 
 
 def lower_step_start(field: VectorField, mode: str) -> Block:
-    """Return the operations that find what is not linear, at the start of the step."""
+    """Return the operations that evaluate the remainder at the start of the step."""
     return (*set_point_to_state(field), *set_point_time(field, real(0.0)), RunBlock(f"pull_{mode}"))
 
 
 def lower_step_end(field: VectorField, mode: str, context: ExponentialContext) -> Block:
-    """Return the operations that go to the end of the step; `work.pull_<state>` is known."""
+    """Return the operations that set `work.end_<state>` from the states and the remainder.
+
+    A full step uses the solved matrices, a part of a step the Taylor sum.
+    """
     end = Assign("work.s", Ref("work.h"))
     arrive = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     rest: Block = (RunBlock(f"series_{mode}"), end, RunBlock("point"), *arrive)
@@ -212,13 +222,14 @@ def lower_step_end(field: VectorField, mode: str, context: ExponentialContext) -
 
 
 def _is_full_step(context: ExponentialContext) -> Expr:
+    """Return the condition that `work.h` is the full step."""
     return Compare("==", Ref("work.h"), real(context.step))
 
 
 def _propagate(
     field: VectorField, mode: str, letters: tuple[str, str, str], context: ExponentialContext
 ) -> Block:
-    """x = E x + F pull into `work.<target>_<state>`; letters are target, E and F."""
+    """Return the assignments work.<target>_x = E x + F pull; `letters` are target, E and F."""
     target, e, f = letters
     table = _solved_matrices(field, mode, context)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
@@ -232,6 +243,7 @@ def _propagate(
 
 
 def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> Mapping[str, Block]:
+    """Return the blocks of one step: remainder at the start, half step, remainder there, end."""
     half = multiply(real(0.5), Ref("work.h"))
     middle = Assign("work.s", half)
     part: Block = (RunBlock(f"series_{mode}"), middle, RunBlock("point"))
@@ -249,7 +261,7 @@ def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> 
 def _taylor_series(
     field: VectorField, mode: str, context: ExponentialContext, term_count: int
 ) -> Block:
-    """d0 = A x0 + pull, d_i = A d_(i-1) / (i + 1)."""
+    """Return the operations that fill the series: d_0 = A x0 + pull, d_i = A d_(i-1) / (i + 1)."""
     a, pull = context.state_matrix(field, mode), _remainder_refs(field, mode, context)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
     order, index = Ref("work.order"), Ref("work.term")
@@ -269,7 +281,7 @@ def _taylor_series(
 def exact_method(
     field: VectorField, context: ExponentialContext, span: Span, problems: Problems
 ) -> IntegrationMethod:
-    """Return the method for a field, with a problem for each mode that is not affine."""
+    """Return the exact method for a field; a mode whose flow is not affine is reported."""
     for mode in field.automaton.modes.values():
         others = non_affine_terms(field.automaton, mode, context.point)
         if others:
@@ -283,4 +295,5 @@ def exact_method(
 def _affine_step_blocks(
     field: VectorField, mode: str, context: ExponentialContext
 ) -> Mapping[str, Block]:
+    """Return the block of one step of an affine flow: the remainder is constant over the step."""
     return {f"step_{mode}": (*lower_step_start(field, mode), *lower_step_end(field, mode, context))}

@@ -1,4 +1,4 @@
-"""Integration: the method of a field by its name, with the limits of its step (rule 17d)."""
+"""Selection of the integration method of a field by name, with its stability limits (rule 17d)."""
 
 from __future__ import annotations
 
@@ -31,14 +31,19 @@ RUNGE_KUTTA_METHODS: Mapping[str, Callable[[VectorField], IntegrationMethod]] = 
     "midpoint": midpoint_method,
     "rk4": rk4_method,
 }
+"""The methods without solved constants, by their name in the spec."""
 EXPONENTIAL_METHODS: Mapping[
     str, Callable[[VectorField, ExponentialContext, Span, Problems], IntegrationMethod]
 ] = {
     "exponential": exponential_method,
     "exact": exact_method,
 }
+"""The methods with solved constants, by their name in the spec."""
 MAX_CORNER_PARAMETERS = 10
-"""Tunables whose ends are all combined: 2^10 matrices per mode, a second of work."""
+"""The largest number of tunable parameters whose range ends are combined.
+
+2^10 matrices per mode take about a second.
+"""
 
 
 def build_method(
@@ -50,7 +55,12 @@ def build_method(
     span: Span,
     problems: Problems,
 ) -> tuple[IntegrationMethod, IntegrationInfo]:
-    """Return a method by name and what it is; problems where its step `step_size` [s] is too long."""
+    """Return the integration method `name` for a field, and its description for reports.
+
+    `blocks` are those of the field and `step_size` is in s. Reported are a step above the stability
+    limit of a mode, too many tunable parameters, and `exact` with an input that varies inside a
+    step.
+    """
     step = float(step_size)
     number = point.automaton.numbers
     rates = {m: round_block(blocks[f"rates_{m}"], number) for m in field.automaton.modes}
@@ -74,17 +84,18 @@ def build_method(
             check_stability(limit, name, step, span, problems)
             value = limit.eigenvalue
             limits.append(StabilityLimit(mode, limit.step, value, limit.term, limit.state))
-    made = (
+    method = (
         RUNGE_KUTTA_METHODS[name](field)
         if name in RUNGE_KUTTA_METHODS
         else EXPONENTIAL_METHODS[name](field, solved, span, problems)
     )
-    return made, IntegrationInfo(
-        name, step, made.terms, dict(made.step_norms), tuple(limits), len(field.states)
+    return method, IntegrationInfo(
+        name, step, method.terms, dict(method.step_norms), tuple(limits), len(field.states)
     )
 
 
 def _flow_formulas(field: VectorField) -> list[Formula]:
+    """Return the equations and both sides of the balances of all modes."""
     found: list[Formula] = []
     for mode in field.automaton.all_modes:
         found += mode.equations.values()
@@ -96,7 +107,11 @@ def _flow_formulas(field: VectorField) -> list[Formula]:
 def _calibration_corners(
     point: LinearisationPoint, tunables: tuple[str, ...]
 ) -> Iterator[Mapping[str, Scalar]]:
-    """Yield the constants at every combination of the ends of the ranges of some tunables."""
+    """Yield the constants at each combination of the range ends of some tunable parameters.
+
+    Parameters without a range keep their value; without any range nothing is yielded. Derived
+    parameters are recomputed.
+    """
     automaton: Automaton = point.automaton
     limits = {name: automaton.parameters[name].range for name in tunables}
     ranged = {name: limit for name, limit in limits.items() if limit}

@@ -1,8 +1,8 @@
-"""Midpoint: the explicit method of two stages (Runge 1895) with a quadratic inside the step.
+"""Explicit midpoint method of two stages (Runge 1895) with quadratic dense output.
 
 Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 (1.4) and II.6. The
-quadratic starts with the first rate and ends at the end of the step: it is of second order all
-through the step, as the method is, and needs no third rate as a cubic would.
+quadratic has the first rate at the start of the step and passes through its end. It is of second
+order throughout the step, as the method is, and needs no third rate, as a cubic would.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ from language.ir.program import Variable
 from language.model.constant_states import never_varying_states, varying_states
 
 TERMS = 2
+"""The number of terms of the polynomial."""
 
 
 def midpoint_method(field: VectorField) -> IntegrationMethod:
-    """Return the method for a field, for the states that move in each mode."""
+    """Return the midpoint method for a field; only states with a rate in a mode are integrated."""
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes:
         quadratics = _quadratic_series(varying_states(field.automaton, mode))
@@ -54,7 +55,7 @@ def midpoint_method(field: VectorField) -> IntegrationMethod:
 
 
 def _step_block(field: VectorField, mode: str) -> Block:
-    """x + h f(x + h/2 f(x))."""
+    """Return the block of one step: x + h f(x + h/2 f(x))."""
     h = Ref("work.h")
     half = multiply(real(0.5), h)
     moves = varying_states(field.automaton, mode)
@@ -77,7 +78,7 @@ def _step_block(field: VectorField, mode: str) -> Block:
 
 
 def _quadratic_series(states: Sequence[str]) -> Block:
-    """x0 + s k1 + s^2 (k2 - k1)/h."""
+    """Return the coefficients of x0 + s k1 + s^2 (k2 - k1)/h for each state."""
     ops: list[Op] = []
     for name in states:
         first, middle = Ref(f"work.first_{name}"), Ref(f"work.middle_{name}")

@@ -1,4 +1,4 @@
-"""Terms: the summands of a mode's rates, through its equations, as the user wrote them."""
+"""Summands of the rates of a mode, through its equations, as they stand in the source."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from language.text.diagnostic import SpecError
 
 @dataclass(frozen=True)
 class RateTerm:
-    """A summand of a state's rate: as written, and in states, inputs and parameters."""
+    """A summand of a state's rate: as written, and in terms of states, inputs and parameters."""
 
     source_tree: SyntaxTree
     expanded_tree: SyntaxTree
 
 
 def source_text(tree: SyntaxTree) -> str:
-    """Return the text of an expression in its file, with the brackets that its ends lack."""
+    """Return the text of an expression in its file, extended until its brackets balance."""
     span = tree.span
     line = span.source.lines[span.line - 1]
     start, end = span.column - 1, span.column - 1 + span.width
@@ -41,13 +41,19 @@ def source_text(tree: SyntaxTree) -> str:
 
 
 def rate_terms_of(mode: Mode, state: str) -> list[RateTerm]:
-    """Return the summands of a state's balance, with all equations put in. Raises SpecError."""
+    """Return the summands of a state's balance with all equations inlined.
+
+    SpecError if an inlined equation is too large.
+    """
     known = inline_equations(mode, {})
     return [RateTerm(tree, substitute_names(tree, known)) for tree in _summands(mode, state)]
 
 
 def _summands(mode: Mode, state: str) -> Iterator[SyntaxTree]:
-    """Yield the summands of a state's balance; an equation is taken apart where it is read."""
+    """Yield the summands of the right side of a balance; an equation that is a term is split.
+
+    Signs are dropped.
+    """
     stack = [mode.flow[state].right]
     while stack:
         match stack.pop():
@@ -62,7 +68,11 @@ def _summands(mode: Mode, state: str) -> Iterator[SyntaxTree]:
 
 
 def non_affine_terms(automaton: Automaton, mode: Mode, point: LinearisationPoint) -> list[str]:
-    """Return the terms that are not linear in the states with constant coefficients, as texts."""
+    """Return the source texts of the terms that are not affine in the states, without repetitions.
+
+    A term is affine if its derivative by each state depends on parameters only. A state whose
+    balance a parallel region chooses gives the text `der(<state>)`.
+    """
     found: dict[str, None] = {}
     for state in automaton.states:
         if state not in mode.flow:
@@ -77,10 +87,10 @@ def non_affine_terms(automaton: Automaton, mode: Mode, point: LinearisationPoint
 def steepest_term(
     field: VectorField, mode: Mode, row: str, column: str, parts: Mapping[str, AffineForm]
 ) -> str:
-    """Return the term of a state's rate that is steepest in another state, as it is written.
+    """Return the source text of the term of `row`'s rate with the largest slope in `column`.
 
-    `parts` is what the names of the block of rates are in the states; an empty text where no term
-    is linear with a constant coefficient, or where there are too many.
+    `parts` are the affine forms of the names that the rates read. The text is empty if the mode has
+    no balance of the state, if its equations are too large, or if no term has a constant slope.
     """
     if row not in mode.flow or exceeds_inlining_limit(mode):
         return ""
@@ -97,6 +107,7 @@ def steepest_term(
 
 
 def _is_affine(term: RateTerm, automaton: Automaton, point: LinearisationPoint) -> bool:
+    """Return whether the derivatives of a term by all states depend on parameters only."""
     parameters = point.automaton.parameters
     known = {*parameters, *automaton.inputs, *automaton.states}
     if any(read.path not in known for read in names(term.expanded_tree)):

@@ -1,4 +1,4 @@
-"""RK4: the classical Runge-Kutta method (Kutta 1901) with a cubic Hermite polynomial inside.
+"""Classical Runge-Kutta method of order 4 (Kutta 1901) with cubic Hermite dense output.
 
 Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 table 1.2 and II.6 (6.7).
 """
@@ -33,15 +33,18 @@ from language.ir.program import Variable
 from language.model.constant_states import ever_varying_states, never_varying_states, varying_states
 
 TERMS = 3
+"""The number of terms of the polynomial."""
 STAGES = (1, 2, 3, 4)
 HERMITE_BLOCK = "cubic"
+"""The block of the polynomial that all modes share."""
 
 
 def rk4_method(field: VectorField) -> IntegrationMethod:
-    """Return the method for a field, for the states that move in each mode.
+    """Return the Runge-Kutta method for a field.
 
-    Where the field `is_staged`, what all modes do alike is a block of its own: an ECU that computes
-    in software has the values of one stage on its stack, not of all.
+    In each mode only states with a rate are integrated. If `has_stage_blocks` is set, the
+    operations that all modes share are blocks of their own: an ECU that computes floating point in
+    software then has the values of one stage on its stack instead of all.
     """
     alike = ever_varying_states(field.automaton)
     blocks: dict[str, Block] = {}
@@ -67,8 +70,10 @@ def rk4_method(field: VectorField) -> IntegrationMethod:
 
 
 def _step_block(field: VectorField, states: Sequence[str], mode: str) -> Block:
-    """Move what is its `states`; stages that are alike in all modes move the rest, also what rests in
-    this one: its rate is 0, and its end is written over.
+    """Return the block of one step of `states`.
+
+    Shared stage blocks integrate the other states too. A state that is constant in this mode has
+    the rate 0 there, and its end value is overwritten.
     """
     ops: list[Op] = [*set_point_to_state(field), *set_point_time(field, real(0.0))]
     for stage in STAGES:
@@ -80,7 +85,7 @@ def _step_block(field: VectorField, states: Sequence[str], mode: str) -> Block:
 
 
 def _stage_ops(states: Sequence[str], stage: int) -> list[Op]:
-    """Keep the rates; go to where the next ones are taken, or to the end."""
+    """Return the operations of a stage: store the rates, then set the next point or the end."""
     ops: list[Op] = [Assign(f"work.k{stage}_{n}", Ref(f"work.rate_{n}")) for n in states]
     if stage == STAGES[-1]:
         return ops + [Assign(f"work.end_{name}", _end_value(name)) for name in states]
@@ -93,19 +98,20 @@ def _stage_ops(states: Sequence[str], stage: int) -> list[Op]:
 
 
 def _stage_time(stage: int) -> Expr:
-    """Return how far into the step the rates after a stage are taken."""
+    """Return the time in the step [s] at which the rates after a stage are evaluated."""
     h = Ref("work.h")
     return h if stage == STAGES[-2] else multiply(real(0.5), h)
 
 
 def _end_value(name: str) -> Expr:
-    """x + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
+    """Return x + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
     k1, k2, k3, k4 = (Ref(f"work.k{stage}_{name}") for stage in STAGES)
     inner = add(add(add(k1, multiply(real(2.0), k2)), multiply(real(2.0), k3)), k4)
     return add(Ref(f"state.{name}"), multiply(divide(Ref("work.h"), real(6.0)), inner))
 
 
 def _series_block(field: VectorField, states: Sequence[str], mode: str) -> Block:
+    """Return the operations that evaluate the rates at the end and fill the series."""
     return (
         *(Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states),
         *set_point_time(field, Ref("work.h")),
@@ -116,7 +122,10 @@ def _series_block(field: VectorField, states: Sequence[str], mode: str) -> Block
 
 
 def _hermite_series(states: Sequence[str]) -> list[Op]:
-    """The cubic through both ends with the rates f0 = k1 at the start and f1 at the end."""
+    """Return the coefficients of the cubic through both ends with the rates there.
+
+    The rates are f0 = k1 at the start and f1 at the end of the step.
+    """
     h = Ref("work.h")
     ops: list[Op] = []
     for name in states:

@@ -1,7 +1,8 @@
-"""Stability: the largest step with which a method lets the decaying parts of a flow decay.
+"""Stability limits: the largest step with which a method damps each decaying mode of a flow.
 
-A method makes x R(h lambda) of a part that decays as e^(lambda t): that must not grow. Hairer and
-Wanner, Solving Ordinary Differential Equations II, IV.2. Growing and undamped parts set no limit.
+A method multiplies a component e^(lambda t) by R(h lambda) in each step; |R| must not exceed 1
+(Hairer and Wanner, Solving Ordinary Differential Equations II, IV.2). Growing and undamped
+components set no limit.
 """
 
 from __future__ import annotations
@@ -23,23 +24,24 @@ STABILITY_FUNCTIONS: Mapping[str, Callable[[complex], complex]] = {
     "midpoint": lambda z: 1 + z + z * z / 2,
     "rk4": lambda z: 1 + z + z * z / 2 + z * z * z / 6 + z * z * z * z / 24,
 }
-"""R(z) of each method: the first terms of e^z."""
+"""The stability function R(z) of each explicit method: the first terms of e^z."""
 MIN_DAMPING_RATIO = 1e-6
-"""Damping ratio below which a part counts as undamped: an eigenvalue has rounding errors."""
+"""The damping ratio below which a component is undamped; eigenvalues have rounding errors."""
 RAY_STEP = 1.0 / 64
-"""Step of the walk along the ray h lambda: no method here has a region narrower than that."""
+"""The step of the search along the ray h lambda; no stability region here is narrower."""
 MAX_RADIUS = 8.0
-"""|h lambda| beyond which none of these methods is stable."""
+"""The |h lambda| beyond which none of these methods is stable."""
 RADIUS_BISECTIONS = 50
+"""The number of bisections of the boundary of the stability region."""
 MAX_COUPLED_STATES = 64
-"""States that act on each other whose eigenvalues are found; of more no limit is told."""
+"""The largest number of coupled states whose eigenvalues are computed."""
 GROWTH_TOLERANCE = 2.0**-40
-"""Growth per step that is rounding of an eigenvalue."""
+"""The growth per step that is attributed to the rounding of an eigenvalue."""
 
 
 @dataclass(frozen=True)
 class StabilityLimit:
-    """The largest stable step [s] in a mode, the eigenvalue [1/s] and the term that set it."""
+    """The largest stable step [s] of a mode, with the eigenvalue [1/s] and the term that set it."""
 
     mode: str
     step: float
@@ -51,9 +53,10 @@ class StabilityLimit:
 def stability_limit_of(
     field: VectorField, mode: str, parts: Mapping[str, AffineForm], method: str
 ) -> StabilityLimit | None:
-    """Return the limit of a mode whose rates have these affine parts; None where there is none.
+    """Return the stability limit of a mode from the affine forms of its rates.
 
-    The states that do not act on each other in a circle have eigenvalues of their own.
+    States that are not coupled in a cycle are treated in separate groups. The result is None for an
+    exponential method, for rates that are not finite and if no component decays.
     """
     if method not in STABILITY_FUNCTIONS:
         return None
@@ -78,7 +81,7 @@ def stability_limit_of(
 
 
 def largest_stable_step(method: str, eigenvalue: complex) -> float:
-    """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' up to h."""
+    """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' from 0 to h."""
     size = abs(eigenvalue)
     turn = eigenvalue / size
     return _stability_radius(method, complex(turn.real, abs(turn.imag))) / size
@@ -86,7 +89,7 @@ def largest_stable_step(method: str, eigenvalue: complex) -> float:
 
 @cache
 def _stability_radius(method: str, direction: complex) -> float:
-    """Return how far from 0 along a direction `direction` the values of |R| stay within 1."""
+    """Return the distance from 0 along `direction` up to which |R| stays within 1."""
     growth = STABILITY_FUNCTIONS[method]
 
     def decays(z: float) -> bool:
@@ -105,7 +108,7 @@ def _stability_radius(method: str, direction: complex) -> float:
 def check_stability(
     limit: StabilityLimit, method: str, h: float, span: Span, problems: Problems
 ) -> None:
-    """Report a step h [s] above the limit."""
+    """Report a problem if the step h [s] exceeds the stability limit."""
     if h <= limit.step * (1.0 + GROWTH_TOLERANCE):
         return
     label = f"`{method}` is not stable in mode `{limit.mode}` with a step of {h:.4g} s: "

@@ -1,4 +1,4 @@
-"""Taylor: how many terms of the sum for a linear flow count, and the size of its step."""
+"""Norms of a linear step, and the number of terms of its Taylor sum (rule 17e)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from language.numerics.matrix import Matrix, abs_sum
 
 
 def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
-    """Return A h (n, n), each state in units of its range's width."""
+    """Return A h (n, n) with each state in units of the width of its range.
+
+    Every state needs a range; `h` is in s.
+    """
     widths = []
     for state in field.automaton.states.values():
         assert state.range is not None
@@ -22,24 +25,24 @@ def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
 
 
 def row_sum_norm(a: Matrix) -> float:
-    """Return the largest sum of sizes of a row."""
+    """Return the largest sum of absolute values of a row; NaN if an entry is NaN."""
     return max_or_nan(abs_sum(row) for row in a)
 
 
 def max_or_nan(values: Iterable[float]) -> float:
-    """Return the largest of sizes; NaN if one is."""
-    found = 0.0
+    """Return the largest of some nonnegative values; 0 without any, NaN if one is NaN."""
+    largest = 0.0
     for value in values:
-        found = value if not value <= found else found
-    return found
+        largest = value if not value <= largest else largest
+    return largest
 
 
 def taylor_term_count(step: Matrix, number: NumberType = "float64") -> int:
-    """Return the number of terms of a Taylor sum after which none counts, for z = A h (n, n).
+    """Return the number of terms after which no term of a Taylor sum matters, for z = A h (n, n).
 
-    The sum is that of z^k (d0 h) / (k + 1)!, and d0 h is at most |z|. From K on
-    | |z|^K 1 | |z| / (K + 1)! <= 2^-53, 2^-24 in float32: powers of sizes see what the norm does
-    not, that what turns into another quantity is gone, such as speed into angle.
+    The sum is that of z^k (d0 h) / (k + 1)!, and |d0 h| is at most |z|. From the K-th term on, |
+    |z|^K 1 | |z| / (K + 1)! <= 2^-53, or 2^-24 in float32. Powers of the matrix of absolute values
+    give a sharper bound than powers of the norm where z is nearly nilpotent.
     """
     norm, tiny = row_sum_norm(step), 2.0 ** -SIGNIFICAND_BITS[number]
     reach = [1.0 for _ in step]

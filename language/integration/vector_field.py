@@ -1,4 +1,8 @@
-"""Field: rates and guards of a continuous automaton at the point `work.at_<state>`."""
+"""The vector field of a continuous automaton: rates and guards at the point `work.at_<state>`.
+
+Integration methods evaluate the blocks `rates_<mode>`; the location of crossings and the
+micro-steps evaluate the blocks `guards_<mode>`.
+"""
 
 from __future__ import annotations
 
@@ -53,16 +57,18 @@ from language.model.region_queries import (
 )
 
 ALWAYS = Value(True)
-"""Of a transition that is taken where no other one is."""
+"""The condition of a transition that is taken if no other one is enabled."""
 
 
 @dataclass(frozen=True)
 class VectorField:
-    """A continuous automaton where it moves: on its own, or as a run inside a tick.
+    """A continuous automaton to integrate, on its own or as a run inside a tick.
 
-    `inputs` are what its inputs read; `mode` is the variable that holds its mode; `timed` says
-    whether something changes with `work.s`, the time since the start of the step; `remembered` is
-    what the guards of a mode (by its key) remember; `is_staged` is whether stages have blocks.
+    `constants` and `inputs` are the expressions of parameters and inputs. `mode_variable_name` is
+    the variable of the mode of the chart. `is_time_dependent` tells whether inputs or delayed
+    values change with `work.s`, the time since the start of the step. `guard_memory` gives the
+    conditions of `after` and of edges, by the key path of a mode. `has_stage_blocks` tells whether
+    the stages of a method are blocks that all modes share.
     """
 
     automaton: Automaton
@@ -81,7 +87,7 @@ class VectorField:
 
     @property
     def guard_slots(self) -> tuple[str, ...]:
-        """The endings of the guard variables."""
+        """The suffixes of the guard variables of all regions."""
         return tuple(all_guard_slots(self.automaton))
 
     def mode_variable_of(self, region: str) -> str:
@@ -90,7 +96,10 @@ class VectorField:
 
 
 def field_blocks(field: VectorField) -> dict[str, Block]:
-    """Return `rates_<mode>` and `guards_<mode>` of every mode."""
+    """Return the blocks `rates_<mode>` and `guards_<mode>` of each mode.
+
+    A mode of a parallel region has a `guards_<region>_<mode>` block only.
+    """
     blocks: dict[str, Block] = {}
     for region in field.automaton.regions:
         for mode in region.modes.values():
@@ -104,7 +113,7 @@ def field_blocks(field: VectorField) -> dict[str, Block]:
 
 
 def field_variables(field: VectorField) -> list[Variable]:
-    """Return the work variables that the blocks of a field use."""
+    """Return the `work` variables of the blocks of a vector field."""
     found = []
     for state, thing in field.automaton.states.items():
         dimension = thing.unit.dimension
@@ -121,12 +130,13 @@ def field_variables(field: VectorField) -> list[Variable]:
 
 
 def bindings_at_point(field: VectorField) -> dict[str, Expr]:
-    """Return what the names of the automaton are at the point, to be added to."""
+    """Return a new dict of the expressions of names at the point, without equations."""
     return dict(_bindings_at_point(field))
 
 
 @cache_on_owner
 def _bindings_at_point(field: VectorField) -> dict[str, Expr]:
+    """Return the cached expressions of names at the point, without equations."""
     known: dict[str, Expr] = dict(field.constants)
     known.update(field.inputs)
     known.update({name: Ref(f"work.at_{name}") for name in field.states})
@@ -136,24 +146,24 @@ def _bindings_at_point(field: VectorField) -> dict[str, Expr]:
 
 @cache_on_owner
 def all_bindings_at_point(field: VectorField) -> dict[str, Expr]:
-    """Return what the names of the automaton are at the point, all equations among them."""
+    """Return the expressions of names at the point, equations included."""
     known = bindings_at_point(field)
     known.update(equation_bindings(field.automaton, "work.at_"))
     return known
 
 
 def set_point_to_state(field: VectorField) -> list[Op]:
-    """Return the operations that put the point where the states are."""
+    """Return the assignments that set the point to the present states."""
     return [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in field.states]
 
 
 def set_point_time(field: VectorField, time: Expr) -> list[Op]:
-    """Return the operations that put the inputs where they are at a time of the step [s]."""
+    """Return the assignment of a time since the start of the step [s]; none if nothing reads it."""
     return [Assign("work.s", time)] if field.is_time_dependent else []
 
 
 def run_block_by_mode(field: VectorField, block_prefix: str) -> Switch:
-    """Return the choice of the block `<verb>_<mode>` of the mode that the field is in."""
+    """Return a Switch over the mode of the chart that runs `<block_prefix>_<mode>`."""
     modes = field.automaton.modes.values()
     return Switch(
         field.mode_variable_name,
@@ -164,7 +174,11 @@ def run_block_by_mode(field: VectorField, block_prefix: str) -> Switch:
 def any_guard_condition(
     field: VectorField, mode: Mode, armed: Mapping[str, str] | None = None
 ) -> Expr:
-    """Return whether a guard of the mode is true (it or an edge's level is not as when armed)."""
+    """Return the condition that a guard of a mode is true, or has changed if `armed` is given.
+
+    `armed` maps guard slots to the variables of their earlier truth. A level of an edge that has
+    changed counts as well.
+    """
     result: Expr = Value(False)
     for k, watched in enumerate(guard_slots(mode)):
         guard: Expr = Ref(f"work.guard_{watched}")
@@ -179,7 +193,10 @@ def any_guard_condition(
 def select_by_priority(
     mode: Mode, enabled: Mapping[int, Expr], effects: Mapping[int, Block]
 ) -> Block:
-    """Return the choice of one transition: the enabled one with the smallest priority."""
+    """Return the operations of the enabled transition with the smallest priority (rule 3a).
+
+    `enabled` and `effects` map the index of a transition to its condition and its operations.
+    """
     ops: Block = ()
     for k, _ in reversed(transitions_by_priority(mode)):
         ops = effects[k] if enabled[k] == ALWAYS else (Branch(enabled[k], effects[k], ops),)
@@ -187,7 +204,7 @@ def select_by_priority(
 
 
 def lower_reset_stages(field: VectorField, transition: Transition) -> tuple[list[Op], list[Op]]:
-    """Return a transition's resets: what reads the values before, then what commits."""
+    """Return the two halves of a transition's reset: evaluation, then storage (rule 5)."""
     automaton, known = field.automaton, all_bindings_at_point(field)
     return read_stage(automaton, transition.reset, known), commit_stage(automaton, transition.reset)
 
@@ -195,7 +212,10 @@ def lower_reset_stages(field: VectorField, transition: Transition) -> tuple[list
 def lower_single_region_step(
     field: VectorField, mode: Mode, enabled: Mapping[int, Expr], extra_effects: Mapping[int, Block]
 ) -> Block:
-    """Return one micro-step of an automaton that has no region beside the chart."""
+    """Return one micro-step of an automaton without parallel regions.
+
+    `extra_effects` are operations to append to those of a transition, by its index.
+    """
     fire = {
         k: (
             *lower_transition_actions(field, transition),
@@ -208,7 +228,10 @@ def lower_single_region_step(
 
 
 def lower_transition_actions(field: VectorField, transition: Transition) -> list[Op]:
-    """Return exit, reset and entry (rule 6) of a transition that nothing else fires beside."""
+    """Return exit, reset and entry of a transition if no parallel region fires with it (rule 6).
+
+    A reset of one state without exit and entry is stored without a `work` variable.
+    """
     source, target = (
         field.automaton.source_mode(transition),
         field.automaton.target_mode(transition),
@@ -230,7 +253,10 @@ def lower_transition_actions(field: VectorField, transition: Transition) -> list
 def lower_entry_at_point(
     field: VectorField, target: Mode, assignments: Mapping[str, Formula]
 ) -> list[Op]:
-    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    """Return the entry actions of `target` after the reset; none without assignments.
+
+    The point is set to the states, and the equations that the entry reads are evaluated.
+    """
     if not assignments:
         return []
     known = bindings_at_point(field)
@@ -240,12 +266,16 @@ def lower_entry_at_point(
 
 
 def set_target_mode(field: VectorField, transition: Transition) -> Assign:
-    """Return the operation that makes a transition's target the mode of its region."""
+    """Return the assignment that makes the target of a transition the mode of its region."""
     number = field.automaton.target_mode(transition).number
     return Assign(field.mode_variable_of(transition.region), integer(number))
 
 
 def _lower_rates(field: VectorField, mode: Mode) -> Block:
+    """Return the block that evaluates `work.rate_<state>` of all states in a mode.
+
+    A balance of a parallel region is chosen by the mode of that region.
+    """
     known = bindings_at_point(field)
     wanted = names_read(
         tree for balance in possible_balances(mode) for tree in (balance.right, balance.left)
@@ -268,7 +298,10 @@ def _lower_rates(field: VectorField, mode: Mode) -> Block:
 
 
 def _lower_guards(field: VectorField, mode: Mode) -> Block:
-    """The guards of a mode of the chart, then those of the modes beside it, on its equations."""
+    """Return the block of the guards of a mode of the chart and of its parallel regions.
+
+    The equations that guards, exits and resets read are evaluated first.
+    """
     known = bindings_at_point(field)
     trees = [transition.when.tree for transition in watched_transitions(mode)]
     for active in (mode, *(m for region in mode.parallel_regions for m in region.modes.values())):
@@ -285,7 +318,10 @@ def _lower_guards(field: VectorField, mode: Mode) -> Block:
 
 
 def _lower_own_guards(field: VectorField, mode: Mode, slot_count: int) -> list[Op]:
-    """Return what sets the guards of a mode, and those up to `slot_count` to false."""
+    """Return the operations that set the guards of a mode.
+
+    Unused slots up to `slot_count` become false.
+    """
     known = ChainMap(dict(field.guard_memory.get(mode.key, {})), all_bindings_at_point(field))
     ops = set_levels(field.automaton, mode, known)
     for k, transition in enumerate(mode.transitions):

@@ -46,7 +46,7 @@ def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
 
 
 def may_complete(chart: Chart, node: ChartNode) -> bool:
-    """Return whether a node can become complete: it has a final mode, in each region if parallel."""
+    """Return whether a node has a final mode, in each of its regions if it is parallel."""
     if node.kind == "parallel":
         return all(may_complete(chart, region) for region in chart.child_regions(node))
     if node.kind == "atomic":

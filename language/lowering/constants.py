@@ -91,7 +91,10 @@ def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
 
 
 def derive_block(automaton: Automaton) -> Block:
-    """Return the assignments of the parameters that depend on tunable ones, in order of dependence."""
+    """Return the assignments of the parameters that depend on tunable parameters.
+
+    Each comes after those that it reads.
+    """
     known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
     ops = []

@@ -60,7 +60,10 @@ IS_DELAY_FILLED = Ref("memory.kept")
 
 @dataclass(frozen=True)
 class SampledDelay:
-    """The value of a call some ticks ago; `previous` has 1 tick, a delay of 0 ticks has no buffer."""
+    """The value of a call some ticks ago.
+
+    `previous` has 1 tick; a delay of 0 ticks has no buffer.
+    """
 
     number: int
     call: FunctionCall
@@ -151,7 +154,10 @@ def evaluate_ticks(automaton: Automaton, time: SyntaxTree) -> int:
 
 
 def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
-    """Return the `previous` and `delay` calls of an automaton, numbered from 1; inner calls first."""
+    """Return the `previous` and `delay` calls of an automaton, numbered from 1.
+
+    A call inside another one comes first.
+    """
     found: list[SampledDelay] = []
     for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
         ticks = evaluate_ticks(automaton, tree.arguments[1]) if tree.function == "delay" else 1

@@ -72,7 +72,7 @@ class Rollback:
 
     @property
     def block_suffix(self) -> str:
-        """The suffix of its blocks: mode and index of the transition, since names may contain `_`."""
+        """The suffix of its blocks: the mode and the index of the transition."""
         return f"{self.source.name}_{self.source.transitions.index(self.transition)}"
 
     @property

@@ -73,7 +73,7 @@ def _lower_table(automaton: Automaton, table: TruthTable, known: NameBindings) -
 def _lower_row(
     automaton: Automaton, table: TruthTable, row: TruthRow, known: NameBindings
 ) -> Block:
-    """Return the assignments of the results of a row; unassigned variables get their present value."""
+    """Return the assignments of the results of a row; the others keep their present value."""
     unchanged = [
         Assign(f"work.{STAGE_NAME}_{name}", known[name])
         for name in table.assigned_names

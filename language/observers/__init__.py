@@ -1,1 +1,1 @@
-"""Lowering of observers: Kalman filters with steady or recursive gain."""
+"""Lowering of observers: Kalman filters with a steady or a recursive gain."""

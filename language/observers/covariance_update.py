@@ -1,7 +1,7 @@
-"""Covariance: P of a recursive observer as operations - over a period, at a measurement, bounded.
+"""Operations on the covariance P of a recursive observer: prediction, correction and limits.
 
-P is stored once per pair of states (`memory.P_<row>__<column>`), so it is symmetric whatever the
-rounding.
+P is stored once per pair of states, as `memory.P_<row>__<column>`, so rounding cannot make it
+asymmetric.
 """
 
 from __future__ import annotations
@@ -41,14 +41,16 @@ from language.observers.steady_kalman import SolvedNames
 from language.text.diagnostic import Problems
 
 COVARIANCE_RANGE = "covariance_range"
+"""The fault bit of a covariance that leaves its limits."""
 StateNames = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class PredictionMatrices:
-    """The numbers of one prediction: Phi, Qd of constant densities, N_<state> per unit of others.
+    """The matrices of a prediction: Phi, Qd, and N_<state> for each density that is not constant.
 
-    `tag` opens the names of its solved constants; A (n, n) [unit_i/(unit_j s)].
+    `name_prefix` opens the names of the solved constants. `a` is A (n, n) [unit_i/(unit_j s)]. Qd
+    is the noise of the constant densities, N_<state> that of a unit density of one state.
     """
 
     name_prefix: str
@@ -81,19 +83,19 @@ def covariance_variables(automaton: Automaton) -> list[Variable]:
 
 
 def covariance_entry(row: str, column: str) -> str:
-    """Return the variable of a covariance; the row stands before the column among the states."""
+    """Return the variable of a covariance; `row` must not come after `column` among the states."""
     return f"memory.P_{row}__{column}"
 
 
 def state_pairs(states: StateNames) -> Iterator[tuple[str, str]]:
-    """Yield the pairs of states whose covariance is stored."""
+    """Yield the pairs (row, column) of the upper triangle, whose covariances are stored."""
     for i, row in enumerate(states):
         for column in states[i:]:
             yield row, column
 
 
 def covariance_rows_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
-    """T = Phi P, of P = Phi P Phi' + Qd over a period."""
+    """Return the operations T = Phi P, the first half of P = Phi P Phi' + Qd."""
     states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
     for row in states:
@@ -105,7 +107,7 @@ def covariance_rows_block(solved: SolvedNames, prediction: PredictionMatrices) -
 
 
 def covariance_columns_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
-    """P = T Phi' + Qd; `work.density_<state>` are the varying densities."""
+    """Return the operations P = T Phi' + Qd, with `work.density_<state>` for varying densities."""
     states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
     for row, column in state_pairs(states):
@@ -119,9 +121,11 @@ def covariance_columns_block(solved: SolvedNames, prediction: PredictionMatrices
 def correct_by_measurement(
     automaton: Automaton, solved: SolvedNames, c: Matrix, measure: str, residual: Expr
 ) -> Block:
-    """Correct states and P by one measurement; `residual` is what it differs from its expectation.
+    """Return the operations that correct states and P by one measurement.
 
-    The spread c P c' + r is at least r: where rounding takes it below, it is r.
+    `residual` is the measured minus the expected value, `c` is C (measures, states). The innovation
+    variance is s = max(c P c' + r, r), since rounding may bring the sum below r; k = P c'/s; x + k
+    residual; P - k c P (Bierman 1977, section II.6).
     """
     states = solved.observer.states
     variance = Ref(f"solved.{solved.mode}_R.{measure}")
@@ -146,8 +150,9 @@ def correct_by_measurement(
 def covariance_limit_blocks(
     automaton: Automaton, mode: Mode, values: Mapping[str, Scalar], problems: Problems
 ) -> dict[str, Block]:
-    """Return what keeps P within its limits at the end of a tick, or nothing: one block of all
-    modes that have the same limits.
+    """Return the block that limits P at the end of a tick; empty if the observer has no limits.
+
+    Modes with the same limits share one block, named after the first of them.
     """
     observer = mode.observer
     assert observer
@@ -162,7 +167,7 @@ def covariance_limit_blocks(
 
 
 def _limit_forms(observer: Observer) -> dict[str, object]:
-    """Return the limits of variances as they are written."""
+    """Return the variance limits of an observer as comparable keys, by state."""
     return {
         n: (structural_key(low.tree), structural_key(high.tree))
         for n, (low, high) in observer.variance_limits.items()
@@ -172,13 +177,16 @@ def _limit_forms(observer: Observer) -> dict[str, object]:
 def variance_limits(
     automaton: Automaton, observer: Observer, values: Mapping[str, Scalar], problems: Problems
 ) -> dict[str, tuple[float, float]]:
-    """Return the limits that an observer gives variances; report those that leave none."""
+    """Return the variance limits (low, high) of an observer, by state.
+
+    A limit that reads a tunable parameter, or a pair without 0 <= low < high, is reported.
+    """
     found = {}
     for name, pair in observer.variance_limits.items():
         if tunables_of(automaton, pair):
             label = "the limits of a variance are made of fixed values"
             problems.error("observer", pair[0].span, label)
-        low, high = (evaluate_constant(one, automaton, values, "a limit") for one in pair)
+        low, high = (evaluate_constant(limit, automaton, values, "a limit") for limit in pair)
         if not 0.0 <= low < high:
             label = f"the variance of `{name}` is kept from {low:g} to {high:g}"
             problems.error("observer", pair[0].span, label, "`[low, high]` with 0 <= low < high")
@@ -187,7 +195,10 @@ def variance_limits(
 
 
 def limit_covariance(states: StateNames, limits: Mapping[str, tuple[float, float]]) -> Block:
-    """Keep variances within limits, covariances within what these allow; else set a fault bit."""
+    """Return the operations that clip variances to their limits and set a fault bit if they do.
+
+    A covariance is clipped to +-sqrt(high_i high_j). States without limits are left out.
+    """
     ops: list[Op] = []
     for row, column in state_pairs(states):
         if row not in limits or column not in limits:
@@ -204,6 +215,7 @@ def limit_covariance(states: StateNames, limits: Mapping[str, tuple[float, float
 
 
 def _symmetric_entry(states: StateNames, row: str, column: str) -> Ref:
+    """Return the variable of P[row, column] in either order of the two states."""
     i, j = states.index(row), states.index(column)
     return Ref(covariance_entry(row, column) if i <= j else covariance_entry(column, row))
 
@@ -211,6 +223,7 @@ def _symmetric_entry(states: StateNames, row: str, column: str) -> Ref:
 def _process_noise_terms(
     solved: SolvedNames, prediction: PredictionMatrices, row: str, column: str
 ) -> list[Expr]:
+    """Return the terms of entry (row, column) of the process noise of a period."""
     states = solved.observer.states
     i, j = states.index(row), states.index(column)
     parts: list[Expr] = []

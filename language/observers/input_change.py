@@ -1,10 +1,10 @@
-"""Instant: what a change of an input at an unknown instant does to the states of an observer.
+"""Correction of an observer for an input that changes at an unknown instant within a tick.
 
-An input that is sampled took its new value at some instant of the time t before, each as likely
-as another. A change by d that was s ago has moved the states by d g(s), with dg/ds = A g + b,
-g(0) = 0; so the prediction, made with the value of before, gets the mean of d g over s in [0, t],
-and P its covariance. Both are solved: of z = (g, 1), whose flow is linear, the integral of z z' is
-the integral of Van Loan 1978 with Q = z(0) z(0)'.
+A sampled input took its new value at an instant of the last t seconds that is uniformly
+distributed. A change by d that was s seconds ago has moved the states by d g(s), with dg/ds = A g +
+b, g(0) = 0. The prediction, which used the previous value, is therefore corrected by the mean of d
+g over s in [0, t], and P by its covariance. Both are solved numbers: z = (g, 1) has a linear flow,
+so the integral of z z' is that of Van Loan 1978 with Q = z(0) z(0)'.
 """
 
 from __future__ import annotations
@@ -39,10 +39,11 @@ from language.observers.steady_kalman import SolvedNames, solved_formulas
 from language.text.diagnostic import Problems
 
 CHANGE_VARIABLE = "work.change_{}"
+"""The variable of the change of an input, as a format."""
 
 
 def input_change_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the inputs whose instants are not known."""
+    """Return the variables of the inputs that change at unknown instants, each once."""
     modes = automaton.modes.values()
     observed = [mode.observer for mode in modes if mode.observer]
     named = dict.fromkeys(name for observer in observed for name in observer.unknown_instant)
@@ -77,9 +78,9 @@ def input_change_matrices(
 
 
 def change_moments(a: Matrix, b: Matrix, time: float) -> tuple[Matrix, Matrix]:
-    """Return mean (n, 1) and covariance (n, n) of g(s), dg/ds = A g + b, g(0) = 0, s in [0, time].
+    """Return mean (n, 1) and covariance (n, n) of g(s) with s uniform in [0, time].
 
-    A (n, n) [unit_i/(unit_j s)], b (n, 1) [unit_i/(unit_u s)], time [s].
+    dg/ds = A g + b, g(0) = 0. A (n, n) [unit_i/(unit_j s)], b (n, 1) [unit_i/(unit_u s)], time [s].
     """
     n = len(a)
     flow = (*((*a[i], b[i][0]) for i in range(n)), (0.0,) * (n + 1))
@@ -99,9 +100,9 @@ def correct_input_change(
     values: Mapping[str, Scalar],
     problems: Problems,
 ) -> tuple[Block, tuple[Constant, ...]]:
-    """Return what moves the states and P where an input of now differs from that of before.
+    """Return the operations that correct states and P for changed inputs, and their constants.
 
-    `known` are the names of before and of now; with it come the constants that it reads.
+    `known` are the bindings of the previous and of the present tick.
     """
     numbers = input_change_matrices(automaton, values, solved.observer, problems)
     ops: list[Op] = []
@@ -119,7 +120,7 @@ def correct_input_change(
 def _solved_constants(
     automaton: Automaton, solved: SolvedNames, matrices: Mapping[str, Matrix]
 ) -> tuple[Constant, ...]:
-    """Return the entries of both that are not 0."""
+    """Return the nonzero entries of the matrices M and V as solved constants."""
     found, states = [], solved.observer.states
     depends_on = tunables_of(automaton, solved_formulas(solved.observer))
     for letter, matrix in matrices.items():
@@ -135,6 +136,7 @@ def _solved_constants(
 def _apply_change(
     automaton: Automaton, solved: SolvedNames, matrices: Mapping[str, Matrix], name: str
 ) -> Block:
+    """Return x + M d and P + V d^2 for the change d of one input, without zero entries."""
     states, change = solved.observer.states, Ref(CHANGE_VARIABLE.format(name))
     ops: list[Op] = []
     for row, (mean,) in zip(states, matrices[f"M_{name}"], strict=True):

@@ -1,4 +1,4 @@
-"""Entries: the matrices of an observer in numbers, from the formulas of their entries."""
+"""Numeric matrices of an observer, from the formulas of their entries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ def numeric_matrix(
     columns: tuple[str, ...],
     what: str,
 ) -> Matrix:
-    """Return a matrix of formulas in numbers, by row and column name."""
+    """Return the matrix (rows, columns) of the values of formulas by row and column name.
+
+    A missing entry is 0. `what` names the matrix in messages. SpecError if a formula reads anything
+    but parameters or is not finite.
+    """
 
     def value(row: str, column: str) -> float:
         formula = entries.get(row, {}).get(column)
@@ -34,13 +38,16 @@ def numeric_diagonal(
     entries: Mapping[str, Formula],
     names: tuple[str, ...],
 ) -> Matrix:
-    """Return a diagonal matrix of formulas in numbers."""
+    """Return the diagonal matrix (names, names) of the values of formulas by name."""
     rows = {name: {name: formula} for name, formula in entries.items()}
     return numeric_matrix(automaton, values, rows, names, names, "noise")
 
 
 def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
-    """Return C (measures, states)."""
+    """Return C (measures, states).
+
+    Without formulas, each row has a 1 at the state that it measures.
+    """
     measures = tuple(observer.measures)
     if observer.c:
         return numeric_matrix(automaton, values, observer.c, measures, observer.states, "C")

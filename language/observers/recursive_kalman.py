@@ -1,9 +1,10 @@
-"""Recursive: a Kalman filter that carries its covariance, corrected by one measurement at a time.
+"""Recursive Kalman filter: P is part of the state, and measurements are processed one by one.
 
-Prediction P = Phi P Phi' + Qd; for each measurement y = c x + v of variance r: s = c P c' + r,
-k = P c' / s, x + k (y - c x), P - k c P (Bierman 1977, Factorization Methods for Discrete
-Sequential Estimation, section II.6). P is stored once per pair, so it is symmetric whatever the
-rounding. Qd is linear in the spectral densities: a density that is not constant is read each tick.
+Prediction P = Phi P Phi' + Qd. For each measurement y = c x + v of variance r: s = c P c' + r, k =
+P c'/s, x + k (y - c x), P - k c P (Bierman 1977, Factorization Methods for Discrete Sequential
+Estimation, section II.6). P is stored once per pair of states, so rounding cannot make it
+asymmetric. Qd is linear in the spectral densities; a density that is not constant is evaluated each
+tick.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ from language.text.diagnostic import Problems
 
 
 def is_time_varying(automaton: Automaton, formula: Formula) -> bool:
-    """Tell whether a density reads inputs, states or what they were."""
+    """Return whether a spectral density reads more than parameters, or a previous value."""
     memory = any(isinstance(part, FunctionCall) and part.function == "previous"
                  for part in walk(formula.tree))  # fmt: skip
     reads = {read.path for read in names_of(formula.tree)}
@@ -72,7 +73,7 @@ def is_time_varying(automaton: Automaton, formula: Formula) -> bool:
 
 
 def density_at_rest(formula: Formula, automaton: Automaton, values: Mapping[str, Scalar]) -> float:
-    """Return a density while all inputs and states are 0."""
+    """Return the value of a spectral density while all inputs and states are 0."""
     known: dict[str, Expr] = {n: real(0.0) for n in (*automaton.inputs, *automaton.states)}
     known.update(constant_bindings(automaton))
     for part in walk(formula.tree):
@@ -89,7 +90,11 @@ def lower_recursive_observer(
     values: Mapping[str, Scalar],
     problems: Problems,
 ) -> LoweredObserver | None:
-    """Return the observer of a mode; None where its numbers cannot be computed (reported)."""
+    """Return the observer of a mode; None if its matrices cannot be computed, which is reported.
+
+    `before` are the bindings during the prediction, `now` those during the correction, `values` the
+    values of the constants.
+    """
     assert mode.observer and automaton.period is not None
     with problems.collect_errors():
         try:
@@ -102,7 +107,7 @@ def lower_recursive_observer(
 
 
 class _RecursiveObserverBuilder:
-    """Builds the operations and numbers of one mode's observer."""
+    """Builder of the operations and constants of the observer of one mode."""
 
     def __init__(
         self,
@@ -122,6 +127,7 @@ class _RecursiveObserverBuilder:
         self.depends_on: tuple[str, ...] = ()
 
     def build(self) -> LoweredObserver | None:
+        """Return the lowered observer; None if the derivation of its matrices was reported."""
         written = self.mode.observer
         assert written
         if written.predicts_by_run and self.mode.run:
@@ -161,7 +167,7 @@ class _RecursiveObserverBuilder:
         )
 
     def _check_same_states(self) -> None:
-        """The covariance belongs to the automaton, as its states do."""
+        """Report an observer whose states differ from those of the first one: they share P."""
         observers = (mode.observer for mode in self.automaton.modes.values())
         first = next(o for o in observers if o and o.gain == "recursive")
         if self.states != first.states:
@@ -170,7 +176,7 @@ class _RecursiveObserverBuilder:
             self.problems.error("observer", self.mode.observer.span, label)
 
     def _prediction_matrices(self, observer: Observer, tag: str) -> PredictionMatrices:
-        """Return the numbers of a prediction by the matrix of an observer."""
+        """Return Phi, Qd and N_<state> of an observer over a period; `tag` opens the names."""
         states, h = self.states, self.period
         a = numeric_matrix(self.automaton, self.values, observer.a, states, states, "A")
         fixed = {n: f for n, f in observer.process_noise.items() if n not in self.varying_densities}
@@ -186,6 +192,7 @@ class _RecursiveObserverBuilder:
     def _solved_constants(
         self, observer: Observer, prediction: PredictionMatrices, c: Matrix, r: Matrix
     ) -> tuple[Constant, ...]:
+        """Return the constants of a prediction, of C and of the measurement variances R."""
         measured = {"C": c} if c else {}
         found = SolvedNames(prediction.name_prefix, observer).nonzero_constants(
             {**prediction.matrices, **measured}, self.depends_on
@@ -237,6 +244,7 @@ class _RecursiveObserverBuilder:
     def _predict_mean(
         self, observer: Observer, prediction: PredictionMatrices
     ) -> tuple[Block, tuple[Constant, ...]]:
+        """Return the prediction of the states by Phi and the inputs, with its constants."""
         states = self.states
         b = numeric_matrix(self.automaton, self.values, observer.b, states, observer.inputs, "B")
         held = expm_integral(prediction.a, self.period)
@@ -253,7 +261,11 @@ class _RecursiveObserverBuilder:
     def _predict_by_run(
         self, written: Observer
     ) -> tuple[Block, tuple[Constant, ...], Mapping[str, Block]]:
-        """The covariance by the mode in which the run begins the period; the states by the run."""
+        """Return the prediction by a run, its constants and its blocks.
+
+        P is predicted by the mode of the model in which the run begins the period, the states by
+        the run.
+        """
         run, model = self.mode.run, self.automaton.model
         assert run and model
         modes = model.modes.values() if run.follow else [model.modes[run.mode]]
@@ -288,7 +300,7 @@ class _RecursiveObserverBuilder:
         return predict, constants, spreads
 
     def _choose_by_run_mode(self, run: ModelRun, cases: list[tuple[int, Block]]) -> Block:
-        """The block of the mode in which the model is; a run that keeps its flow has one."""
+        """Return the block of the model's mode; a run without `follow` has only one."""
         if run.follow and cases:
             return (Switch("memory.run_mode", tuple(cases)),)
         return cases[0][1] if cases else ()
@@ -306,7 +318,7 @@ class _RecursiveObserverBuilder:
     def _covariance_blocks(
         self, observer: Observer, prediction: PredictionMatrices
     ) -> dict[str, Block]:
-        """The densities of now, then the covariance over the period: its rows, its columns."""
+        """Return the blocks of the prediction of P: densities, then its rows, then its columns."""
         ops: list[Op] = []
         for name, formula in self.varying_densities.items():
             key = f"{self.automaton.name} {formula.key}"
@@ -321,7 +333,7 @@ class _RecursiveObserverBuilder:
         }
 
     def _correct_block(self, observer: Observer, c: Matrix) -> Block:
-        """Innovations against the prediction, then one measurement at a time in their order."""
+        """Return the innovations against the prediction, then the corrections in their order."""
         solved = SolvedNames(self.mode.name, observer)
         more = {name: Ref(f"solved.{name}") for name in observer.constants}
         known = {**self.now, **more}
@@ -340,6 +352,7 @@ class _RecursiveObserverBuilder:
     def _expected_measurement(
         self, observer: Observer, solved: SolvedNames, c: Matrix, name: str, known: NameBindings
     ) -> Expr:
+        """Return the expected value of a measurement: its row of C times x, plus g."""
         state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in self.states}
         parts = solved.row_products("C", c, name, state)
         if name in observer.g:

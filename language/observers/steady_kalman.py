@@ -1,8 +1,8 @@
-"""Kalman: a steady observer as operations - prediction over a period, correction by a gain.
+"""Steady Kalman filter: prediction over a period and correction by a constant gain.
 
-x(k|k-1) = Phi x(k-1) + G (B u(k-1) + f), x(k) = x(k|k-1) + L (y(k) - C x(k|k-1)); Phi = e^(A T),
-G its integral, L from the discrete Riccati equation with Van Loan's noise covariance
-(Grewal and Andrews 2001, section 4.2; Van Loan 1978).
+x(k|k-1) = Phi x(k-1) + G (B u(k-1) + f), x(k) = x(k|k-1) + L (y(k) - C x(k|k-1) - g). Phi = e^(A
+T), G is its integral over the period, and L solves the discrete Riccati equation with the noise
+covariance of Van Loan (Grewal and Andrews 2001, section 4.2; Van Loan 1978).
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ from language.text.diagnostic import Problems
 
 @dataclass(frozen=True)
 class LoweredObserver:
-    """The operations and numbers of one mode's observer.
+    """The operations and constants of the observer of one mode.
 
-    `start` sets its covariance at the first tick, `enter` when its mode is entered; `spreads` are
-    blocks that `predict` runs: its covariance over the period.
+    `initial_covariance` sets P at the first tick, `entry_covariance` on entry of the mode.
+    `covariance_blocks` are blocks that `predict` and `correct` run.
     """
 
     predict: Block
@@ -66,10 +66,10 @@ def lower_steady_observer(
     values: Mapping[str, Scalar],
     problems: Problems,
 ) -> LoweredObserver | None:
-    """Return the observer of a mode; None where its numbers cannot be computed (reported).
+    """Return the observer of a mode; None if its matrices cannot be computed, which is reported.
 
-    `before` says what names are during the prediction: states now, inputs of the tick before;
-    `now` what they are during the correction.
+    `before` are the bindings during the prediction: present states, inputs of the previous tick.
+    `now` are those during the correction. `values` are the values of the constants.
     """
     assert mode.observer and automaton.period is not None
     observer = derive_observer_matrices(automaton, mode.name, mode.observer, values, problems)
@@ -94,16 +94,16 @@ def lower_steady_observer(
         numbers = {"Phi": phi, "Gamma": gamma, "G": held, "L": gain, "C": c}
         own = {name: Ref(f"solved.{name}") for name in observer.constants}
         known = ({**before, **own}, {**now, **own})
-        built = _assemble_observer(automaton, mode, observer, known, numbers, (a, b, c, q, r))
+        lowered = _assemble_observer(automaton, mode, observer, known, numbers, (a, b, c, q, r))
         more = offset_constants(automaton, observer, values)
-        return dataclasses.replace(built, constants=(*built.constants, *more))
+        return dataclasses.replace(lowered, constants=(*lowered.constants, *more))
     return None
 
 
 def offset_constants(
     automaton: Automaton, observer: Observer, values: Mapping[str, Scalar]
 ) -> tuple[Constant, ...]:
-    """Return the constant parts of f and g."""
+    """Return the constant parts of f and g as solved constants."""
     return tuple(
         Constant(
             f"solved.{name}",
@@ -140,6 +140,10 @@ def _assemble_observer(
     matrices: Mapping[str, Matrix],
     model_matrices: tuple[Matrix, Matrix, Matrix, Matrix, Matrix],
 ) -> LoweredObserver:
+    """Return the operations, constants and description of an observer with known matrices.
+
+    `known` are the bindings of prediction and correction; `model_matrices` are A, B, C, Q and R.
+    """
     names = SolvedNames(mode.name, observer)
     depends_on = tunables_of(automaton, solved_formulas(observer))
     constants = names.nonzero_constants(matrices, depends_on)
@@ -164,17 +168,17 @@ def _assemble_observer(
 
 @dataclass(frozen=True)
 class SolvedNames:
-    """Names of an observer's solved constants: `solved.<mode>_<letter>.<row>.<column>`."""
+    """The names of an observer's solved constants: `solved.<mode>_<letter>.<row>.<column>`."""
 
     mode: str
     observer: Observer
 
     def entry(self, letter: str, row: str, column: str) -> str:
-        """Return the name of an entry."""
+        """Return the name of an entry of a matrix."""
         return f"solved.{self.mode}_{letter}.{row}.{column}"
 
     def row_and_column_names(self, letter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the names of the rows and columns of a matrix."""
+        """Return the names of the rows and of the columns of a matrix; other letters are (n, n)."""
         states, measures = self.observer.states, tuple(self.observer.measures)
         return {
             "Phi": (states, states),
@@ -187,7 +191,10 @@ class SolvedNames:
     def nonzero_constants(
         self, matrices: Mapping[str, Matrix], depends_on: tuple[str, ...]
     ) -> tuple[Constant, ...]:
-        """Return the entries of some matrices that are not 0."""
+        """Return the nonzero entries of matrices as solved constants.
+
+        Columns of G without an offset f are left out.
+        """
         found = []
         for letter, matrix in matrices.items():
             rows, columns = self.row_and_column_names(letter)
@@ -201,7 +208,10 @@ class SolvedNames:
     def row_products(
         self, letter: str, matrix: Matrix, row: str, values: Mapping[str, Expr]
     ) -> list[Expr]:
-        """Return the products of a row with values by column; 0 is left out, 1 is no factor."""
+        """Return the products of a row of a matrix with values by column.
+
+        Zero entries and columns without a value are left out; a factor of 1 is not written.
+        """
         rows, columns = self.row_and_column_names(letter)
         if not matrix:
             return []
@@ -215,6 +225,7 @@ class SolvedNames:
 
 
 def _is_omitted(letter: str, column: str, observer: Observer) -> bool:
+    """Return whether no operation reads a column of a matrix: one of G without an offset f."""
     return letter == "G" and column not in observer.f
 
 
@@ -226,7 +237,7 @@ def predict_mean(
     before: NameBindings,
     prefix: str,
 ) -> Block:
-    """Return the prediction of the states over a period."""
+    """Return the operations that predict the states over a period and store them."""
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     held = {name: before[name] for name in observer.inputs}
     ops: list[Op] = []
@@ -253,6 +264,10 @@ def _correct_mean(
     matrices: Mapping[str, Matrix],
     now: NameBindings,
 ) -> Block:
+    """Return the operations that set the innovations and correct the states by the gain.
+
+    The innovation of a measurement without a new value is 0.
+    """
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     error: dict[str, Expr] = {name: Ref(f"innovation.{name}") for name in observer.measures}
     ops: list[Op] = []
@@ -272,7 +287,10 @@ def _correct_mean(
 
 
 def has_new_measurement(observer: Observer, measure: str) -> Expr:
-    """Return whether a tick has a new value of a measurement."""
+    """Return the condition that a tick has a new value of a measurement to correct with.
+
+    It includes the input `correct` of the observer, if that is declared.
+    """
     fresh = Ref(f"is_new.{measure}")
     if observer.correct is None:
         return fresh
@@ -280,7 +298,7 @@ def has_new_measurement(observer: Observer, measure: str) -> Expr:
 
 
 def solved_formulas(observer: Observer) -> list[Formula]:
-    """Return the formulas that the solved numbers of an observer come from."""
+    """Return the formulas that the solved numbers of an observer depend on."""
     rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
     noise = [observer.process_noise, observer.measurement_noise, observer.unknown_instant]
     return [formula for row in [*rows, *noise] for formula in row.values()]

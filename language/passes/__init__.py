@@ -1,1 +1,1 @@
-"""Passes over a Program: constant folding, common subexpressions."""
+"""Passes from Program to Program: hoisting of constants, common-subexpression elimination."""

@@ -1,7 +1,11 @@
-"""Common: a value that a block computes twice is computed once, and has a name.
+"""Common-subexpression elimination: a block computes each real expression once.
 
-Value numbering (Cocke and Schwartz 1970): equal operations on equal numbers have equal numbers; a
-variable that is written has a new one.
+    a = x * y + 1.0    ->    x_y = x * y
+    b = x * y + 2.0          a = x_y + 1.0
+                             b = x_y + 2.0
+
+Local value numbering (Cocke and Schwartz 1970): equal operations on equal numbers have equal
+numbers, and a variable that is written gets a new number.
 """
 
 from __future__ import annotations
@@ -18,11 +22,15 @@ from language.ir.traversal import block_writes, walk_ops
 from language.lowering.expressions import is_whole
 
 CHEAP_FUNCTIONS = ("real", "whole", "abs")
-"""Operations that cost no more than a name."""
+"""Functions that cost no more than reading a variable."""
 
 
 def eliminate_common_subexpressions(program: Program) -> Program:
-    """Return a Program whose blocks compute no real twice from the same values."""
+    """Return a Program whose blocks compute no real expression twice from the same values.
+
+    Expressions inside branches, loops and switches are left as they are. The new `work` variables
+    are named after their formula.
+    """
     writes = _transitive_writes(program)
     taken = {name.partition(".")[2].lower() for name in _all_names(program)}
     variables: dict[str, Variable] = {}
@@ -36,7 +44,7 @@ def eliminate_common_subexpressions(program: Program) -> Program:
 
 
 class _ValueNumbering:
-    """The operations of one block, in order; those inside others are left as they are."""
+    """Value numbering of the assignments of one block; nested operations are not rewritten."""
 
     def __init__(
         self,
@@ -57,7 +65,10 @@ class _ValueNumbering:
         self.rewritten_ops: list[Op] = []
 
     def rewrite(self) -> Block:
-        """Return the block: its values are counted, then those that are read again are named."""
+        """Return the block with repeated expressions replaced by variables.
+
+        The first traversal counts the uses of each value, the second one replaces them.
+        """
         for op in self.block:
             if isinstance(op, Assign | Store):
                 for expr in direct_expressions(op):
@@ -74,7 +85,7 @@ class _ValueNumbering:
         return tuple(self.rewritten_ops)
 
     def _invalidate_written(self, op: Op) -> None:
-        """What an operation writes, in the blocks that it runs too, is another value from here."""
+        """Start a new version of each variable that an operation writes, directly or by a block."""
         self.number_cache.clear()
         self.versions.update(set(block_writes((op,))))
         for inner in walk_ops((op,)):
@@ -82,13 +93,17 @@ class _ValueNumbering:
                 self.versions.update(self.writes[inner.block])
 
     def _value_number(self, expr: Expr) -> int:
-        """Return the number of a value; that of an expression holds for one operation."""
+        """Return the number of the value of an expression; it is cached for one operation."""
         if id(expr) not in self.number_cache:
             value = self._value_key(expr)
             self.number_cache[id(expr)] = self.numbers.setdefault(value, len(self.numbers))
         return self.number_cache[id(expr)]
 
     def _value_key(self, expr: Expr) -> Hashable:
+        """Return a key that is equal for expressions with equal values.
+
+        Comparisons, selections and unary operations get a key of their own.
+        """
         match expr:
             case Value(value):
                 return repr(value)
@@ -104,15 +119,20 @@ class _ValueNumbering:
                 return id(expr)
 
     def _count_uses(self, expr: Expr) -> None:
+        """Count the values of an expression; the parts of a repeated value are skipped."""
         if _is_worth_naming(expr):
             key = self._value_number(expr)
             self.use_counts[key] += 1
             if self.use_counts[key] > 1:
-                return  # what is inside is not computed again either
+                return  # its parts are not computed again either
         for part in operands(expr):
             self._count_uses(part)
 
     def _replace_repeated(self, expr: Expr) -> Expr:
+        """Return an expression in which values with two or more uses are variables.
+
+        The first use appends the assignment of the variable to the rewritten operations.
+        """
         key = self._value_number(expr) if _is_worth_naming(expr) else None
         if key is None or self.use_counts[key] < 2:
             return map_operands(expr, self._replace_repeated)
@@ -125,7 +145,7 @@ class _ValueNumbering:
         return Ref(self.names_by_number[key])
 
     def _choose_name(self, expr: Expr) -> str:
-        """Return a new name, or that of the same formula in another block."""
+        """Return the name of a new variable, or that of the same formula in another block."""
         about, base = format_formula(expr), formula_name(expr)
         name, number = base, 1
         while name.lower() in self.used_names:
@@ -140,18 +160,20 @@ class _ValueNumbering:
 
 
 def _is_worth_naming(expr: Expr) -> bool:
+    """Return whether an expression computes a real by arithmetic or by a costly function."""
     if isinstance(expr, Binary):
         return expr.operator in "+-*/" and not is_whole(expr)
     return isinstance(expr, Call) and expr.function not in CHEAP_FUNCTIONS
 
 
 def _all_names(program: Program) -> list[str]:
+    """Return the names of all variables and constants, and `block.<name>` of all blocks."""
     found = [v.name for v in program.variables] + [c.name for c in program.constants]
     return [*found, *(f"block.{name}" for name in program.blocks)]
 
 
 def _transitive_writes(program: Program) -> dict[str, frozenset[str]]:
-    """Return what each block writes, in the blocks that it runs too."""
+    """Return the variables that each block writes, directly or through the blocks that it runs."""
     found: dict[str, frozenset[str]] = {}
 
     def visit(name: str) -> frozenset[str]:

@@ -1,11 +1,12 @@
-"""Hoist: what does not change is computed once (decision 0001). Three passes, each a Program.
+"""Constant folding and hoisting (decision 0001): three passes, each from Program to Program.
 
-    parameters  what reads parameters alone becomes a constant, or is derived where one is tunable;
-                a division by such a value becomes a multiplication by its reciprocal
-    inputs      what reads inputs that are frozen during the flow is computed where they are latched
-    common      what a block computes twice is computed once (language/passes/common_subexpressions.py)
+    parameters    x = p * q * y    ->    x = p_q * y
+                  p_q becomes a constant, or a derived parameter if p or q is tunable
+                  x = y / p        ->    x = y * per_p
+    inputs        an expression of inputs and constants is computed in the block `latch`
+    program       common subexpressions are named (common_subexpressions.py)
 
-Both back ends run the result, so both have its bits.
+Both back ends run the resulting Program, so both have its bits.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ from language.numerics.evaluate import Scalar, evaluate
 from language.passes.common_subexpressions import CHEAP_FUNCTIONS, eliminate_common_subexpressions
 
 SMALLEST_NORMAL: Mapping[NumberType, float] = {"float64": 2.0**-1022, "float32": 2.0**-126}
-"""A reciprocal below it has lost digits: then division stays division."""
+"""The smallest normal number; a smaller reciprocal has lost digits and is not used."""
 EXCLUDED_BLOCKS = ("derive", "init", "start", "compare_stamps", "latch")
-"""Blocks that run once, or where what is hoisted is computed."""
+"""Blocks that run once, and the blocks that compute hoisted values."""
 CONSTANT_PREFIX = "constant."
 TUNABLE_PREFIXES = ("calibration.", "derived.")
 LATCHED_PREFIX = "before."
@@ -49,16 +50,20 @@ LATCH_BLOCK = "latch"
 
 
 def run_passes(program: Program) -> Program:
-    """Return a Program that computes what does not change once."""
+    """Return the Program after all passes in their order."""
     for run in PASSES.values():
         program = run(program)
     return program
 
 
 def hoist_inputs(program: Program) -> Program:
-    """Return a continuous Program that computes with its inputs where they are latched.
+    """Return a continuous Program whose expressions of inputs are computed in the block `latch`.
 
-    Nothing tunable is in it: a page turns between two latches.
+    Only inputs and fixed constants are hoisted, since the calibration page may change between two
+    latches. A sampled Program is returned unchanged.
+
+        x = before.u * k * state.y    ->    latch: before.u_k = before.u * k
+                                            x = before.u_k * state.y
     """
     if program.period is not None:
         return program
@@ -81,9 +86,10 @@ def hoist_inputs(program: Program) -> Program:
 
 
 def _recompute_if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list[Op]]:
-    """Return what looks whether inputs changed, before they are latched, and what follows from it.
+    """Return two lists: tests whether inputs change, and the recomputation of hoisted values.
 
-    A function of inputs is computed anew if one of them is another number than before.
+    The tests run before the inputs are latched. An expression that calls a costly function is
+    recomputed only at the start and after a change of an input that it reads.
     """
     whole = {
         v.name: v.type == "whole" for v in program.variables if v.name.startswith(LATCHED_PREFIX)
@@ -107,7 +113,14 @@ def _recompute_if_changed(program: Program, ops: list[Assign]) -> tuple[list[Ass
 
 
 def fold_parameters(program: Program) -> Program:
-    """Return a Program in which what follows from parameters is a constant or derived."""
+    """Return a Program in which expressions of parameters are constants or derived parameters.
+
+        x = constant.p * constant.q * state.y    ->    x = constant.p_q * state.y
+        x = calibration.p * constant.q           ->    x = derived.p_q    (block `derive`)
+        x = state.y / constant.p                 ->    x = state.y * constant.per_p
+
+    A value that is not finite is not folded, and a reciprocal below SMALLEST_NORMAL is not used.
+    """
     number = program.number_type
     values: dict[str, Scalar] = {c.name: c.value for c in program.constants if not c.items}
     real = {c.name for c in program.constants if c.type == "real" and not c.items}
@@ -145,12 +158,12 @@ def fold_parameters(program: Program) -> Program:
 
 
 def eliminate_redundancy(program: Program) -> Program:
-    """Return a Program whose blocks compute nothing twice, without constants that nothing reads."""
+    """Return a Program without common subexpressions and without unused fixed parameters."""
     return _remove_unused_constants(eliminate_common_subexpressions(program))
 
 
 def _remove_unused_constants(program: Program) -> Program:
-    """Leave out the fixed parameters that are read no more: the comment of a value has them."""
+    """Return the Program without the fixed parameters that no block reads."""
     used = {name for block in program.blocks.values() for name in block_names(block)}
     kept = tuple(
         c for c in program.constants if c.name in used or not c.name.startswith(CONSTANT_PREFIX)
@@ -159,7 +172,7 @@ def _remove_unused_constants(program: Program) -> Program:
 
 
 class _HoistedValues:
-    """What was hoisted: the expression of each new name."""
+    """The names and expressions of hoisted values."""
 
     def __init__(self, program: Program) -> None:
         names = [v.name for v in program.variables] + [c.name for c in program.constants]
@@ -169,7 +182,10 @@ class _HoistedValues:
         self.expressions: dict[str, Expr] = {}
 
     def ref_to(self, group: str, expr: Expr) -> Ref:
-        """Return what reads the value of an expression, by a name that no other has."""
+        """Return a reference to the hoisted value of an expression, with a new name if needed.
+
+        `group` is the prefix of the name. Equal expressions share one name.
+        """
         text = format_expr(expr)
         if text not in self._names:
             base = formula_name(expr)
@@ -189,10 +205,11 @@ def _replace_hoistable(
     hoist: Callable[[Expr], Expr],
     reciprocal: Callable[[Expr], Expr | None] = lambda divisor: None,
 ) -> dict[str, Block]:
-    """Return the blocks of a Program with the largest hoistable expressions changed.
+    """Return the blocks of a Program with the largest hoistable expressions replaced.
 
-    `is_hoistable_name` tells of a name whether a value that reads it can be hoisted, None if that alone is no
-    reason to; `reciprocal` gives the inverse of a divisor that can be.
+    `is_hoistable_name` returns True if a name is a reason to hoist, None if it permits hoisting,
+    False if it prevents it. `hoist` returns the replacement of an expression; `reciprocal` returns
+    the inverse of a hoistable divisor or None.
     """
 
     def visit(expr: Expr) -> tuple[Expr, bool | None]:
@@ -231,7 +248,7 @@ def _replace_hoistable(
 
 
 def _is_real_operation(expr: Expr) -> bool:
-    """Tell whether an expression computes a real: more than a sign."""
+    """Return whether an expression is arithmetic on reals; a sign alone does not count."""
     if isinstance(expr, Unary):
         return expr.operator == "-" and _is_real_operation(expr.operand)
     if isinstance(expr, Binary):
@@ -240,6 +257,7 @@ def _is_real_operation(expr: Expr) -> bool:
 
 
 def _replace(program: Program, **changes: object) -> Program:
+    """Return the Program with some fields replaced."""
     return dataclasses.replace(program, **changes)  # type: ignore[arg-type]
 
 
@@ -248,4 +266,4 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "inputs": hoist_inputs,
     "program": eliminate_redundancy,
 }
-"""The passes in their order, as `modewright explain --pass` names them."""
+"""The passes in their order, by the names that `modewright explain --pass` accepts."""
