@@ -12,23 +12,10 @@ from tests.validation.blind_study.acceptance import Bar, by_effect
 from tests.validation.blind_study.answer import Answer
 from tests.validation.blind_study.picture import draw
 from tests.validation.blind_study.rate import Rate, rate_of
-from tests.validation.figures.store import ROOT, code_digest
+from tests.validation.figures.store import ROOT
 
 PAGE = ROOT / "docs" / "proof.md"
 FOLDER = ROOT / "docs" / "proof"
-METHOD = ("diagnosis", "spec/effects")
-"""What the page belongs to: it is true of this code."""
-MARK = "Digest of `diagnosis/` and `spec/effects/`: `"
-
-
-def method_digest() -> str:
-    """Return the first digits of the digest that the page belongs to."""
-    return code_digest(METHOD)[:16]
-
-
-def is_current(text: str) -> bool:
-    """Tell whether a page was written with the method as it is now."""
-    return f"{MARK}{method_digest()}`" in text
 
 
 def write_page(
@@ -47,8 +34,6 @@ def page(
     shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     full, weak = ([one for one in every if one.plan == name] for name in ("full", "weak"))
     return shown.from_string(template).render(
-        mark=MARK,
-        digest=method_digest(),
         seals=seals,
         bars=found,
         effects=_effects(full, weak),
