@@ -9,13 +9,30 @@ import argparse
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from tests.validation.figures.store import ROOT
 
 WHOLE = (
     *("first_drive", "complete", "lockstep_bits", "random_specs", "random_charts"),
-    *("command_line", "editor", "static_checks", "charts", "studies", "fast", "open_cases"),
-    *("variants", "tip_out", "kept_stages", "target_bits", "machines", "proofs", "fuzzing"),
+    *(
+        "command_line",
+        "editor",
+        "static_checks",
+        "charts",
+        "studies",
+        "fast",
+        "diagnosis_figures/open_cases",
+    ),
+    *(
+        "variants",
+        "tip_out",
+        "diagnosis_figures/resumed_stages",
+        "target_bits",
+        "diagnosis_figures/machines",
+        "proofs",
+        "fuzzing",
+    ),
     *("twins", "mcdc", "paper", "cluster"),
 )
 PART = (
@@ -27,7 +44,7 @@ PART = (
     *("command_line", "editor", "static_checks"),
 )
 """What CI measures, with words of its own."""
-OF_RECORDINGS = ("first_drive", "machines")
+OF_RECORDINGS = ("first_drive", "diagnosis_figures/machines")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,11 +59,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         name, *words = script.split()
         if given.recordings and name in OF_RECORDINGS:
             words += ["--recordings", given.recordings]
-        command = [sys.executable, str(ROOT / "tests" / "verify" / f"{name}.py"), *words]
+        command = [sys.executable, str(_path_of(name)), *words]
         if subprocess.run(command, check=False).returncode:
             missed.append(name)
     print(f"bars missed or not measured: {', '.join(missed) or 'none'}")
     return 1 if missed else 0
+
+
+def _path_of(name: str) -> Path:
+    """Return the file of a script: one of this folder, or of a folder beside it."""
+    folder, _, script = name.rpartition("/")
+    return ROOT / "tests" / "validation" / (folder or "figures") / f"{script}.py"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Open case: one case of the open generator diagnosed in a process of its own; its CPU time too.
 
-python -m tests.validation.figures.open_case CASE RESULT
+python -m tests.validation.diagnosis_figures.open_case CASE RESULT
 """
 
 from __future__ import annotations

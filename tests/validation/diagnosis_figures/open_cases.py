@@ -73,7 +73,7 @@ def open_generator(seed: int, effects: str, jobs: int, first: int | None = None)
             command = [
                 sys.executable,
                 "-m",
-                "tests.validation.figures.open_case",
+                "tests.validation.diagnosis_figures.open_case",
                 cases / name,
                 path,
             ]
