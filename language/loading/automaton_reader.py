@@ -97,11 +97,11 @@ def _read_model(
         problems.raise_if_errors()
     theirs = _parameter_table(base.root)
     shared = {key: entry for key, entry in own.entries.items() if key in theirs.entries}
-    laid = apply_overlay(theirs, MappingNode(shared, own.span), problems, template=True)
+    merged = apply_overlay(theirs, MappingNode(shared, own.span), problems, template=True)
     known = MappingNode({**theirs.entries, **own.entries}, own.span)
     passed = {key: value for key, value in values.items() if key in theirs.entries}
     kept = {key: value for key, value in values.items() if key not in passed}
-    root = _with_entry(base.root, "parameters", laid)
+    root = _with_entry(base.root, "parameters", merged)
     changed = Document(base.kind, base.name, base.name_span, root, base.source)
     model = read_automaton(changed, project, passed, problems)
     rest = without_keys(own, *shared)
@@ -172,9 +172,9 @@ class _AutomatonReader(Reader):
         modes = self._read_modes()
         main, *beside = modes.regions
         places = fault_modes(modes.statechart) if modes.statechart else main.modes
-        laid_on = ElementReader(self.problems)
+        element_reader = ElementReader(self.problems)
         variables = VariableReader(self.problems, model, self.is_sampled, tree, places)
-        outputs = laid_on.read_outputs(tree.get("outputs"))
+        outputs = element_reader.read_outputs(tree.get("outputs"))
         events = event_inputs(modes.statechart, tree.get("events")) if modes.statechart else {}
         automaton = Automaton(
             name=self.name,
@@ -191,8 +191,8 @@ class _AutomatonReader(Reader):
             outputs=outputs.spans,
             span=self.span,
             output_sources=outputs.sources,
-            elements=laid_on.read_elements(tree.get("elements")),
-            places=laid_on.read_places(tree.get("places")),
+            elements=element_reader.read_elements(tree.get("elements")),
+            places=element_reader.read_places(tree.get("places")),
             regions=tuple(beside),
             numbers=numbers,
             faults=variables.faults,

@@ -60,8 +60,6 @@ class ConnectionReader(Reader):
         self.kinds.update(self.instance_outputs)
         self.measurable = {n: k for n, k in self.kinds.items() if isinstance(k, Dimension)}
 
-    # Sensors.
-
     def read_sensors(self, node: YamlNode | None) -> None:
         """Read `sensors` into `self.sensors`; connections and outputs can read them afterwards."""
         for entry in self.named_entries(node, "sensors"):
@@ -165,8 +163,6 @@ class ConnectionReader(Reader):
         if value <= 0:
             self.problems.error("range", node.span, f"`{what}` is above zero")
         return value
-
-    # Connections.
 
     def read_connections(self, node: YamlNode | None) -> dict[tuple[str, str], Connection]:
         """Return the connections by instance and input; one with a problem is left out."""
@@ -272,8 +268,6 @@ class ConnectionReader(Reader):
         label = "a delay is `delay(signal, time)`, like `delay(T_req, 1 ms)`"
         self.problems.error("arguments", tree.span, label)
         return ErrorNode(tree.span)
-
-    # Outputs.
 
     def read_outputs(self, node: YamlNode | None) -> dict[str, str | Formula]:
         """Return the outputs of the system by name: the name of a signal, or an expression."""

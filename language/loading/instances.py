@@ -154,8 +154,7 @@ class _InstanceReader(Reader):
         return _InstanceDeclaration(entry, asked, root, names)
 
     def _read_root(self, reference: ScalarNode) -> MappingNode | None:
-        """Return the expanded tree of an instantiated automaton, or None with a problem reported.
-        """
+        """Return the expanded tree of an instantiated automaton; None with a reported problem."""
         with self.problems.collect_errors():
             document = read_document(self.project.path_of(reference.text, reference.span))
             document = expand_document(document, self.project, self.problems)

@@ -105,7 +105,7 @@ class _ScenarioReader(StimulusReader):
         if isinstance(named, ScalarNode):
             for key in ("time", "columns", "constants"):
                 if key in table.entries:
-                    label = f"`{key}` stands in the map `{named.text}`"
+                    label = f"`{key}` is given by the map `{named.text}`"
                     self.problems.error("form", table.entries[key].span, label)
             with self.problems.collect_errors():
                 other = expand_document(
@@ -212,7 +212,8 @@ class _ScenarioReader(StimulusReader):
         if not are_compatible(dimension, unit.dimension) and not getattr(
             tree, "is_bare_zero", False
         ):
-            label = f"this is in `{dimension.display_name}`, the state is in `{unit.dimension.display_name}`"
+            expected = unit.dimension.display_name
+            label = f"this is in `{dimension.display_name}`, the state is in `{expected}`"
             self.problems.error("dimension", tree.span, label)
         return value
 

@@ -239,7 +239,7 @@ class _SystemReader(Reader):
             label = (
                 f"instances read each other at the same instant: {format_cycle(find_cycle(edges))}"
             )
-            hint = "a delay breaks the circle: `delay(signal, 1 ms)`, or a sensor with `delay`"
+            hint = "a delay breaks the cycle: `delay(signal, 1 ms)`, or a sensor with `delay`"
             self.problems.error("loop", span, label, hint)
         return tuple(found or instances)
 

@@ -25,10 +25,10 @@ def cache_on_owner(compute: Callable[[Owner], Fact]) -> Callable[[Owner], Fact]:
     @wraps(compute)
     def cached(thing: Owner) -> Fact:
         """Return the stored result for `thing`; compute and store it at the first call."""
-        kept = vars(thing)
-        if name not in kept:
-            kept[name] = compute(thing)
-        fact: Fact = kept[name]
+        results = vars(thing)
+        if name not in results:
+            results[name] = compute(thing)
+        fact: Fact = results[name]
         return fact
 
     return cached

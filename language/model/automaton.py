@@ -288,8 +288,8 @@ class Automaton:
 
     def source_mode(self, transition: Transition) -> Mode:
         """Return the mode, possibly a superstate, that a transition leaves."""
-        found = self.region(transition.region).modes.get(transition.source)
-        return found or next(
+        innermost = self.region(transition.region).modes.get(transition.source)
+        return innermost or next(
             mode
             for mode in self.superstates
             if (mode.region, mode.name) == (transition.region, transition.source)
@@ -311,8 +311,8 @@ class Automaton:
         A literal's value is its index in the declaration. A literal of this automaton overrides an
         equal name of the model.
         """
-        lists = [thing.values for thing in self.parameters.values()]
-        lists += [thing.values for thing in self.inputs.values()]
-        lists += [thing.values for thing in self.discrete.values()]
-        own = {name: place for values in lists for place, name in enumerate(values)}
+        literals = [parameter.values for parameter in self.parameters.values()]
+        literals += [variable.values for variable in self.inputs.values()]
+        literals += [variable.values for variable in self.discrete.values()]
+        own = {name: index for values in literals for index, name in enumerate(values)}
         return {**(self.model.enum_literals if self.model else {}), **own}

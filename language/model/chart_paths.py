@@ -28,10 +28,10 @@ class NamedNode(Protocol):
 def find_descendant(nodes: Sequence[NamedNode], owner: int, path: str) -> int | None:
     """Return the index of the node at a dotted path below the node `owner`, or None."""
     for part in path.split("."):
-        found = [child for child in nodes[owner].children if nodes[child].name == part]
-        if not found:
+        matches = [child for child in nodes[owner].children if nodes[child].name == part]
+        if not matches:
             return None
-        owner = found[0]
+        owner = matches[0]
     return owner
 
 
@@ -45,17 +45,17 @@ def resolve_target(chart: Chart, source: ChartNode, name: str) -> ChartNode | No
     """
     first, _, rest = name.partition(".")
     if rest:
-        for start in (name, f"{CHART}.{name}"):
-            found = find_descendant(chart.nodes, ROOT, start)
-            if found is not None:
-                return chart.nodes[found]
+        for path in (name, f"{CHART}.{name}"):
+            index = find_descendant(chart.nodes, ROOT, path)
+            if index is not None:
+                return chart.nodes[index]
     owners = [chart.nodes[node.parent] for node in chart.ancestors(source)]
     for owner in (*owners, source):
         first_node = find_descendant(chart.nodes, owner.index, first)
         if first_node is not None:
-            found = find_descendant(chart.nodes, first_node, rest) if rest else first_node
-            if found is not None:
-                return chart.nodes[found]
+            index = find_descendant(chart.nodes, first_node, rest) if rest else first_node
+            if index is not None:
+                return chart.nodes[index]
     return None
 
 

@@ -46,7 +46,12 @@ def written_states(automaton: Automaton) -> tuple[str, ...]:
 
     These are the states that vary in some mode and the states that some transition resets.
     """
-    reset = {n for mode in automaton.all_modes for one in mode.transitions for n in one.reset}
+    reset = {
+        n
+        for mode in automaton.all_modes
+        for transition in mode.transitions
+        for n in transition.reset
+    }
     return tuple(n for n in automaton.states if n in ever_varying_states(automaton) or n in reset)
 
 
@@ -57,5 +62,5 @@ def _is_zero(mode: Mode, tree: SyntaxTree) -> bool:
             return value == 0
         case Name(name):
             formulas = equation_formulas(mode).get(name, ())
-            return bool(formulas) and all(_is_zero(mode, one.tree) for one in formulas)
+            return bool(formulas) and all(_is_zero(mode, formula.tree) for formula in formulas)
     return False

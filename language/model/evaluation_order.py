@@ -27,11 +27,14 @@ def equation_order(mode: Mode) -> list[str]:
     """
     formulas = equation_formulas(mode)
     edges = reversed_edges(
-        {name: [r for f in found for r in f.reads] for name, found in formulas.items()}
+        {
+            name: [read for formula in alternatives for read in formula.reads]
+            for name, alternatives in formulas.items()
+        }
     )
-    found = topological_sort(edges)
-    if found is not None:
-        return found
+    order = topological_sort(edges)
+    if order is not None:
+        return order
     cycle = find_cycle(edges)
     problems = Problems()
     label = f"an algebraic loop in mode `{mode.name}`: {format_cycle(cycle)}"
@@ -51,8 +54,8 @@ def report_cycle(
     """
     cycle = find_cycle(_reader_edges({name: [tree] for name, tree in trees.items()}))
     if cycle:
-        label = f"`{what}` values in a circle: {format_cycle(cycle)}"
-        hint = "one of them is given by a value of its own" + _format_places(cycle, spans)
+        label = f"`{what}` values form a cycle: {format_cycle(cycle)}"
+        hint = "give one of them a value of its own" + _format_places(cycle, spans)
         problems.error("loop", spans[cycle[0]], label, hint)
 
 
@@ -65,11 +68,11 @@ def unreachable_modes(
     fire.
     """
     edges = {
-        mode.name: [way.target for way in mode.transitions if way.key not in ignored_keys]
+        mode.name: [t.target for t in mode.transitions if t.key not in ignored_keys]
         for mode in modes.values()
     }
-    found = reachable(edges, initial)
-    return [name for name in modes if name not in found]
+    reached = reachable(edges, initial)
+    return [name for name in modes if name not in reached]
 
 
 def _format_places(cycle: Sequence[str], spans: Mapping[str, Span]) -> str:

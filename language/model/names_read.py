@@ -24,17 +24,17 @@ def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[
         if field.name != "model"
     ]
     while stack:
-        thing = stack.pop()
-        if isinstance(thing, Formula):
-            yield from thing.reads
-        elif isinstance(thing, Balance):
-            yield from (name.path for side in (thing.left, thing.right) for name in names(side))
-        elif isinstance(thing, Mapping):
-            stack += thing.values()
-        elif isinstance(thing, tuple):
-            stack += thing
-        elif dataclasses.is_dataclass(thing) and not isinstance(thing, Span):
-            fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
-            if isinstance(thing, Transition) and not include_waits:
+        part = stack.pop()
+        if isinstance(part, Formula):
+            yield from part.reads
+        elif isinstance(part, Balance):
+            yield from (name.path for side in (part.left, part.right) for name in names(side))
+        elif isinstance(part, Mapping):
+            stack += part.values()
+        elif isinstance(part, tuple):
+            stack += part
+        elif dataclasses.is_dataclass(part) and not isinstance(part, Span):
+            fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+            if isinstance(part, Transition) and not include_waits:
                 del fields["wait"]
             stack += fields.values()

@@ -99,12 +99,12 @@ def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
     search of witnesses, which proves nothing.
     """
     source = automaton.source_mode(transition)
-    found: dict[str, Formula] = {}
+    equations: dict[str, Formula] = {}
     for region in automaton.all_regions:
         own = region.name == transition.region
         mode = source if own else region.modes[region.initial]
-        found.update(mode.equations)
-    return dataclasses.replace(source, equations=found, parallel_regions=())
+        equations.update(mode.equations)
+    return dataclasses.replace(source, equations=equations, parallel_regions=())
 
 
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:

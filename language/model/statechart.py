@@ -173,7 +173,7 @@ class Chart:
 
     def exited_domains(self, transitions: Iterable[ChartTransition]) -> frozenset[int]:
         """Return the set of domains of transitions; transitions without a target are left out."""
-        return frozenset(way.domain for way in transitions if way.domain is not None)
+        return frozenset(t.domain for t in transitions if t.domain is not None)
 
     def are_nested(self, left: int, right: int) -> bool:
         """Tell whether one of two nodes contains the other or they are the same."""
@@ -196,10 +196,10 @@ class Chart:
             child = next(c for c in node.children if self.nodes[c].contains(targets[0]))
             result += self.entry_set(self.nodes[child], targets)
         if node.kind == "parallel":
-            kept = [w for w in targets if self.nodes[w].kind == "history"]
-            more = [i for w in kept for i in self.nodes[w].initial]
+            histories = [w for w in targets if self.nodes[w].kind == "history"]
+            defaults = [i for w in histories for i in self.nodes[w].initial]
             for region in self.child_regions(node):
-                result += self.entry_set(region, [*targets, *more])
+                result += self.entry_set(region, [*targets, *defaults])
         return result
 
     def initial_configuration(self) -> list[ChartNode]:

@@ -26,16 +26,16 @@ def preceding_transitions(
     outer_first`, those of the superstates around the mode. Only transitions that are possible in
     every micro-step in which `transition` is possible are returned.
     """
-    position = [way for _, way in transitions_by_priority(mode)].index(transition)
-    result = [way for _, way in transitions_by_priority(mode)[:position]]
+    position = [other for _, other in transitions_by_priority(mode)].index(transition)
+    result = [other for _, other in transitions_by_priority(mode)[:position]]
     chart, node = automaton.statechart, node_of(automaton, mode)
     if chart and node and chart.order == "outer_first":
         result += [
-            way
+            other
             for outer in chart.region_ancestors(node)[1:]
-            for way in _transitions_of(automaton, outer)
+            for other in _transitions_of(automaton, outer)
         ]
-    return [way for way in result if covers_events(automaton, way, transition)]
+    return [other for other in result if covers_events(automaton, other, transition)]
 
 
 def inner_preceding_transitions(
@@ -52,8 +52,8 @@ def inner_preceding_transitions(
     for leaf in chart.leaves_of(node) if node.number is None else ():
         chain = chart.region_ancestors(leaf)
         inner = chain[: _position_of(chain, node)]
-        found = [way for each in inner for way in _transitions_of(automaton, each)]
-        yield automaton.modes_by_key[leaf.mode_key], found
+        transitions = [other for each in inner for other in _transitions_of(automaton, each)]
+        yield automaton.modes_by_key[leaf.mode_key], transitions
 
 
 def covers_events(automaton: Automaton, transition: Transition, other: Transition) -> bool:
@@ -70,7 +70,7 @@ def covers_events(automaton: Automaton, transition: Transition, other: Transitio
 def possible_events(automaton: Automaton) -> frozenset[str]:
     """Return the events of a chart that are inputs or that some transition raises."""
     signals = automaton.statechart.events if automaton.statechart else {}
-    raised = (way.raises for mode in automaton.all_modes for way in mode.transitions)
+    raised = (other.raises for mode in automaton.all_modes for other in mode.transitions)
     inputs = (name for name, signal in signals.items() if signal.is_input)
     return frozenset((*inputs, *(name for names in raised for name in names)))
 

@@ -59,7 +59,7 @@ def _report_mismatch(
     application: EffectApplication, mismatch: PlaceMismatch, problems: Problems
 ) -> None:
     """Report at the place of an application why the effect cannot be applied."""
-    label = f"`{application.effect.name}` cannot be laid here: {mismatch.reason}"
+    label = f"`{application.effect.name}` cannot be applied here: {mismatch.reason}"
     problems.error("effect", application.place_span, label, mismatch.help)
 
 
@@ -114,8 +114,6 @@ class _EffectApplier:
             body = put_node(body, ("equations",), MappingNode(kept, table.span))
         return body
 
-    # Names.
-
     def _choose_private_names(self) -> dict[str, str]:
         """Return the name in the tree of each name that the effect adds.
 
@@ -146,7 +144,8 @@ class _EffectApplier:
     def _check_private_name(self, name: str, private_name: str, is_taken: bool, span: Span) -> None:
         """Report a name of the effect that is too long, taken or not valid in the tree."""
         if not NAME_PATTERN.fullmatch(private_name):
-            label = f"`{name}` of the effect would be called `{private_name}`: {len(private_name)} characters"
+            length = f"{len(private_name)} characters"
+            label = f"`{name}` of the effect would be called `{private_name}`: {length}"
             self.problems.error("effect", span, label, "`as: ...` gives a shorter ending")
         elif is_taken:
             label = f"`{name}` of the effect would be called `{private_name}`, which is taken"
@@ -165,15 +164,13 @@ class _EffectApplier:
             if hole not in self.place.holes:
                 if self.application.effect.place_patterns[0].kind == "element":
                     misfit = PlaceMismatch(
-                        f"element `{name}` has no `{hole}`", f"`elements.{name}.{hole}` would do"
+                        f"element `{name}` has no `{hole}`", f"add `elements.{name}.{hole}`"
                     )
                 else:
-                    hint = f"`places: {{{name}: {{{hole}: ...}}}}` would do"
+                    hint = f"add `places: {{{name}: {{{hole}: ...}}}}`"
                     misfit = PlaceMismatch(f"`{name}` declares no `{hole}`", hint)
                 _report_mismatch(self.application, misfit, self.problems)
                 return
-
-    # Filling.
 
     def _fill_holes(self, body: MappingNode) -> MappingNode:
         """Return the body with its holes filled and its own names replaced by those in the tree."""
@@ -233,8 +230,6 @@ class _EffectApplier:
         return HOLE_PATTERN.sub(
             lambda match: self._first_value(self.place.holes[match.group(1)]), text
         )
-
-    # What an effect does.
 
     def _apply_redirects(self, tree: MappingNode, body: MappingNode) -> MappingNode:
         """Return the tree with all entries of `redirect` applied; `body` is the filled body."""

@@ -45,7 +45,7 @@ def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -
 def report_unknown_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
     """Report a hole that no place of the effect has; the hint is a similar hole or `has`."""
     label = f"`{hole}` is not a hole of the places where this effect fits"
-    hint = suggest_name(hole, holes) or f"or `has: [{hole[1:]}]` says that it is"
+    hint = suggest_name(hole, holes) or f"`has: [{hole[1:]}]` declares it"
     problems.error("effect", span, label, hint)
 
 

@@ -60,11 +60,9 @@ def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPla
 def _missing_hole(pattern: PlacePattern, name: str, key: str) -> PlaceMismatch:
     """Return the mismatch of a place that lacks a hole that the pattern requires."""
     if pattern.kind == "element":
-        return PlaceMismatch(
-            f"element `{name}` has no `{key}`", f"`elements.{name}.{key}` would do"
-        )
+        return PlaceMismatch(f"element `{name}` has no `{key}`", f"add `elements.{name}.{key}`")
     label = f"the {pattern.kind} of `{name}` declares no `{key}`"
-    return PlaceMismatch(label, f"`places: {{{name}: {{{key}: ...}}}}` would do")
+    return PlaceMismatch(label, f"add `places: {{{name}: {{{key}: ...}}}}`")
 
 
 def _find_balance(

@@ -140,7 +140,7 @@ def read_effect_application(
     reader = Reader(problems)
     name, sign, place = entry.key.partition("@")
     if not (name and sign and place):
-        label = f"`{entry.key}` does not say where the effect is laid"
+        label = f"`{entry.key}` does not say at which place the effect is applied"
         problems.error("effect", entry.span, label, "`coulomb_friction@w_em`: effect, place")
         problems.raise_if_errors()
     table = reader.read_mapping(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
@@ -246,7 +246,7 @@ class _EffectReader(Reader):
         """Return the patterns of `at` in the order of the file; an empty `at` is reported."""
         table = self.read_mapping(node, "at", PLACE_PATTERN_KEYS)
         if not table.entries:
-            self.problems.error("missing", span, "an effect says `at` what place it fits")
+            self.problems.error("missing", span, "an effect names the places that it fits in `at`")
         return tuple(
             self._read_place_pattern(entry) for entry in table if entry.key in PLACE_PATTERN_KEYS
         )
@@ -295,7 +295,7 @@ class _EffectReader(Reader):
         for name, item in reads.items():
             check_name(name, item.span, self.problems)
             if name in own:
-                label = f"`{name}` is the effect's own: it is not read of the model"
+                label = f"`{name}` is a name of the effect: `reads` lists names of the model"
                 self.problems.error("effect", item.span, label)
         known = {f"${hole}" for fit in fits for hole in (*HOLES_BY_PLACE_KIND[fit.kind], *fit.has)}
         check_holes(tree, known, self.problems)
@@ -325,7 +325,7 @@ class _EffectReader(Reader):
         label = f"`{name.path}` is neither a hole nor a name of this effect"
         hint = suggest_name(name.path, allowed)
         if not hint and name.path != "base":
-            hint = f"or `reads: [{name.path}]` says that it is one of the model"
+            hint = f"`reads: [{name.path}]` declares it as a name of the model"
         self.problems.error("effect", name.span, label, hint)
 
 

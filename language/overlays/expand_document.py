@@ -92,11 +92,11 @@ def _extension_chain(document: Document, project: Project) -> list[Document]:
         names = [layer.name for layer in chain]
         problems = Problems()
         if base.name in names[:-1]:
-            circle = " -> ".join(f"`{name}`" for name in names[names.index(base.name) :])
-            label = f"`{base.name}` extends itself: {circle}"
-            problems.error("variant", extends.span, label, "one of them extends a base")
+            cycle = " -> ".join(f"`{name}`" for name in names[names.index(base.name) :])
+            label = f"`{base.name}` extends itself: {cycle}"
+            problems.error("variant", extends.span, label, "one of them must extend a base")
         elif len(chain) > MAX_OVERLAYS:
-            label = f"more than {MAX_OVERLAYS} layers lie over each other"
+            label = f"a chain of `extends` has more than {MAX_OVERLAYS} documents"
             problems.error("variant", extends.span, label)
         problems.raise_if_errors()
     return chain
@@ -259,7 +259,7 @@ def _apply_effects(
     if node is None:
         return merged
     if merged.kind != "automaton" or not isinstance(node, MappingNode):
-        label = f"`effects` are laid over an automaton; `{merged.name}` is a {merged.kind}"
+        label = f"`effects` apply to an automaton; `{merged.name}` is a {merged.kind}"
         if not isinstance(node, MappingNode):
             label = "`effects` is a mapping"
         problems.error("form", layer.root.entries["effects"].span, label)
@@ -282,5 +282,5 @@ def _base_name_of(document: Document) -> ScalarNode:
     if isinstance(node, ScalarNode):
         return node
     problems = Problems()
-    problems.error("form", document.name_span, "a variant says what it `extends`")
+    problems.error("form", document.name_span, "a variant names its base in `extends`")
     raise SpecError(problems.reported)

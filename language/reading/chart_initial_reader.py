@@ -78,8 +78,8 @@ def _resolve_initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tu
     if node is None and len(own) == 1:
         return (own[0],)
     if node is None:
-        told = f"like `initial: {nodes[own[0]].name}`"
-        reader.problems.error("missing", raw.span, "`initial` is missing", told)
+        hint = f"like `initial: {nodes[own[0]].name}`"
+        reader.problems.error("missing", raw.span, "`initial` is missing", hint)
         return ()
     return _resolve_names(nodes, index, _read_initial_names(node, raw, reader), reader)
 

@@ -220,7 +220,7 @@ class ChartReader:
         for key, own in table.entries.items():
             if key not in ("history", "initial", *TEXT_KEYS):
                 label = f"`{entry.key}` is a history: it has no `{key}`"
-                hint = "it only says what is entered in the mode around it"
+                hint = "it only determines what is entered in the mode around it"
                 self.problems.error("form", own.span, label, hint)
 
     def _read_children(

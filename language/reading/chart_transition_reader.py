@@ -62,7 +62,7 @@ def _target_hint(chart: Chart, name: str) -> str:
         return "`to: []` for no target"
     paths = [node.path for node in chart.nodes[ROOT + 1 :] if node.name == name]
     if paths:
-        return f"it stands in another mode: write {' or '.join(f'`to: {path}`' for path in paths)}"
+        return f"it is in another mode: write {' or '.join(f'`to: {path}`' for path in paths)}"
     return suggest_name(name, target_names(chart))
 
 

@@ -73,7 +73,7 @@ class ModeReader(Reader):
         if any(entry.key == CHART for entry in entries):
             for key in ("modes", "initial"):
                 if key in self.root.entries:
-                    label = f"`{key}` stands at the root and in region `{CHART}`"
+                    label = f"`{key}` is given at the root and in region `{CHART}`"
                     self.problems.error("duplicate", self.root.entries[key].span, label)
         return entries
 

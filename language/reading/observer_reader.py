@@ -183,8 +183,8 @@ def _check_matrix_source(reader: Reader, table: MappingNode) -> None:
     """Report matrices that are written although `of` takes them from the model."""
     written = [name for name in MATRIX_KEYS if name in table.entries]
     for name in written if "of" in table.entries else []:
-        label = f"`{name}` is taken from the model: `of` stands beside it"
-        help = f"leave out `{name}`, or lay `of: {{remove: true}}` over it"
+        label = f"`{name}` is taken from the model, because `of` is given"
+        help = f"leave out `{name}`, or remove `of` by `of: {{remove: true}}`"
         reader.problems.error("observer", table.entries[name].span, label, help)
 
 

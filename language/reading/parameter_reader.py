@@ -63,7 +63,7 @@ class ParameterReader(Reader):
         unit = unit or parse_unit("1")
         limits = self.read_range(table.get("range"), unit)
         if unit is UNKNOWN_UNIT:
-            limits = None  # told as no unit
+            limits = None  # reported as an unknown unit
         given = table.get("value")
         if limits and value is not None and given and not limits[0] <= value <= limits[1]:
             label = f"the value of `{entry.key}` is outside its range"

@@ -161,18 +161,18 @@ class TransitionReader(Reader):
             return Formula(BoolLiteral(True, entry.span), f"{key}.when")
         keys = entry.node.entries if isinstance(entry.node, MappingNode) else ()
         if node is None and any(key_alias_hint(key, ("when", "event")) for key in keys):
-            return None  # told as an unknown key
+            return None  # reported as an unknown key
         if isinstance(entry.node, SequenceNode) or (
             isinstance(entry.node, ScalarNode) and entry.node.text
         ):
-            return None  # told as no mapping
+            return None  # reported because it is no mapping
         if node is None:
-            hint = "`when: true` with the largest `priority` for what the others leave"
+            hint = "`when: true` with the largest `priority` for all other cases"
             self.problems.error("missing", entry.span, "`when` is missing", hint)
             return None
         if isinstance(node, ScalarNode) and node.text in ("else", "otherwise"):
             label = f"`{node.text}` is no condition"
-            hint = "`when: true` with the largest `priority` for what the others leave"
+            hint = "`when: true` with the largest `priority` for all other cases"
             self.problems.error("expression", node.span, label, hint)
             return None
         return self.read_expression(node, f"{key}.when", entry.span)

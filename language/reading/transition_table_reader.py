@@ -74,7 +74,7 @@ class _TransitionTableReader(Reader):
         }
         rows = {row.key: row for row in self.read_mapping(body.get("rows"), "rows")}
         if not isinstance(modes, MappingNode) or not columns:
-            label = "a transition table stands beside `modes` and has at least one column"
+            label = "a transition table is beside `modes` and has at least one column"
             self.problems.error("missing", entry.span, label)
             return MappingNode(kept, tree.span)
         for column in columns.values():
@@ -131,7 +131,7 @@ class _TransitionTableReader(Reader):
         A missing cell is reported and gives None.
         """
         if cell is None:
-            label = f"`{row.key}` says nothing of `{column.key}`"
+            label = f"row `{row.key}` has no cell for `{column.key}`"
             self.problems.error("incomplete", row.span, label, f"a mode, or `{STAY}`")
             return None
         target = self.read_scalar(cell.node, column.key, cell.span)

@@ -53,7 +53,7 @@ class TruthTableReader(Reader):
         for row in rows[:-1]:
             if row.is_else:
                 label = f"`{ELSE_ROW}` is not the last row"
-                self.problems.error("table", row.span, label, "it is for what the others leave")
+                self.problems.error("table", row.span, label, "it applies if no other row does")
         return TruthTable(entry.key, conditions, rows, key, entry.span)
 
     def _read_row(self, entry: Entry, key: str, width: int) -> TruthRow:
@@ -83,5 +83,5 @@ def _row_hint(key: str, width: int) -> str:
     if len(marks) == width and all(marks):
         return f'it is written `"{" ".join(marks)}"`'
     if key in ("default", "otherwise", "rest"):
-        return f"the last row is `{ELSE_ROW}`, for what the others leave"
+        return f"the last row is `{ELSE_ROW}`: it applies if no other row does"
     return "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"

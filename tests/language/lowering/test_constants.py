@@ -129,7 +129,7 @@ def test_values_that_follow_from_each_other_are_refused(
 ) -> None:
     lines = "\n".join(f'  {name}: {{derived: {text}, unit: "1"}}' for name, text in derived.items())
     (problem,) = raised_problems(lambda: automaton(clock(lines)))
-    assert problem.label == f"`derived` values in a circle: {circle}"
+    assert problem.label == f"`derived` values form a cycle: {circle}"
 
 
 @pytest.mark.parametrize(

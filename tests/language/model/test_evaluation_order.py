@@ -122,7 +122,7 @@ def test_a_circle_of_values_is_told_and_none_is_not() -> None:
     report_cycle({"a": tree("b"), "b": tree("c"), "c": tree("x")}, spans, "derived", problems)
     assert problems.reported == []
     report_cycle({"a": tree("b"), "b": tree("a"), "c": tree("x")}, spans, "derived", problems)
-    assert problem_labels(problems) == ["`derived` values in a circle: `a` -> `b` -> `a`"]
+    assert problem_labels(problems) == ["`derived` values form a cycle: `a` -> `b` -> `a`"]
 
 
 MODES = """language: 1
@@ -169,5 +169,5 @@ def test_start_values_come_after_those_that_they_read() -> None:
 
 def test_a_circle_of_start_values_is_refused() -> None:
     lines = problem_lines(lambda: program(MODES.replace("initial: 2 m", "initial: z")))
-    assert lines == ["5:10 `initial` values in a circle: `x` -> `z` -> `x`"]
+    assert lines == ["5:10 `initial` values form a cycle: `x` -> `z` -> `x`"]
     assert Fraction(1, 1000) == program(MODES).period

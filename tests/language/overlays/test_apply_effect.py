@@ -114,7 +114,7 @@ def test_a_redirection_that_finds_nothing_is_refused(tmp_path: Path) -> None:
     project_of(tmp_path, laid="language: 1\nvariant: laid\nextends: cart\neffects: {lag@G: {}}\n")
     assert problem_lines(
         lambda: expand_document(read_document(project.path_of("laid")), project)
-    ) == ["4:15 `lag` cannot be laid here: nothing reads `G`"]
+    ) == ["4:15 `lag` cannot be applied here: nothing reads `G`"]
 
 
 def test_an_element_without_what_an_effect_needs_is_told_the_key(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_an_element_without_what_an_effect_needs_is_told_the_key(tmp_path: Path)
     project_of(tmp_path, cart=CART.replace(", far: [load]", ""))
     assert problem_lines(
         lambda: expand_document(read_document(project.path_of("laid")), project)
-    ) == ["4:17 `split` cannot be laid here: element `body` has no `far`"]
+    ) == ["4:17 `split` cannot be applied here: element `body` has no `far`"]
 
 
 def test_an_expression_is_no_name_to_redirect(tmp_path: Path) -> None:

@@ -201,7 +201,7 @@ def test_twenty_one_layers_are_too_many(tmp_path: Path) -> None:
     project = project_of(tmp_path, **chain, v20=plain("v20"))
     assert extended(project, "v1").kind == "automaton"
     assert problem_lines(lambda: extended(project, "v0")) == [
-        "3:10 more than 20 layers lie over each other"
+        "3:10 a chain of `extends` has more than 20 documents"
     ]
 
 
