@@ -1,1 +1,2 @@
-"""expectation: tests of specs - what a run is expected to do, and what became of it."""
+"""Tests of specs: read expectations, evaluate them on runs, measure coverage, trace requirements.
+"""

@@ -1,4 +1,8 @@
-"""Condition: an expression of a test, its modes and running numbers found and checked."""
+"""Conditions: resolve and type-check the expressions of a test.
+
+References to modes, fault bits and running statistics become names that the evaluation of a run
+defines.
+"""
 
 from __future__ import annotations
 
@@ -46,16 +50,23 @@ from language.typecheck.infer import TypeChecker
 from language.typecheck.types import EnumType, ExprType, IntType
 
 RUNNING_FUNCTIONS = ("count", "first", "rms")
+"""Functions over the run from its start to the present instant."""
 MODES_HINT = (
     "compare it with the name of a mode, like `est.mode == drive`, or write `in(est.drive)`"
 )
+"""Hint for a mode signal that is used as a number."""
 
 
 class ConditionReader:
-    """Reads the expressions of a test over the signals and modes of a system."""
+    """Reader of the expressions of a test over the signals and modes of a system.
+
+    `words` are the fault words with their instances, `kinds` the types of signals, `modes` the
+    predicates by mode name, `regions` the regions by mode signal, `literals` the values of
+    enumerations.
+    """
 
     def __init__(self, problems: Problems, system: System) -> None:
-        """Report into `problems`."""
+        """Collect the names of the system; problems are reported to `problems`."""
         self.problems = problems
         self.system = system
         self.words = fault_words(system)
@@ -67,10 +78,16 @@ class ConditionReader:
         self.literals = _enumeration_literals(self.kinds)
 
     def read_condition(self, scalar: ScalarNode, formula: Formula) -> Condition | None:
-        """Return a condition; None with the problem reported."""
+        """Return the condition of an expression that is true or false; None if a problem was
+        reported.
+        """
         return self._read(scalar.text, formula.tree, formula.key, truth=True)
 
     def _read(self, text: str, tree: SyntaxTree, key: str, truth: bool) -> Condition | None:
+        """Return the condition of a resolved and typed tree; None if a problem was reported.
+
+        `truth` states whether the expression must be true or false, or a quantity.
+        """
         problem_count = len(self.problems.reported)
         resolver = _NameResolver(self)
         resolved_tree = resolver.resolve(tree)
@@ -95,7 +112,9 @@ class ConditionReader:
         )  # fmt: skip
 
     def full_name(self, name: str) -> str:
-        """Return a signal's whole name: in a test of an automaton it stands alone."""
+        """Return the full name of a signal: a single instance needs no prefix, an output has a
+        source.
+        """
         alone = self.system.sole_instance
         if alone and "." not in name and f"{alone}.{name}" in {**self.kinds, **self.regions}:
             name = f"{alone}.{name}"
@@ -103,12 +122,14 @@ class ConditionReader:
         return output if isinstance(output, str) and output in self.regions else name
 
     def read_operand(self, text: str, tree: SyntaxTree, truth: bool) -> Condition | None:
-        """Return what a running number reads; None with the problem reported."""
+        """Return the operand of a running statistic; None if a problem was reported."""
         return self._read(text, tree, "running", truth)
 
 
 class _NameResolver:
-    """What one expression reads, found on the way through it."""
+    """Resolver of the names in one expression; its attributes collect what the expression refers
+    to.
+    """
 
     def __init__(self, reader: ConditionReader) -> None:
         self.reader = reader
@@ -120,7 +141,10 @@ class _NameResolver:
         self.kinds: dict[str, ExprType] = {}
 
     def resolve(self, tree: SyntaxTree) -> SyntaxTree:
-        """Return a tree in which modes and running numbers are names."""
+        """Return the tree with modes, fault bits and running statistics replaced by names.
+
+        Invalid parts become error nodes, with the problem reported.
+        """
         match tree:
             case Relation("==" | "!=", left, right, span):
                 for mode, name in ((left, right), (right, left)):
@@ -139,11 +163,15 @@ class _NameResolver:
         return _map_children(tree, self.resolve)
 
     def _find_region(self, tree: SyntaxTree) -> RegionRef | None:
+        """Return the region whose mode a name denotes; None for other trees."""
         if not isinstance(tree, Name):
             return None
         return self.reader.regions.get(self.reader.full_name(tree.path))
 
     def _resolve_mode_comparison(self, region_ref: RegionRef, tree: SyntaxTree) -> SyntaxTree:
+        """Return the name of the predicate `region.mode == mode`; an error node if the mode is
+        unknown.
+        """
         instance, region = region_ref
         if isinstance(tree, Name):
             stay = self.reader.modes.get(f"{instance}.{path_of_mode(region, tree.path)}")
@@ -155,6 +183,7 @@ class _NameResolver:
         return ErrorNode(tree.span)
 
     def _resolve_in(self, tree: FunctionCall, arguments: tuple[SyntaxTree, ...]) -> SyntaxTree:
+        """Return the name of the predicate `in(mode)`; an error node if the mode is unknown."""
         path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
         stay = self.reader.modes.get(path)
         if stay is None:
@@ -165,7 +194,11 @@ class _NameResolver:
         return self._add_mode_predicate(stay, path, tree)
 
     def _resolve_fault(self, tree: FunctionCall, arguments: tuple[SyntaxTree, ...]) -> SyntaxTree:
-        """Return one bit of a fault word: `fault(est.range_T)`, in a test of one alone without."""
+        """Return the name of one bit of a fault word, e.g. `fault(est.range_T)`.
+
+        The instance may be omitted if there is only one. Reports unknown faults, and fault words
+        that are not outputs.
+        """
         path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
         system = self.reader.system
         head, _, name = path.rpartition(".")
@@ -182,7 +215,7 @@ class _NameResolver:
         signal = next((word for word, of in self.reader.words.items() if of == instance), None)
         if signal is None:
             automaton = system.instances[instance].automaton.name
-            label = f"the faults of `{instance}` are not told"
+            label = f"the faults of `{instance}` are not an output"
             self._error("missing", at, label, f"add `faults` to the `outputs` of `{automaton}`")
             return ErrorNode(tree.span)
         made = f"fault {instance} {name}"
@@ -193,6 +226,7 @@ class _NameResolver:
     def _add_mode_predicate(
         self, predicate: ModePredicate, mode: str, at: SyntaxTree
     ) -> SyntaxTree:
+        """Store a mode predicate under a new name and return the name."""
         self._require_mode_output(predicate.region_ref, at)
         name = f"in {'.'.join(predicate.region_ref)} {mode}"
         self.stays[name] = predicate
@@ -200,9 +234,11 @@ class _NameResolver:
         return Name(name, at.span)
 
     def _require_mode_output(self, region_ref: RegionRef, at: SyntaxTree) -> None:
+        """Report a chart that does not output its modes."""
         require_mode_output(self.reader.system, region_ref[0], at.span, self.problems)
 
     def _resolve_running(self, tree: FunctionCall) -> SyntaxTree:
+        """Return the name of a running statistic; an error node if its arguments are invalid."""
         function, arguments = tree.function, tree.arguments
         most = 2 if function == "rms" else 1
         if not 1 <= len(arguments) <= most:
@@ -226,6 +262,7 @@ class _NameResolver:
         return Name(name, tree.span)
 
     def _read_start_time(self, tree: SyntaxTree) -> Fraction:
+        """Return the start [s] of a root mean square; 0 after a report for other quantities."""
         if isinstance(tree, NumberLiteral) and (
             are_compatible(tree.unit.dimension, SECOND) or tree.is_bare_zero
         ):
@@ -234,6 +271,9 @@ class _NameResolver:
         return Fraction(0)
 
     def _resolve_signal(self, tree: Name) -> SyntaxTree:
+        """Return a name node with the full name of a signal; an error node for unknown names and
+        modes.
+        """
         name = self.reader.full_name(tree.path)
         if name in self.reader.kinds:
             self.signals[name] = self.reader.kinds[name]
@@ -250,11 +290,12 @@ class _NameResolver:
         return ErrorNode(tree.span)
 
     def _error(self, kind: str, at: SyntaxTree, label: str, help: str = "") -> None:
+        """Report a problem at the place of a tree."""
         self.problems.error(kind, at.span, label, help)
 
 
 def _map_children(tree: SyntaxTree, change: Callable[[SyntaxTree], SyntaxTree]) -> SyntaxTree:
-    """Return a tree whose parts are changed."""
+    """Return a tree whose direct children are replaced by the results of a function."""
     parts: dict[str, Any] = {}
     for field in dataclasses.fields(tree):
         value = getattr(tree, field.name)
@@ -266,7 +307,7 @@ def _map_children(tree: SyntaxTree, change: Callable[[SyntaxTree], SyntaxTree]) 
 
 
 def _enumeration_literals(kinds: dict[str, ExprType]) -> dict[str, tuple[ExprType, int]]:
-    """Return the names of enumerations with their kind and number."""
+    """Return type and number of each enumeration value among the types of signals."""
     found: dict[str, tuple[ExprType, int]] = {}
     for kind in kinds.values():
         if isinstance(kind, EnumType):

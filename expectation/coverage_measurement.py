@@ -1,4 +1,6 @@
-"""Coverage: which modes, transitions and conditions of specs tests have reached."""
+"""Coverage measurement: run tests with instrumented Programs to find modes, transitions,
+conditions.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,16 @@ from language.model.automaton import Automaton
 from language.passes.constant_folding import run_passes
 
 STRUCTURE_KEYS = ("modes", "regions", "transitions")
-"""Words of a key path that are no names."""
+"""The words of a key path that are not names."""
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What has been reached of an automaton: modes and transitions by key path, combinations."""
+    """The coverage of one automaton: reached modes and transitions by key path.
+
+    `combinations` holds, for each decision, the observed values of its conditions as bit patterns.
+    `unmeasured` are decisions with too many conditions.
+    """
 
     automaton: Automaton
     decisions: tuple[Decision, ...]
@@ -42,15 +48,15 @@ class Coverage:
 
     @property
     def all_modes(self) -> tuple[str, ...]:
-        """All modes by key path, innermost ones first; superstates too."""
+        """The key paths of all modes including superstates, innermost modes first."""
         return tuple(mode.key for mode in self.automaton.all_modes if is_mode_key(mode.key))
 
     def condition_coverage(self, decision: Decision) -> tuple[ConditionCoverage, ...]:
-        """Return of each condition of a guard whether it was shown to matter."""
+        """Return the MC/DC coverage of each condition of a decision."""
         return decision.condition_coverage(self.combinations.get(decision.key, frozenset()))
 
     def count(self) -> dict[str, tuple[int, int]]:
-        """Return how many modes, transitions, outcomes of guards and conditions were reached."""
+        """Return (reached, total) of modes, transitions, outcomes of guards and conditions."""
         outcomes = [d.outcomes(self.combinations.get(d.key, frozenset())) for d in self.decisions]
         conditions = [each for d in self.decisions for each in self.condition_coverage(d)]
         return {
@@ -61,7 +67,7 @@ class Coverage:
         }
 
     def list_missed(self) -> list[str]:
-        """Return what was not reached, one line each."""
+        """Return one line for each mode, transition and condition that is not covered."""
         lines = [
             f"mode `{'.'.join(names_of(key.removeprefix(f'regions.{CHART}.')))}` was not entered"
             for key in self.all_modes
@@ -74,6 +80,7 @@ class Coverage:
         return lines
 
     def _missed_conditions(self, decision: Decision) -> list[str]:
+        """Return one line for each condition of a decision that is not covered."""
         if decision.key in self.unmeasured:
             return [f"`{decision.key}.when` is not measured: {len(decision.conditions)} conditions"]
         if decision.key not in self.combinations:
@@ -89,7 +96,7 @@ class Coverage:
 
 
 def measure_coverage(test: Test) -> list[Coverage]:
-    """Return what a test reaches of each automaton: a run of the interpreter with probes."""
+    """Return the coverage of each instance in a test, from a run of the interpreter."""
     scenario = resolve_recording(test.system, test.scenario)
     decisions, programs, arrays = instrument_programs(automata_of(test.system, scenario))
     steppers: dict[int, _CoverageInterpreter] = {}
@@ -119,9 +126,9 @@ def measure_coverage(test: Test) -> list[Coverage]:
 
 
 def _entered_modes(automaton: Automaton, active: Collection[tuple[str, int]]) -> frozenset[str]:
-    """Return the key paths of the modes that were active, and of all that hold them.
+    """Return the key paths of the modes that were active, including enclosing superstates.
 
-    `active` are regions with numbers of modes.
+    `active` holds pairs of a region and the number of a mode.
     """
     modes = [mode for region in automaton.all_regions for mode in region.modes.values()]
     inner = {mode.key for mode in modes if (mode.region, mode.number) in active}
@@ -130,19 +137,22 @@ def _entered_modes(automaton: Automaton, active: Collection[tuple[str, int]]) ->
 
 
 def is_mode_key(key: str) -> bool:
-    """Tell whether a key path is that of a mode, and not of a region."""
+    """Return whether a key path denotes a mode, and not a region."""
     return key.split(".")[-2:-1] == ["modes"]
 
 
 def names_of(key: str) -> tuple[str, ...]:
-    """Return the names of a key path: `modes.a.transitions.b` is (a, b)."""
+    """Return the names in a key path: `modes.a.transitions.b` gives ("a", "b")."""
     return tuple(part for part in key.split(".") if part not in STRUCTURE_KEYS)
 
 
 def instrument_programs(
     automata: Mapping[str, tuple[Automaton, list[str]]],
 ) -> tuple[dict[str, tuple[Decision, ...]], dict[str, Program], dict[str, Mapping[str, str]]]:
-    """Return the decisions of instances, their Programs with probes, and where these write."""
+    """Return decisions, instrumented Programs and arrays of combinations, each by instance.
+
+    `automata` holds each instance's automaton and the names of its varying parameters.
+    """
     decisions, programs, arrays = {}, {}, {}
     for name, (automaton, varying) in automata.items():
         transitions = [way for mode in automaton.all_modes for way in mode.transitions]
@@ -153,7 +163,8 @@ def instrument_programs(
 
 
 def merge_coverages(parts: Iterable[Coverage]) -> list[Coverage]:
-    """Return what several tests and instances have reached, one for each automaton by name."""
+    """Return the union of coverages, one for each automaton name, in the order of first occurrence.
+    """
     merged: dict[str, Coverage] = {}
     for part in parts:
         before = merged.get(part.name)
@@ -162,6 +173,7 @@ def merge_coverages(parts: Iterable[Coverage]) -> list[Coverage]:
 
 
 def _merge_two(first: Coverage, second: Coverage) -> Coverage:
+    """Return the union of two coverages of the same automaton."""
     none: frozenset[int] = frozenset()
     keys = {**first.combinations, **second.combinations}
     return dataclasses.replace(
@@ -176,7 +188,8 @@ def _merge_two(first: Coverage, second: Coverage) -> Coverage:
 
 
 class _CoverageInterpreter(Interpreter):
-    """An interpreter that reads guards wherever outputs are read, and notes what fires."""
+    """Interpreter that evaluates guards at each output instant and records transitions and modes.
+    """
 
     def __init__(self, program: Program) -> None:
         super().__init__(program)
@@ -186,13 +199,14 @@ class _CoverageInterpreter(Interpreter):
         self._looks = GUARD_READ_BLOCK in program.blocks
 
     def all_active_modes(self) -> set[tuple[str, int]]:
-        """Return the regions with the numbers of the modes that were active, however shortly."""
+        """Return (region, mode number) of all modes that were active, also within a tick."""
         arrays = [(region, reached_array(region)) for region in self._modes]
         kept = [(region, self.get(array)) for region, array in arrays if self.has(array)]
         inside = ((region, k) for region, array in kept for k, was in enumerate(array) if was)
         return self._active.union(inside)
 
     def run(self, block: str) -> None:
+        """Run a block, and record fired transitions and active modes after it."""
         if block == "equations" and self._looks:
             super().run(GUARD_READ_BLOCK)
         super().run(block)
@@ -204,8 +218,10 @@ class _CoverageInterpreter(Interpreter):
             self._active.update(self._active_modes())
 
     def _active_modes(self) -> Iterator[tuple[str, int]]:
+        """Yield (region, number of the active mode) for each region."""
         return ((region, self.get(name)) for region, name in self._modes.items())
 
 
 def _possible_outcomes(decision: Decision) -> int:
+    """Return the number of possible outcomes of a decision: 1 without conditions, else 2."""
     return 2 if decision.conditions else 1

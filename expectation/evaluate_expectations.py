@@ -1,4 +1,4 @@
-"""Judging: whether a run did what was expected, and where it did not."""
+"""Evaluation: decide whether a run meets the expectations of a test, and where it fails."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ from language.loading.event_names import ModeEntryEvent
 
 TimeSpans = list[tuple[float, float]]
 TruthSeries = list[tuple[int, float, bool]]
-"""Point, time [s] and whether a condition holds there."""
+"""The value of a condition as (point, time [s], value) in order of time."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an expectation: where it was decided [s], modes and values there."""
+    """The result of an expectation with the time [s] of the decision, and modes and values there.
+    """
 
     name: str
     passed: bool
@@ -37,19 +38,20 @@ class Outcome:
 
 
 def evaluate_test(test: Test, trajectory: Trajectory) -> tuple[Outcome, ...]:
-    """Return what became of each expectation in a run."""
+    """Return the outcomes of all expectations of a test, in their order."""
     run = observe_run(test.system, trajectory)
     return tuple(_ExpectationEvaluator(each, run).evaluate() for each in test.expectations)
 
 
 class _ExpectationEvaluator:
-    """One expectation of one run."""
+    """Evaluation of one expectation on one run."""
 
     def __init__(self, expectation: Expectation, run: ObservedRun) -> None:
         self.expectation = expectation
         self.seen = run
 
     def evaluate(self) -> Outcome:
+        """Return the outcome of the expectation."""
         expectation = self.expectation
         match expectation.kind:
             case "that":
@@ -65,9 +67,10 @@ class _ExpectationEvaluator:
             case "modes":
                 return self._evaluate_modes(expectation.when)
 
-    # What there is to see.
+    # Observations.
 
     def _truth_series(self, subject: Any) -> TruthSeries:
+        """Return the values of a condition at the points where it is known."""
         found = evaluate_series(subject, self.seen)
         points = self.seen.points
         return [
@@ -75,7 +78,8 @@ class _ExpectationEvaluator:
         ]
 
     def _occurrences(self, trigger: Trigger, when: TimeConstraint) -> list[float]:
-        """Return when something happened, or turned true, in the window [s]."""
+        """Return the times [s] in the window at which an event occurred or a condition became true.
+        """
         if isinstance(trigger, ModeEntryEvent):
             times = self.seen.times_of(trigger)
         else:
@@ -88,12 +92,14 @@ class _ExpectationEvaluator:
         ]
 
     def _window(self, when: TimeConstraint) -> tuple[float, float]:
+        """Return start and end [s] of the constraint `from` and `until`; by default the whole run.
+        """
         low = 0.0 if when.since is None else float(when.since)
         high = self.seen.end if when.until is None else float(when.until)
         return low, high
 
     def _spans(self, when: TimeConstraint) -> TimeSpans:
-        """Return from when to when something is expected [s]: once, or after each event."""
+        """Return the intervals [s] of the expectation: the window, or one after each trigger."""
         if when.after is None:
             return [self._window(when)]
         late = float(when.within or 0)
@@ -102,6 +108,8 @@ class _ExpectationEvaluator:
     # Conditions.
 
     def _evaluate_that(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
+        """Return the outcome of `that`: at a time, near a time, before a time or after a trigger.
+        """
         if when.at is not None and when.within is None:
             return self._check_at(truths, float(when.at))
         if when.at is not None:
@@ -119,6 +127,7 @@ class _ExpectationEvaluator:
         return self._check_eventually(truths, spans, f"was not true {late}")
 
     def _check_at(self, truths: TruthSeries, time: float) -> Outcome:
+        """Return whether the condition holds at a time; fails if the run ended before."""
         held = _last_not_after(truths, time)
         if held is None:
             return self._fail_run_ended(time)
@@ -130,6 +139,7 @@ class _ExpectationEvaluator:
         return self._fail(f"is false at {_format_time(time)}", time, k)
 
     def _check_near(self, times: Sequence[float], at: float, within: float, verb: str) -> Outcome:
+        """Return whether one of the times is within a distance of the expected time."""
         limit = within + time_tolerance(at + within)
         nearest = min(times, key=lambda time: abs(time - at), default=None)
         if nearest is not None and abs(nearest - at) <= limit:
@@ -141,7 +151,9 @@ class _ExpectationEvaluator:
         return self._fail(text, at if nearest is None else nearest)
 
     def _check_eventually(self, truths: TruthSeries, spans: TimeSpans, text: str) -> Outcome:
-        """Somewhere in each span it is true."""
+        """Return whether the condition is true at a point in each interval; fails at the first
+        without.
+        """
         first = None
         for low, high in spans:
             hit = next(
@@ -163,7 +175,11 @@ class _ExpectationEvaluator:
         return self._pass(first)
 
     def _truths_within(self, truths: TruthSeries, low: float, high: float) -> TruthSeries:
-        """Return what modes hold at the start of a span, signals at rows, then all points in it."""
+        """Return the part of a series in a closed interval.
+
+        A condition of modes only also has the value that holds at the start; signals count at rows
+        only.
+        """
         subject = self.expectation.subject
         if isinstance(subject, Condition) and subject.all_signals:
             start = bisect.bisect_left(truths, low - time_tolerance(low), key=lambda each: each[1])
@@ -174,7 +190,10 @@ class _ExpectationEvaluator:
         return truths[start:end]
 
     def _check_throughout(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
-        """In all of each span it is what it is expected to be."""
+        """Return whether the condition is true (`always`) or false (`never`) in each interval.
+
+        Fails if the run ended before the end of an interval or no row lies in it.
+        """
         expected_truth = self.expectation.kind == "always"
         spans = self._spans(when)
         if not spans:
@@ -196,6 +215,8 @@ class _ExpectationEvaluator:
     # Events and modes.
 
     def _evaluate_event(self, when: TimeConstraint) -> Outcome:
+        """Return the outcome of `event`: near a time, before a time, after a trigger, or its count.
+        """
         subject = self.expectation.subject
         assert isinstance(subject, ModeEntryEvent)
         times = self.seen.times_of(subject)
@@ -224,6 +245,7 @@ class _ExpectationEvaluator:
         )
 
     def _check_event_in_spans(self, times: Sequence[float], spans: TimeSpans, text: str) -> Outcome:
+        """Return whether an event occurred in each interval; fails at the first without one."""
         first = None
         for low, high in spans:
             hit = next(
@@ -239,7 +261,10 @@ class _ExpectationEvaluator:
         return self._pass(first)
 
     def _evaluate_modes(self, when: TimeConstraint) -> Outcome:
-        """The modes of a region from the window's start on, each as often as it was entered."""
+        """Return whether a region had exactly the expected modes in the window, in order.
+
+        A mode counts once for each entry.
+        """
         place, expected_modes = self.expectation.region_ref, self.expectation.subject
         assert place is not None and isinstance(expected_modes, tuple)
         low, high = self._window(when)
@@ -266,9 +291,13 @@ class _ExpectationEvaluator:
     # Outcomes.
 
     def _pass(self, time: float | None) -> Outcome:
+        """Return a passed outcome."""
         return Outcome(self.expectation.name, True, "", time)
 
     def _fail(self, text: str, time: float | None = None, point: int | None = None) -> Outcome:
+        """Return a failed outcome with modes and signals at a point (default: the last one before
+        `time`).
+        """
         if point is None and time is not None:
             point = point_at_or_before(self.seen, time)
         modes = {} if point is None else self.seen.modes_at(point)
@@ -276,16 +305,20 @@ class _ExpectationEvaluator:
         return Outcome(self.expectation.name, False, text, time, modes, values)
 
     def _fail_run_ended(self, time: float) -> Outcome:
+        """Return a failed outcome because the run ended before a time."""
         return self._fail(
             f"the run ended at {_format_time(self.seen.end)}, before {_format_time(time)}",
             self.seen.end,
         )
 
     def _fail_no_trigger(self, when: TimeConstraint) -> Outcome:
+        """Return a failed outcome because the trigger did not occur."""
         return self._fail(f"`{when.after_text}` never happened")
 
     def _signal_values(self, point: int) -> dict[str, Any]:
-        """Return the signals that the conditions read, at a point or in the row before."""
+        """Return the signals of the conditions in the last row at or before a point; empty without
+        rows.
+        """
         rows = [p.row for p in self.seen.points[: point + 1] if p.row >= 0]
         if not rows:
             return {}
@@ -294,7 +327,7 @@ class _ExpectationEvaluator:
 
 
 def _rising_times(truths: TruthSeries) -> list[float]:
-    """Return when a condition turned true [s]; the start counts."""
+    """Return the times [s] at which a condition became true; a true start counts."""
     found, before = [], False
     for _, time, value in truths:
         if value and not before:
@@ -304,10 +337,11 @@ def _rising_times(truths: TruthSeries) -> list[float]:
 
 
 def _last_not_after(truths: TruthSeries, time: float) -> tuple[int, float, bool] | None:
-    """Return the last point that is not after a time."""
+    """Return the last entry whose time is not later; None if there is none."""
     place = bisect.bisect_right(truths, time + time_tolerance(time), key=lambda each: each[1])
     return truths[place - 1] if place else None
 
 
 def _format_time(time: float) -> str:
+    """Return a time with nine digits and unit; `the end` for infinity."""
     return f"{time:.9g} s" if math.isfinite(time) else "the end"

@@ -1,4 +1,4 @@
-"""Expected: what a test expects of a run - conditions, events and modes, and when."""
+"""Expectations: the model of a test - conditions, events, modes and time constraints."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from language.text.diagnostic import Source, Span
 from language.typecheck.types import ExprType
 
 RegionRef = tuple[str, str]
-"""An instance and one of its regions."""
+"""An instance and the name of one of its regions."""
 
 
 @dataclass(frozen=True)
 class ModePredicate:
-    """Whether one of some modes of a region is active."""
+    """The predicate that a region is in one of the given leaf modes."""
 
     region_ref: RegionRef
     modes: frozenset[str]
@@ -27,10 +27,10 @@ class ModePredicate:
 
 @dataclass(frozen=True)
 class RunningStatistic:
-    """A number of the run so far: `count` (of changes), `first` (time [s]), `rms`.
+    """A statistic of the run up to the present: `count`, `first` (time [s]) or `rms`.
 
-    What it reads is a condition or a quantity, or for `count` also the mode of a region.
-    `since` [s] is where the root mean square begins.
+    `count` counts rising edges of a condition or entries of a region. `first` is the time at which
+    a condition first holds. `since` [s] is the start of a root mean square.
     """
 
     function: Literal["count", "first", "rms"]
@@ -40,7 +40,7 @@ class RunningStatistic:
 
 @dataclass(frozen=True)
 class FaultFlag:
-    """One bit of a fault word, a signal."""
+    """One bit of a signal that is a fault word."""
 
     signal: str
     bit: int
@@ -48,7 +48,11 @@ class FaultFlag:
 
 @dataclass(frozen=True)
 class Condition:
-    """An expression over a run; its names are signals, or keys of `stays`, `flags`, `running`."""
+    """An expression over a run.
+
+    Its names are signals, enumeration literals, or keys of `stays` (mode predicates), `flags` and
+    `running`. `kind` is the type of its value.
+    """
 
     formula: Formula
     text: str
@@ -61,7 +65,10 @@ class Condition:
 
     @property
     def all_signals(self) -> tuple[str, ...]:
-        """The signals that are read, by what runs too; none: it is known between rows."""
+        """The signals to which the expression and its running statistics refer.
+
+        A condition without signals is known between rows, too.
+        """
         found = dict.fromkeys([*self.signals, *(flag.signal for flag in self.flags.values())])
         for running in self.running.values():
             if isinstance(running.operand, Condition):
@@ -70,13 +77,14 @@ class Condition:
 
 
 Trigger = Condition | ModeEntryEvent
+"""The start of an interval: a condition that becomes true, or an event."""
 Subject = Condition | ModeEntryEvent | tuple[str, ...]
-"""What is expected: that something is the case, an event, or the modes of a region in order."""
+"""The subject of an expectation: a condition, an event, or the modes of a region in order."""
 
 
 @dataclass(frozen=True)
 class TimeConstraint:
-    """When something is expected; all times in s, None where nothing is said."""
+    """The time constraint of an expectation; times in s, None if not stated."""
 
     at: Fraction | None = None
     within: Fraction | None = None
@@ -89,7 +97,10 @@ class TimeConstraint:
 
 @dataclass(frozen=True)
 class Expectation:
-    """One line of a test. `place` is the region whose modes are expected, `count` of events."""
+    """One entry of a test.
+
+    `region_ref` is the region of expected modes; `count` is the expected number of events.
+    """
 
     name: str
     kind: Literal["that", "always", "never", "event", "modes"]
@@ -103,14 +114,14 @@ class Expectation:
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """The conditions that have to be known to judge it."""
+        """The conditions that the evaluation needs: subject and trigger."""
         found = (self.subject, self.when.after)
         return tuple(part for part in found if isinstance(part, Condition))
 
 
 @dataclass(frozen=True)
 class Test:
-    """A test: a system through a scenario, recorded as the expectations need it."""
+    """A test: a system with a scenario that records the signals of the expectations."""
 
     __test__ = False  # for pytest
 

@@ -1,9 +1,9 @@
-"""Probe: a Program that remembers in which combinations the conditions of its guards were read.
+"""Instrumentation: add operations to a Program that record the values of guard conditions.
 
-`probe.<k>` is an array with a place for each combination of the conditions of guard k. A sampled
-Program reads its guards in its jumps. A continuous one reads them all along its steps; what counts
-are jumps, and the instants at which outputs are evaluated (`look`): not what bisection tries. A
-chart remembers which modes were active after each micro-step.
+The array `probe.<k>` has an element for each combination of the conditions of guard k. A sampled
+Program evaluates guards when it selects transitions. A continuous Program evaluates them also
+during the search for crossings; only jumps and output instants (block `look`) are recorded. A chart
+also records the active modes after each micro-step.
 """
 
 from __future__ import annotations
@@ -31,27 +31,37 @@ from language.ir.ops import (
 from language.ir.program import Program, Variable, mode_variable
 
 GUARD_READ_BLOCK = "look"
-"""The block that reads the guards of the active modes and does nothing else."""
+"""The block that evaluates and records the guards of the active modes, without other effects."""
 COMMIT_BLOCK = "commit"
-"""The block of a chart that ends a micro-step: its modes are those between two of them."""
+"""The block of a chart that ends a micro-step."""
 GUARDS_PREFIX = "guards_"
+"""Prefix of the blocks of a continuous Program that evaluate guards."""
 PROBED_PREFIX = "probed_"
+"""Prefix of the instrumented copies of these blocks."""
 SELECTION_PREFIXES = ("jump", "count_", "choose_")
-"""How the blocks of a sampled Program begin that read guards."""
+"""Prefixes of the blocks of a sampled Program that evaluate guards."""
 FIRED_PREFIXES = ("memory.fired", "work.wish_")
-"""How the variables begin that hold the transition that is taken, or wished for in a chart."""
+"""Prefixes of the variables with the number of the selected or requested transition."""
 
 
 @dataclasses.dataclass(frozen=True)
 class InstrumentedProgram:
-    """A Program with probes, and the array of each decision that has one, by its key path."""
+    """An instrumented Program with the array of each recorded decision, by key path."""
 
     program: Program
     arrays: Mapping[str, str]
 
 
 def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedProgram:
-    """Return a Program, not yet optimised, with probes at its guards."""
+    """Return an instrumented copy of a Program that has not been optimised.
+
+    Decisions with more than MAX_CONDITIONS conditions, and guards whose lowered form does not
+    match, are not recorded. The pass adds a store after (continuous) or before (sampled) each
+    guard:
+
+        work.guard = a and b   ->   work.guard = a and b
+                                    probe.k[(a ? 1 : 0) + (b ? 2 : 0)] = true
+    """
     inserter = _ProbeInserter(program, tuple(decisions))
     blocks = dict(program.blocks)
     if program.period is None:
@@ -85,12 +95,12 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
 
 
 def reached_array(region: str) -> str:
-    """Return the array of the modes of a chart's region that were active after a micro-step."""
+    """Return the name of the array of modes of a region that were active after a micro-step."""
     return mode_variable("reached.mode", region)
 
 
 class _ProbeInserter:
-    """What is put into the blocks of a Program."""
+    """Insertion of stores into the blocks of a Program; `stored` are the keys that got one."""
 
     def __init__(self, program: Program, decisions: tuple[Decision, ...]) -> None:
         self.decisions = tuple(d for d in decisions if len(d.conditions) <= MAX_CONDITIONS)
@@ -100,24 +110,30 @@ class _ProbeInserter:
         self._timers = {info.key: info.timer for info in program.transitions}
 
     def insert_after_assignment(self, op: Op) -> Iterator[Op]:
-        """A guard is kept in a variable."""
+        """Yield an operation, and a store after it if it assigns a guard."""
         yield op
         if isinstance(op, Assign) and op.key.endswith(".when"):
             yield from self._store_combination(op.key.removesuffix(".when"), op.value)
 
     def insert_before_firing(self, op: Op) -> Iterator[Op]:
-        """A guard is what a branch asks for that fires, or what a wait counts."""
+        """Yield an operation, preceded by a store if it evaluates a guard.
+
+        These are counters of waits, and branches that select a transition without a wait.
+        """
         match op:
             case Count(_, condition, _, key):
                 yield from self._store_combination(key.removesuffix(".when"), condition)
             case Branch(condition, then, _):
-                taken = (inner for inner in then if isinstance(inner, Assign))
-                for inner in taken:  # where there is a wait the guard is read when it is counted
+                assignments = (inner for inner in then if isinstance(inner, Assign))
+                for inner in assignments:  # the guard of a wait is recorded at its counter
                     if inner.target.startswith(FIRED_PREFIXES) and not self._timers.get(inner.key):
                         yield from self._store_combination(inner.key, condition)
         yield op
 
     def _store_combination(self, key: str, guard: Expr) -> Iterator[Op]:
+        """Yield a store of the combination of a guard's conditions; nothing if the guard has no
+        match.
+        """
         decision = self._by_key.get(key)
         parts = match_conditions(decision.structure, guard) if decision else None
         if decision is None or parts is None:
@@ -130,7 +146,7 @@ class _ProbeInserter:
 
 
 def _map_operations(block: Block, change: Callable[[Op], Iterator[Op]]) -> Block:
-    """Return a block in which each operation, inner ones first, is replaced by others."""
+    """Return a block whose operations, innermost first, are each replaced by a sequence."""
     found: list[Op] = []
     for op in block:
         match op:
@@ -145,13 +161,14 @@ def _map_operations(block: Block, change: Callable[[Op], Iterator[Op]]) -> Block
 
 
 def _redirect_to_probed(op: Op) -> Iterator[Op]:
+    """Yield an operation; a call of a guard block calls its instrumented copy instead."""
     if isinstance(op, RunBlock) and op.block.startswith(GUARDS_PREFIX):
         op = RunBlock(PROBED_PREFIX + op.block)
     yield op
 
 
 def _guard_reads(block: Sequence[Op]) -> Iterator[Op]:
-    """What leads to the guards in `watch`, and nothing that lasts."""
+    """Yield the operations of `watch` that evaluate guards, without stores to lasting variables."""
     for op in block:
         match op:
             case Assign(target, _, _) if target.startswith("work."):

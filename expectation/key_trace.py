@@ -1,4 +1,4 @@
-"""Key trace: which lines of C come from which key of a spec, and which keys show in none."""
+"""Key trace: relate the keys of a spec to the lines of C that cite them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ KEYED_SECTIONS = (
     *("modes", "regions", "tables", "parameters", "inputs", "states", "discrete", "equations"),
     *("flow", "terms", "events", "transitions", "observer", "update", "entry", "exit"),
 )
-"""Parts whose entries are each a key of their own."""
+"""Sections whose entries are traced."""
 
 
 @dataclass(frozen=True)
 class KeyTrace:
-    """A key of a spec by its `path`, where it stands, and the lines of C that cite it."""
+    """A key of a spec by path, its place, and the lines of C that cite it."""
 
     spec: str
     path: str
@@ -29,24 +29,24 @@ class KeyTrace:
 
 @dataclass(frozen=True)
 class KeyTraces:
-    """All keys, in the order of the specs; `strays` are what C cites and no spec has."""
+    """All keys in the order of the specs; `unmatched_citations` are paths that no spec has."""
 
     keys: tuple[KeyTrace, ...]
     unmatched_citations: tuple[str, ...]
 
     @property
     def uncited(self) -> tuple[KeyTrace, ...]:
-        """The keys that no line of C cites: their values went into numbers, or nothing reads it."""
+        """The keys that no line of C cites, because they are folded into numbers or unused."""
         return tuple(key for key in self.keys if not key.code)
 
 
 def build_key_traces(
     documents: Sequence[Document], code: Mapping[str, Mapping[str, str]]
 ) -> KeyTraces:
-    """Return which lines of C cite which keys of specs; `code` is C by automaton and file.
+    """Return the lines of C that cite each key; `code` is C text by automaton and file name.
 
-    A line that cites a part of a key, such as one flow of a mode, belongs to the smallest key that
-    a spec has for it; that of a mode that is `like` a template to the template's.
+    A citation of a part of a key belongs to the smallest enclosing key. A citation of a mode that
+    is `like` a template belongs to the key of the template if that is smaller.
     """
     spans = {
         (document.name, path): span
@@ -70,7 +70,7 @@ def build_key_traces(
 
 
 def _iterate_keys(table: MappingNode, above: str) -> Iterator[tuple[str, Span]]:
-    """Yield the path and place of each key below the parts that have keys of their own."""
+    """Yield path and place of each key in the keyed sections of a mapping, recursively."""
     for part in table:
         if not isinstance(part.node, MappingNode):
             continue
@@ -81,6 +81,7 @@ def _iterate_keys(table: MappingNode, above: str) -> Iterator[tuple[str, Span]]:
 
 
 def _iterate_entries(table: MappingNode, above: str) -> Iterator[tuple[str, Span]]:
+    """Yield path and place of the entries of a section and of the keys below them."""
     for entry in table:
         yield f"{above}{entry.key}", entry.span
         if isinstance(entry.node, MappingNode):
@@ -90,7 +91,7 @@ def _iterate_entries(table: MappingNode, above: str) -> Iterator[tuple[str, Span
 def _enclosing_key(
     name: str, path: str, known: Mapping[tuple[str, str], Span], root: MappingNode | None
 ) -> tuple[str, str] | None:
-    """Return the smallest known key that a cited path is in."""
+    """Return the smallest known key that contains a cited path; None if there is none."""
     parts = path.split(".")
     for count in range(len(parts), 1, -1):
         shorter = ".".join(parts[:count])
@@ -103,7 +104,7 @@ def _enclosing_key(
 
 
 def _template_path(root: MappingNode | None, parts: Sequence[str]) -> str:
-    """Return the path in the template that a mode is like; "" if it is like none."""
+    """Return the path in the template of a mode; empty if the mode has no template."""
     like: YamlNode | None = find_node(root, (*parts[:2], "like")) if root else None
     if not isinstance(like, ScalarNode) or parts[0] != "modes" or len(parts) < 3:
         return ""

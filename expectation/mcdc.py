@@ -1,9 +1,9 @@
-"""Decision: a guard as conditions and how they are joined; which of them were shown to matter.
+"""MC/DC: represent guards as decisions of conditions and determine which conditions are covered.
 
-MC/DC (Chilenski and Miller 1994, Applicability of modified condition/decision coverage): every
-condition is shown to change the outcome alone. Unique cause: of two evaluations in which only it
-differs, one is true. Masking: in both evaluations the outcome hangs on it, others may differ, too.
-A condition that is written twice is one.
+MC/DC (Chilenski and Miller 1994, Applicability of modified condition/decision coverage) requires
+that each condition independently affects the outcome. Unique cause: two evaluations differ in this
+condition only and in the outcome. Masking: in both evaluations the outcome depends on the
+condition, while others may differ. Equal conditions count once.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ DecisionStructure = (
     | tuple[str, "DecisionStructure"]
     | tuple[str, "DecisionStructure", "DecisionStructure"]
 )
-"""A condition by its place, `true` or `false`, or `not`, `and`, `or` of others."""
+"""A condition by index, a constant, or `not`, `and`, `or` of structures."""
 ConditionCoverage = Literal["unique cause", "masking", "always true", "always false", "not shown"]
 COVERED: tuple[ConditionCoverage, ...] = ("unique cause", "masking")
-"""What counts as covered."""
+"""The values that count as covered."""
 MAX_CONDITIONS = 10
-"""More have too many combinations to be kept, one for each."""
+"""Largest number of conditions of a recorded decision; there are 2**n combinations."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The guard of a transition, by its key path; conditions in the order of the text.
+    """The guard of a transition by key path, with conditions in the order of the text.
 
-    Events that it waits for come first; that a superstate has come to its end is one condition.
+    The events of the transition come first. The completion of a superstate is one condition.
     """
 
     key: str
@@ -48,18 +48,19 @@ class Decision:
     structure: DecisionStructure
 
     def outcome(self, combination: int) -> bool:
-        """Return what the guard is; bit k of a combination is condition k."""
+        """Return the value of the guard; bit k of the combination is condition k."""
         return _evaluate(self.structure, combination)
 
     def condition_coverage(self, combinations: Collection[int]) -> tuple[ConditionCoverage, ...]:
-        """Return of each condition whether the combinations that were seen show that it matters."""
+        """Return the coverage of each condition by the observed combinations."""
         return tuple(self._coverage_of(1 << k, combinations) for k in range(len(self.conditions)))
 
     def outcomes(self, combinations: Collection[int]) -> frozenset[bool]:
-        """Return what the guard has been."""
+        """Return the values of the guard over the combinations."""
         return frozenset(self.outcome(combination) for combination in combinations)
 
     def _coverage_of(self, bit: int, combinations: Collection[int]) -> ConditionCoverage:
+        """Return the coverage of the condition with this bit."""
         ons = [one for one in combinations if one & bit]
         offs = {one for one in combinations if not one & bit}
         if any(one ^ bit in offs and self._affects_outcome(one, bit) for one in ons):
@@ -73,11 +74,12 @@ class Decision:
         return "not shown"
 
     def _affects_outcome(self, combination: int, bit: int) -> bool:
+        """Return whether the outcome changes if the condition with this bit is inverted."""
         return self.outcome(combination) != self.outcome(combination ^ bit)
 
 
 def decision_of(transition: Transition) -> Decision:
-    """Return what a transition asks for as a decision: its events, and its guard."""
+    """Return the decision of a transition: any of its events, and its guard."""
     if transition.is_completion:
         return Decision(transition.key, ("completion",), 0)
     conditions: list[SyntaxTree] = []
@@ -108,7 +110,7 @@ def decision_of(transition: Transition) -> Decision:
 
 
 def any_of(count: int) -> DecisionStructure:
-    """Return whether one of the first conditions holds."""
+    """Return the structure `or` of the first `count` conditions."""
     structure: DecisionStructure = 0
     for place in range(1, count):
         structure = ("or", structure, place)
@@ -116,9 +118,9 @@ def any_of(count: int) -> DecisionStructure:
 
 
 def match_conditions(structure: DecisionStructure, expr: Expr) -> dict[int, Expr] | None:
-    """Return what each condition is in a lowered guard; None where that is joined otherwise.
+    """Return the lowered expression of each condition by index; None if the structures differ.
 
-    A condition may be lowered to anything: `rising(x)` to whether x is true, and was not.
+    A condition may be lowered to any expression, e.g. `rising(x)` to `x and not previous`.
     """
     match structure, expr:
         case bool(), _:
@@ -135,6 +137,7 @@ def match_conditions(structure: DecisionStructure, expr: Expr) -> dict[int, Expr
 
 
 def _evaluate(structure: DecisionStructure, combination: int) -> bool:
+    """Return the value of a structure for a combination. Raises TypeError for other objects."""
     match structure:
         case bool():
             return structure
@@ -150,7 +153,8 @@ def _evaluate(structure: DecisionStructure, combination: int) -> bool:
 
 
 def _condition_text(tree: SyntaxTree) -> str:
-    """Return a condition as its author wrote it, where that is one text of the file."""
+    """Return the text of a condition as in the file, or formatted if it is not a single text there.
+    """
     span = tree.span
     if not span.is_atomic and 1 <= span.line <= len(span.source.lines):
         line = span.source.lines[span.line - 1]

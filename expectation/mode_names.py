@@ -1,4 +1,4 @@
-"""Places: the modes of a system by name, superstates too, and which signals tell of charts."""
+"""Mode names: find modes, superstates, mode signals and fault bits of a system by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from language.text.diagnostic import Problems, Span, suggest_name
 
 
 def mode_predicates(system: System) -> dict[str, ModePredicate]:
-    """Return every mode by `instance.mode`, alone for the one instance of an automaton."""
+    """Return the predicate of each mode by `instance.mode`.
+
+    A single instance needs no prefix; modes of the main region also have the name of the region.
+    """
     found: dict[str, ModePredicate] = {}
     for name, instance in system.instances.items():
         for (region, path), inside in leaf_modes_by_path(instance.automaton).items():
@@ -29,7 +32,7 @@ def mode_predicates(system: System) -> dict[str, ModePredicate]:
 
 
 def leaf_modes_by_path(automaton: Automaton) -> dict[tuple[str, str], frozenset[str]]:
-    """Return the innermost modes of its region inside each mode, by region and path."""
+    """Return the leaf modes inside each mode and superstate, by region and path."""
     found: dict[tuple[str, str], frozenset[str]] = {}
     for region in automaton.all_regions:
         for mode in region.modes.values():
@@ -43,18 +46,18 @@ def leaf_modes_by_path(automaton: Automaton) -> dict[tuple[str, str], frozenset[
 
 
 def path_of_mode(region: str, mode: str) -> str:
-    """Return the path of a mode from the root."""
+    """Return the path of a mode: its name, preceded by the region unless that is the main one."""
     return mode if region == CHART else f"{region}.{mode}"
 
 
 def format_region(region_ref: RegionRef) -> str:
-    """Return how a region is named: `est`, `est.gap`."""
+    """Return the name of a region: `est` for the main region, else `est.gap`."""
     instance, region = region_ref
     return instance if region == CHART else f"{instance}.{region}"
 
 
 def suggest_mode(name: str, region_ref: RegionRef, system: System) -> str:
-    """Return which mode of a region may be meant, by the name it has beside that region."""
+    """Return a hint with the mode of a region that the name probably means; may be empty."""
     instance, region = region_ref
     own = "" if region == CHART else f"{region}."
     paths = leaf_modes_by_path(system.instances[instance].automaton)
@@ -67,25 +70,26 @@ def suggest_mode(name: str, region_ref: RegionRef, system: System) -> str:
 
 
 def suggest_path(name: str, known: Iterable[str]) -> str:
-    """Return which of some paths may be meant: one that ends so, else the nearest one."""
+    """Return a hint with the shortest path that ends with the name, else the most similar one."""
     known = list(known)
     ends = [path for path in known if path.endswith(f".{name}")]
     return f"did you mean `{min(ends, key=len)}`?" if ends else suggest_name(name, known)
 
 
 def leaf_modes_entered(system: System, event: ModeEntryEvent) -> frozenset[str]:
-    """Return the innermost modes inside the one that an event enters."""
+    """Return the leaf modes inside the mode that an event enters."""
     automaton = system.instances[event.instance].automaton
     return leaf_modes_by_path(automaton)[event.region, path_of_mode(event.region, event.target)]
 
 
 def is_chart(system: System, instance: str) -> bool:
-    """Tell whether an instance has modes inside modes, or several micro-steps in a tick."""
+    """Return whether the automaton of an instance is a chart (nested modes or several micro-steps).
+    """
     return system.instances[instance].automaton.statechart is not None
 
 
 def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
-    """Return the signals that hold the modes of an instance, with their regions."""
+    """Return the regions of an instance by the signal that holds their mode."""
     found = {}
     for region in system.instances[instance].automaton.all_regions:
         signal = "mode" if region.name == CHART else region.name.replace(".", "_")
@@ -94,7 +98,8 @@ def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
 
 
 def fault_words(system: System) -> dict[str, str]:
-    """Return the signals that hold fault words, with their instances; those of instances first."""
+    """Return the instances by fault-word signal; signals of instances before outputs of the system.
+    """
     found = {
         f"{name}.{output}": name
         for name, instance in system.instances.items()
@@ -106,18 +111,19 @@ def fault_words(system: System) -> dict[str, str]:
 
 
 def fault_bits(system: System, instance: str) -> dict[str, int]:
-    """Return the bits of an instance's fault word by name; none for one that has no such word."""
+    """Return the bit of each fault of an instance; empty if it is not sampled or does not exist."""
     found = system.instances.get(instance)
     return _fault_bits_of(found.automaton) if found and found.automaton.is_sampled else {}
 
 
 @cache_on_owner
 def _fault_bits_of(automaton: Automaton) -> dict[str, int]:
+    """Return the bit of each fault of an automaton; cached with the automaton."""
     return {name: bit for bit, name in enumerate(lower_automaton(automaton).faults)}
 
 
 def require_mode_output(system: System, instance: str, at: Span, problems: Problems) -> None:
-    """Report a chart whose modes a run does not tell."""
+    """Report a chart that does not have its mode as an output."""
     outputs = system.instances[instance].automaton.outputs
     if is_chart(system, instance) and "mode" not in outputs:
         label = f"`{instance}` is a chart: its modes are known by its output `mode`"
@@ -125,7 +131,8 @@ def require_mode_output(system: System, instance: str, at: Span, problems: Probl
 
 
 def suggest_output(system: System, name: str) -> str:
-    """Return what makes a signal of what an instance keeps to itself; empty where it has none."""
+    """Return the hint to make an internal variable of an instance an output; empty if it has none.
+    """
     head, _, own = name.rpartition(".")
     instance = system.instances.get(head or system.sole_instance or "")
     automaton = instance.automaton if instance else None

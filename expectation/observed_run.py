@@ -1,6 +1,6 @@
-"""Observed: a run as a test looks at it - its rows, its transitions, the modes at each of them.
+"""Observed run: the rows, transitions and active modes of a run, on which conditions are evaluated.
 
-Modes are known at every instant, in each micro-step; signals at the rows that are recorded.
+Modes are known at each instant and micro-step, signals at recorded rows only.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from language.reading.mode_reader import IMPLICIT_MODE
 from language.typecheck.types import EnumType, ExprType, IntType
 
 NO_ROW = -1
-"""The row of a point that lies between rows."""
+"""The row of a point that is not a recorded row."""
 TIME_TOLERANCE_ULPS = 4.0
-"""Times that differ by so many units in the last place are one: a sum of two rounds twice."""
+"""Times that differ by at most so many units in the last place are equal: sums of two roundings."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """An instant at which a run is looked at [s], its row, and the region that has just moved."""
+    """An instant [s] of a run: a recorded row, or a transition of the region `moved`."""
 
     time: float
     row: int
@@ -47,7 +47,7 @@ class Point:
 
 @dataclass(frozen=True)
 class ObservedRun:
-    """The points of a run in order, and the active modes at each."""
+    """The points of a run in order of time, and the active mode of each region at each point."""
 
     points: tuple[Point, ...]
     modes: Mapping[RegionRef, Sequence[str]]
@@ -60,7 +60,7 @@ class ObservedRun:
     def modes_at(self, point: int) -> dict[str, str]:
         """Return the active modes at a point by `instance` or `instance.region`.
 
-        That an automaton without modes, or whose regions have them all, is `always` is not told.
+        The implicit mode of an automaton without modes is left out.
         """
         return {
             format_region(place): found[point]
@@ -69,9 +69,9 @@ class ObservedRun:
         }
 
     def times_of(self, event: ModeEntryEvent) -> list[float]:
-        """Return when an event happened [s].
+        """Return the times [s] of an event in ascending order.
 
-        In a chart a mode is entered by what enters it, and by whatever makes it active.
+        In a chart a mode is also entered if a recorded row finds it active after it was inactive.
         """
         is_tree = is_chart(self.system, event.instance)
         names = (event.source, event.target)
@@ -92,6 +92,7 @@ class ObservedRun:
         return sorted({*exact, *self._entry_times(stay)})
 
     def _entry_times(self, predicate: ModePredicate) -> list[float]:
+        """Return the times [s] of the points at which a predicate becomes true."""
         found, before = [], self.modes[predicate.region_ref][0] in predicate.modes
         for point, mode in zip(self.points, self.modes[predicate.region_ref], strict=True):
             if mode in predicate.modes and not before:
@@ -100,7 +101,7 @@ class ObservedRun:
         return found
 
     def mode_entries(self, region_ref: RegionRef, since: int) -> list[tuple[int, str]]:
-        """Return the points after one at which a region entered a mode, and that mode."""
+        """Return (point, mode) for each entry of a mode in a region after the point `since`."""
         modes = self.modes[region_ref]
         is_tree = is_chart(self.system, region_ref[0])
         return [
@@ -112,14 +113,14 @@ class ObservedRun:
 
 @dataclass(frozen=True)
 class Series:
-    """A value at some points of a run, in their order."""
+    """The values of an expression at some points of a run, in order."""
 
     points: tuple[int, ...]
     values: tuple[Any, ...]
 
 
 def observe_run(system: System, trajectory: Trajectory) -> ObservedRun:
-    """Return what a test sees of a run; the modes of charts are those of the rows."""
+    """Return the observation of a trajectory; the modes of charts come from recorded rows."""
     moves = [event for event in trajectory.events if event.kind == "transition"]
     moves.sort(key=lambda event: event.time)
     chart_modes = _recorded_chart_modes(system, trajectory)
@@ -157,7 +158,7 @@ def observe_run(system: System, trajectory: Trajectory) -> ObservedRun:
 
 
 def _recorded_chart_modes(system: System, trajectory: Trajectory) -> dict[RegionRef, list[str]]:
-    """Return the modes of charts at each row, where they are recorded."""
+    """Return the mode names of charts at each row, by region, as far as they are recorded."""
     found = {}
     for name in system.instances:
         if is_chart(system, name):
@@ -169,7 +170,10 @@ def _recorded_chart_modes(system: System, trajectory: Trajectory) -> dict[Region
 
 
 def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
-    """Return the value of an expression at the points at which it is known."""
+    """Return the values of a condition at all points where it is known.
+
+    With signals these are the rows, else all points. Equal operands are evaluated once.
+    """
     by_row = bool(condition.all_signals)
     points = [k for k, point in enumerate(run.points) if not by_row or point.row != NO_ROW]
     columns: list[list[Any]] = []
@@ -204,7 +208,7 @@ def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
 
 
 def point_at_or_before(run: ObservedRun, time: float) -> int:
-    """Return the last point that is not after a time [s]."""
+    """Return the index of the last point that is not later than a time [s]; 0 if all are later."""
     limit = time + time_tolerance(time)
     last = 0
     for k, point in enumerate(run.points):
@@ -215,12 +219,13 @@ def point_at_or_before(run: ObservedRun, time: float) -> int:
 
 
 def time_tolerance(time: float) -> float:
-    """Return by how much two floats may differ that are one time [s]."""
+    """Return the difference [s] below which two times are equal."""
     return TIME_TOLERANCE_ULPS * math.ulp(time)
 
 
 def _evaluate_running(running: RunningStatistic, run: ObservedRun) -> list[Any]:
-    """Return a number of the run so far at each point: what it was at the last one it is known."""
+    """Return the value of a running statistic at each point; between known values it is constant.
+    """
     found: list[Any] = [0 if running.function == "count" else math.nan] * len(run.points)
     if isinstance(running.operand, tuple):
         return list(itertools.accumulate(int(p.moved == running.operand) for p in run.points))
@@ -242,6 +247,7 @@ def _evaluate_running(running: RunningStatistic, run: ObservedRun) -> list[Any]:
 
 
 def _converter_of(kind: ExprType) -> Any:
+    """Return the Python type of the values of a type: bool, int or float."""
     if kind == "truth":
         return bool
     return int if isinstance(kind, IntType | EnumType) else float

@@ -1,4 +1,4 @@
-"""Trace: which requirement is named where - in specs, in the lines of their C, in tests."""
+"""Requirement trace: relate requirements to specs, lines of C and tests."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ CITATION = re.compile(
     r"(?:\b([A-Za-z]\w*) )?\b((?:modes|regions|tables|parameters|inputs|states|discrete|equations"
     r"|flow|terms)\.[\w.]+)"
 )
-"""How C cites the key path of what it does: `estimator modes.gap.transitions.drive`."""
+"""The form in which C cites a key path: `estimator modes.gap.transitions.drive`."""
 CodeLine = tuple[str, int]
-"""A file and a line of it."""
+"""A file name and a line number."""
 
 
 @dataclass(frozen=True)
 class Implementation:
-    """A place of a spec that names a requirement, and the lines of C that come from it."""
+    """A place in a spec that names a requirement, and the lines of C that come from it."""
 
     spec: str
     path: str
@@ -34,7 +34,7 @@ class Implementation:
 class Verification:
     """A test, or one of its expectations, that names a requirement.
 
-    `passed` is None where the test was not run.
+    `passed` is None if the test was not run.
     """
 
     test: str
@@ -45,7 +45,9 @@ class Verification:
 
 @dataclass(frozen=True)
 class TracedRequirement:
-    """A requirement with all that names it; `text` is what a list says of it."""
+    """A requirement with its implementations and verifications; `text` is from a list of
+    requirements.
+    """
 
     name: str
     text: str = ""
@@ -54,7 +56,7 @@ class TracedRequirement:
 
     @property
     def state(self) -> str:
-        """What is missing, if anything is."""
+        """The state: `unimplemented`, `untested` or `traced`."""
         if not self.implementations:
             return "unimplemented"
         return "traced" if self.verifications else "untested"
@@ -62,12 +64,13 @@ class TracedRequirement:
 
 @dataclass(frozen=True)
 class RequirementTrace:
-    """All requirements, in the order of a list, then in that in which they were found."""
+    """All requirements: first those of the list in its order, then others in order of occurrence.
+    """
 
     requirements: tuple[TracedRequirement, ...] = field(default_factory=tuple)
 
     def with_state(self, state: str) -> list[str]:
-        """Return the requirements that are traced, untested or unimplemented."""
+        """Return the names of the requirements in a state."""
         return [each.name for each in self.requirements if each.state == state]
 
 
@@ -77,10 +80,10 @@ def trace_requirements(
     tests: Iterable[tuple[Test, Mapping[str, bool]]],
     requirement_texts: Mapping[str, str],
 ) -> RequirementTrace:
-    """Return the trace of specs, with templates as they are written.
+    """Return the trace of requirements over specs (templates not expanded), C and tests.
 
-    `code` is their C by automaton and file; a test has the verdict of each expectation where it was
-    run; `requirement_texts` are requirements with what they say.
+    `code` is C text by automaton and file name. Each test comes with the results of its
+    expectations, empty if it was not run. `requirement_texts` are the texts of known requirements.
     """
     cited = citations(code)
     implementations: dict[str, list[Implementation]] = {}
@@ -106,7 +109,10 @@ def trace_requirements(
 
 
 def citations(code: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, str], list[CodeLine]]:
-    """Return the lines of C by the automaton and the key path that they cite."""
+    """Return the lines of C by the cited automaton and key path.
+
+    A citation without a name refers to the automaton of the file.
+    """
     found: dict[tuple[str, str], list[CodeLine]] = {}
     for owner, files in code.items():
         for file, text in files.items():
@@ -122,7 +128,10 @@ def _citing_lines(
     code: Mapping[str, Mapping[str, str]],
     cited: Mapping[tuple[str, str], Sequence[CodeLine]],
 ) -> Iterator[CodeLine]:
-    """Yield the lines that cite a path or something in it; of a whole file, its first lines."""
+    """Yield the lines that cite a path or a key below it, sorted.
+
+    An empty path stands for the whole spec and yields line 1 of each C file.
+    """
     if not path:
         yield from ((file, 1) for file in code.get(document.name, {}) if file.endswith(".c"))
         return
@@ -135,7 +144,9 @@ def _citing_lines(
 
 
 def _cited_paths(document: Document, path: str) -> list[str]:
-    """Return the paths that C cites for one: a template's stand in the modes that are like it."""
+    """Return the paths that C cites for a path; one in a template gives one for each mode that uses
+    it.
+    """
     head, _, rest = path.partition(".")
     if head != "templates":
         return [path]
@@ -148,7 +159,7 @@ def _cited_paths(document: Document, path: str) -> list[str]:
 
 
 def _iterate_modes(table: MappingNode, path: tuple[str, ...]) -> Iterator[tuple[str, MappingNode]]:
-    """Yield each mode with its key path: those of regions, and those inside modes, too."""
+    """Yield key path and node of each mode, including those in regions and in other modes."""
     for key in ("modes", "regions"):
         for entry in entries(table.get(key)):
             if isinstance(entry.node, MappingNode):
@@ -159,6 +170,7 @@ def _iterate_modes(table: MappingNode, path: tuple[str, ...]) -> Iterator[tuple[
 
 
 def _verifications_of(test: Test, passed: Mapping[str, bool]) -> Iterator[tuple[str, Verification]]:
+    """Yield requirement and verification for a test and for each of its expectations."""
     every = all(passed.values()) if passed else None
     for requirement in test.requirements:
         yield requirement, Verification(test.name, "", _format_location(test.span), every)
@@ -172,9 +184,11 @@ def _verifications_of(test: Test, passed: Mapping[str, bool]) -> Iterator[tuple[
 
 
 def _format_location(span: object) -> str:
+    """Return file and line of a span, without the column."""
     return str(span).rpartition(":")[0]
 
 
 def _text(table: MappingNode, key: str) -> str:
+    """Return the text of a key; empty if it is absent or no scalar."""
     node = table.get(key)
     return node.text if isinstance(node, ScalarNode) else ""

@@ -1,4 +1,4 @@
-"""Reader: a test from its document, checked with the system and the scenario that it names."""
+"""Test reader: read a test from its document and check it against its system and scenario."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ from language.text.overlay import without_keys
 from language.text.requirement import all_requirements, requirements_of
 
 MAX_ROWS = 1_000_000
-"""More rows are a mistake of a horizon, or of a period."""
+"""Largest number of rows; more indicate a wrong horizon or period."""
 
 
 def select_recorded_signals(
     scenario: Scenario, system: System, expectations: Sequence[Expectation], problems: Problems
 ) -> Scenario:
-    """Return a scenario that records the signals that are read, at least one.
+    """Return the scenario with the signals that the expectations need; at least one.
 
-    The modes of charts are recorded at their ticks: their transitions do not tell them all.
+    The modes of charts are recorded at each tick, because transitions do not determine them.
     """
     read = [n for e in expectations for c in e.conditions for n in c.all_signals]
     every = scenario.every
@@ -68,18 +68,20 @@ def select_recorded_signals(
 
 
 def _common_period(every: Fraction, period: Fraction, offset: Fraction) -> Fraction:
-    """Return the largest time of which all three are whole multiples [s]."""
+    """Return the greatest common divisor of three times [s]."""
     times = (every, period, offset)
     whole = math.lcm(*(time.denominator for time in times))
     return Fraction(math.gcd(*(int(time * whole) for time in times)), whole)
 
 
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
+"""The sections of a test."""
 
 INLINE_SCENARIO_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
-"""The keys of a scenario that is written in a test."""
+"""The keys of a scenario that is part of a test."""
 
 TIME_KEYS = ("at", "within", "before", "after", "from", "until")
+"""The keys of a time constraint."""
 
 EXPECTATION_KEYS: Mapping[str, tuple[str, ...]] = {
     "that": TIME_KEYS,
@@ -88,13 +90,14 @@ EXPECTATION_KEYS: Mapping[str, tuple[str, ...]] = {
     "event": (*TIME_KEYS, "count"),
     "modes": ("of", "from", "until"),
 }
-"""What an expectation may be, and what stands beside it."""
+"""The kinds of expectations with the keys beside them."""
 
 MAX_EVENTS = 1_000_000
+"""Largest expected number of events."""
 
 
 def read_test(document: Document, project: Project, problems: Problems | None = None) -> Test:
-    """Read a test with its system and scenario. Raises SpecError with all problems."""
+    """Return a checked test with its system and scenario. Raises SpecError with all problems."""
     document = expand_document(document, project)
     problems = problems if problems is not None else Problems()
     require_kind(document, "test", problems)
@@ -105,7 +108,7 @@ def read_test(document: Document, project: Project, problems: Problems | None = 
 
 
 class _TestReader(Reader):
-    """The sections of a test, one method each."""
+    """Reader with one method for each section of a test."""
 
     system: System
     scenario: Scenario
@@ -117,6 +120,7 @@ class _TestReader(Reader):
         self.project = project
 
     def read(self, document: Document) -> Test:
+        """Return the test of an expanded document; reports problems section by section."""
         tree = self.read_mapping(document.root, f"test {document.name}", TEST_KEYS)
         at = document.name_span
         self._load(tree, document)
@@ -148,7 +152,7 @@ class _TestReader(Reader):
         )
 
     def _load(self, tree: MappingNode, document: Document) -> None:
-        """The system and the scenario: named, or with the scenario written here."""
+        """Read the system, and the scenario by name or from the section `scenario`."""
         node, at = tree.get("scenario"), document.name_span
         if isinstance(node, MappingNode):
             inner = self.read_mapping(node, "scenario", INLINE_SCENARIO_KEYS)
@@ -176,6 +180,7 @@ class _TestReader(Reader):
         self.scenario_document = written
 
     def _expectation(self, entry: Entry) -> Expectation | None:
+        """Return the expectation of an entry; None if a problem was reported."""
         problem_count = len(self.problems.reported)
         found = self.read_alternative(entry, f"expect.{entry.key}", EXPECTATION_KEYS, "expects")
         if found is None:
@@ -202,9 +207,10 @@ class _TestReader(Reader):
             requirements=requirements_of(own),
         )
 
-    # What is expected.
+    # Subjects.
 
     def _subject(self, kind: str, entry: Entry, region_ref: RegionRef | None) -> Subject | None:
+        """Return the subject of an expectation; None if a problem was reported."""
         if kind == "modes":
             return self._modes(entry.node, region_ref)
         scalar = self.read_scalar(entry.node, kind, entry.span)
@@ -215,13 +221,14 @@ class _TestReader(Reader):
         return self._condition(scalar, kind)
 
     def _condition(self, scalar: ScalarNode, key: str) -> Condition | None:
+        """Return the condition of an expression; None if a problem was reported."""
         formula: Formula | None = self.read_expression(scalar, key, scalar.span)
         if formula is None or isinstance(formula.tree, ErrorNode):
             return None
         return self.conditions.read_condition(scalar, formula)
 
     def _trigger(self, node: YamlNode | None, at: Span) -> Trigger | None:
-        """What something is expected after: an event, or a condition that turns true."""
+        """Return the trigger `after`: an event (`->` or a mode name) or a condition."""
         scalar = self.read_scalar(node, "after", at)
         if scalar is None:
             return None
@@ -230,13 +237,17 @@ class _TestReader(Reader):
         return self._condition(scalar, "after")
 
     def _event(self, scalar: ScalarNode) -> ModeEntryEvent | None:
+        """Return an event of the system; None if a problem was reported."""
         event = read_event(scalar, self.system, self.problems)
         if event:
             require_mode_output(self.system, event.instance, scalar.span, self.problems)
         return event
 
     def _region_ref(self, own: MappingNode, at: Span) -> RegionRef | None:
-        """The region whose modes are expected: `est`, `est.gap`."""
+        """Return the region `of` of expected modes, e.g. `est` or `est.gap`.
+
+        Without `of` it is the main region of a single instance. None if a problem was reported.
+        """
         places = [
             (name, region.name)
             for name, instance in self.system.instances.items()
@@ -261,6 +272,7 @@ class _TestReader(Reader):
         return known[scalar.text]
 
     def _modes(self, node: YamlNode, region_ref: RegionRef | None) -> tuple[str, ...] | None:
+        """Return the expected modes of a region; reports unknown ones."""
         items = self.read_list(node, "modes")
         if region_ref is None or not items:
             return None
@@ -274,18 +286,19 @@ class _TestReader(Reader):
     def _report_unknown_mode(
         self, item: ScalarNode, region_ref: RegionRef, modes: Sequence[str]
     ) -> None:
-        """Report a mode that a region has not, or that has others inside it."""
+        """Report a name that is no leaf mode of a region."""
         label = f"`{item.text}` is not a mode of `{format_region(region_ref)}`"
         hint = suggest_mode(item.text, region_ref, self.system)
         inner = [mode for mode in modes if mode.startswith(f"{item.text}.")]
         if inner:
-            label = f"`{item.text}` has modes inside it, and what is listed are the innermost"
+            label = f"`{item.text}` has modes inside it; list the innermost modes"
             hint = f"like `{inner[0]}`"
         self.problems.error("name", item.span, label, hint)
 
-    # When it is expected.
+    # Time constraints.
 
     def _when(self, own: MappingNode, entry: Entry, kind: str) -> TimeConstraint:
+        """Return the time constraint of an expectation; reports contradictions."""
         given = {key: own.entries[key] for key in TIME_KEYS if key in own.entries}
         self._require_one_time(given, entry, kind)
         times = {key: self._time_point(own.get(key), key) for key in TIME_KEYS if key != "after"}
@@ -300,6 +313,7 @@ class _TestReader(Reader):
         )  # fmt: skip
 
     def _require_one_time(self, given: Mapping[str, Entry], entry: Entry, kind: str) -> None:
+        """Report missing, duplicate and incompatible keys of a time constraint."""
         moments = [key for key in ("at", "before", "after") if key in given]
         if len(moments) > 1:
             label = f"`{moments[0]}` and `{moments[1]}` say two moments"
@@ -320,6 +334,7 @@ class _TestReader(Reader):
                 self.problems.error("form", given[key].span, label)
 
     def _time_point(self, node: YamlNode | None, key: str) -> Fraction | None:
+        """Return a time [s]; `end` is the horizon. Reports times after the end of the run."""
         horizon = self.scenario.horizon
         if node is None:
             return None
@@ -338,6 +353,7 @@ class _TestReader(Reader):
         return time
 
     def _time(self, node: YamlNode | None, what: str) -> Fraction:
+        """Return a time [s] that is not negative; reports other quantities."""
         assert node is not None
         value, unit = self.read_quantity(node, what, node.span, None)
         if value < 0 or (value and not are_compatible(unit.dimension, SECOND)):
@@ -345,7 +361,7 @@ class _TestReader(Reader):
         return value
 
     def _require_row_time(self, subject: Subject, when: TimeConstraint, own: MappingNode) -> None:
-        """Signals are known at rows: `at` is the time of one."""
+        """Report a condition of signals whose time `at` is not the time of a row."""
         every = self.scenario.every
         if not isinstance(subject, Condition) or not subject.all_signals:
             return
@@ -356,4 +372,5 @@ class _TestReader(Reader):
 
 
 def _text(node: YamlNode | None) -> str:
+    """Return the text of a scalar node; empty for other nodes."""
     return node.text if isinstance(node, ScalarNode) else ""

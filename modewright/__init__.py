@@ -1,6 +1,6 @@
-"""modewright: hybrid automata in YAML, interpreted, printed as C, kept in lock-step.
+"""modewright: simulate, check, diagnose and generate C from hybrid automata in YAML.
 
-What is named here is loaded when it is first used: `import modewright` itself takes no time.
+The public API. A name is imported at its first use, so that `import modewright` is fast.
 """
 
 from __future__ import annotations
@@ -134,11 +134,11 @@ PLACES = {
     "sweep": "modewright.api.studies",
     "trace": "modewright.api.traces",
 }
-"""Where a name of the public API is defined, if not in `modewright.api.simulation`."""
+"""The module of each public name; names that are absent are in `modewright.api.simulation`."""
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name of the public API."""
+    """Import a public name at its first use. Raises AttributeError for other names."""
     if name not in __all__:
         raise AttributeError(f"module `modewright` has no `{name}`")
     value = getattr(import_module(PLACES.get(name, "modewright.api.simulation")), name)

@@ -1,1 +1,2 @@
-"""sweep: studies of many variants of a system - what varies, what is measured, the store."""
+"""Studies: simulate many variants of a system, store the results in Parquet files, summarise them.
+"""

@@ -1,1 +1,1 @@
-"""The public functions: simulate, check, generate, diagnose, sweep and others."""
+"""Public API: the functions behind the commands, such as simulate, check, generate and diagnose."""

@@ -1,4 +1,4 @@
-"""Calibrations: pages of automata written for, and read from, calibration tools."""
+"""Calibrations: export, import and recompute the calibration pages of automata."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from language.overlays.literal_format import (
 from language.text.diagnostic import Problem, Problems, Source, Span
 from language.text.document import Document, ScalarNode, YamlNode
 from language.text.node_edit import format_inline
-from modewright.api.documents import Values, load_calibrated_document, parse_values as as_scalars
+from modewright.api.documents import Values, load_calibrated_document, parse_values
 
 
 @dataclass(frozen=True)
 class CalibrationPage:
-    """The page of an automaton, its solved numbers solved for the values that it holds."""
+    """The calibration page of an automaton; its solved numbers belong to its parameter values."""
 
     automaton: Automaton = field(repr=False)
     program: Program = field(repr=False)
@@ -49,7 +49,7 @@ class CalibrationPage:
         return tuple(c for c in page_constants(self.program) if c.kind == "solved")
 
     def text(self, form: str) -> str:
-        """Return the page as a file: `dcm`, `cdfx` or `csv`."""
+        """Return the page as the text of a file in the format `dcm`, `cdfx` or `csv`."""
         name, number = self.program.name, self.program.number_type
         heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
         return FORMATS[form].write(
@@ -59,7 +59,7 @@ class CalibrationPage:
 
 @dataclass(frozen=True)
 class SolvedChange:
-    """A solved number that is another one now; `relative` is |change| over the larger size."""
+    """A solved number that changed; `relative` is |change| over the larger magnitude."""
 
     name: str
     before: float
@@ -67,17 +67,17 @@ class SolvedChange:
 
     @property
     def relative(self) -> float:
-        """How large the change is."""
+        """The relative change, between 0 and 2."""
         size = max(abs(self.after), abs(self.before))
         return abs(self.after / size - self.before / size)
 
 
 @dataclass(frozen=True)
 class ImportedPage:
-    """What a file of calibration data says of an automaton.
+    """The values of a calibration file for an automaton.
 
-    `values` are literals of the language by parameter; `stale` are solved numbers of the file that
-    were solved for other values; `warnings` are about the file.
+    `values` are literals of the language by parameter, `stale` the solved numbers in the file that
+    belong to other values, `warnings` problems of the file.
     """
 
     page: CalibrationPage
@@ -87,13 +87,14 @@ class ImportedPage:
     warnings: tuple[Problem, ...]
 
     def calibration(self, name: str, origin: str = "", date: str = "") -> str:
-        """Return the calibration file of the language with these values."""
+        """Return the text of a calibration file (YAML) with these values."""
         return format_calibration(name, self.page.program.name, origin, date, self.values)
 
 
 @dataclass(frozen=True)
 class ResolvedPage:
-    """A page that was solved anew, the solved numbers that changed, and those that were absent."""
+    """A page with recomputed solved numbers, the changes, and the numbers that were absent before.
+    """
 
     page: CalibrationPage
     changes: tuple[SolvedChange, ...]
@@ -111,7 +112,7 @@ def export_calibration(
     """Return the calibration page of an automaton. Raises SpecError."""
     project = Project(root or Path())
     return _build_page(
-        load_calibrated_document(reference, project, calibrations), project, as_scalars(values)
+        load_calibrated_document(reference, project, calibrations), project, parse_values(values)
     )
 
 
@@ -122,9 +123,9 @@ def import_calibration(
     form: str | None = None,
     own_only: bool = False,
 ) -> ImportedPage:
-    """Return what a file of calibration data says of an automaton. Raises SpecError.
+    """Return the values of a calibration file for an automaton. Raises SpecError.
 
-    With `own_only` names of other functions of the ECU are passed over.
+    With `own_only` names of other functions of the ECU are ignored.
     """
     project = Project(root or Path())
     return _import_page(
@@ -140,15 +141,13 @@ def resolve_calibration(
     calibrations: Sequence[str] = (),
     form: str | None = None,
 ) -> ResolvedPage:
-    """Return the page of an automaton solved anew, for the values of a file or a calibration.
+    """Return the page of an automaton with solved numbers computed for a file or for calibrations.
 
-    Changes are those since the file, without one since the spec as it stands. Raises SpecError.
+    Changes are relative to the file, or without a file to the spec. Raises SpecError.
     """
     project = Project(root or Path())
-    document, scalars = (
-        load_calibrated_document(reference, project, calibrations),
-        as_scalars(values),
-    )
+    document = load_calibrated_document(reference, project, calibrations)
+    scalars = parse_values(values)
     if page:
         imported = _import_page(page, form, document, project, scalars)
         absent = [remark.name for remark in imported.remarks if remark.kind == "missing"]
@@ -171,6 +170,7 @@ def _import_page(
     scalars: Mapping[str, ScalarNode],
     own_only: bool = False,
 ) -> ImportedPage:
+    """Return the values of a calibration file and the page that results from them."""
     problems = Problems()
     automaton = automaton_of(document, project, scalars)
     program = program_of(automaton)
@@ -191,7 +191,7 @@ def _import_page(
 def _changed_constants(
     before: Mapping[str, float], page: CalibrationPage
 ) -> tuple[SolvedChange, ...]:
-    """Return the solved numbers that are others than they were."""
+    """Return the solved numbers of a page that differ from those before."""
     return tuple(
         SolvedChange(page_name(page.program, constant), before[constant.name], constant.value)
         for constant in page.solved
@@ -202,9 +202,9 @@ def _changed_constants(
 def _build_page(
     document: Document, project: Project, values: Mapping[str, YamlNode]
 ) -> CalibrationPage:
-    """Return a page; a value with more digits than its type is taken as the page will hold it.
+    """Return a page whose solved numbers fit the rounded parameter values of the page exactly.
 
-    What is solved for a value then fits what a tool reads of it, to the last bit.
+    A parameter with more digits than its number type is first rounded to that type.
     """
     automaton = automaton_of(document, project, values)
     program = program_of(automaton)
@@ -222,7 +222,7 @@ def _build_page(
 
 
 def _stored_value(automaton: Automaton, program: Program, name: str) -> ScalarNode:
-    """Return the value of a parameter as a page holds it."""
+    """Return the value of a parameter as its number type stores it."""
     value = next(c.value for c in program.constants if c.name == f"calibration.{name}")
     text = format_value_in_unit(automaton.parameters[name], value, program.number_type)
     return ScalarNode(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))

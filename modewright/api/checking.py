@@ -1,4 +1,4 @@
-"""Checking: all problems of a spec of any kind; loads neither numerics nor generator."""
+"""Checking: report all problems of a spec of any kind, without importing numerics or generator."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ from sweep.definition.study_reader import read_study
 
 @dataclass(frozen=True)
 class CheckResult:
-    """All problems of a spec, warnings too; of an automaton the limits of its step, as lines."""
+    """The problems of a spec including warnings; `limits` are lines about the step of an automaton.
+    """
 
     problems: tuple[Problem, ...]
     limits: tuple[str, ...] = ()
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec, warnings too; an empty list means that it is fine."""
+    """Return all problems of a spec including warnings; an empty list means that the spec is valid.
+    """
     return list(check_spec(reference, root).problems)
 
 
@@ -42,7 +44,7 @@ def check_spec(
 ) -> CheckResult:
     """Return all problems of a spec, and the largest stable step of each mode of an automaton.
 
-    `texts` are those of an editor, by resolved path: they stand for what is on the disk.
+    `texts` are unsaved texts of an editor by resolved path; they replace the files.
     """
     return _run_checks(
         reference,
@@ -52,21 +54,21 @@ def check_spec(
 
 
 def check_without_proofs(reference: str, root: Path, texts: Mapping[Path, str]) -> CheckResult:
-    """Return what `checked` does without what takes long: solved numbers, and proofs."""
+    """Return the result of `check_spec` without solved numbers and proofs, which take long."""
     skip_deep_checks = _DeepChecks(lambda automaton: None, lambda automaton, problems: None)
     return _run_checks(reference, Project(root, texts), skip_deep_checks)
 
 
 @dataclass(frozen=True)
 class _DeepChecks:
-    """What is done with an automaton without errors: its Program is made, it is looked at."""
+    """The slow steps for a valid automaton: lowering to a Program, and checks with proofs."""
 
     lower: Callable[[Automaton], Program | None]
     examine: Callable[[Automaton, Problems], None]
 
 
 def _run_checks(reference: str, project: Project, deep_checks: _DeepChecks) -> CheckResult:
-    """Return what is found of a spec."""
+    """Return the problems of a spec according to its kind."""
     problems = Problems()
     limits: tuple[str, ...] = ()
     try:
@@ -106,7 +108,9 @@ def _run_checks(reference: str, project: Project, deep_checks: _DeepChecks) -> C
 def _apply_calibration(
     document: Document, reference: str, project: Project, problems: Problems
 ) -> Document:
-    """Return what a calibration is of, calibrated by it: so its values are checked there."""
+    """Return the base of a calibration with the calibration applied, so that its values are
+    checked.
+    """
     of = read_calibration(document, problems).of
     problems.raise_if_errors()
     base = project.read(project.path_of(of.text, of.span))
@@ -114,17 +118,17 @@ def _apply_calibration(
 
 
 def merge_problems(results: Iterable[CheckResult]) -> list[Problem]:
-    """Return the problems of several specs, each once, in the order of their places."""
+    """Return the problems of several specs without duplicates, in the order of their places."""
     return sort_problems(problem for each in results for problem in each.problems)
 
 
 def spec_files(root: Path) -> Iterator[Path]:
-    """Yield the specs of a project in the order of their paths."""
+    """Yield the YAML files below `spec/` in the order of their paths."""
     yield from sorted((root / "spec").rglob("*.yaml"))
 
 
 def problem_json(problem: Problem) -> dict[str, Any]:
-    """Return a problem as plain data."""
+    """Return a problem as a dict for JSON."""
     return {
         "severity": problem.severity,
         "code": problem.code,
@@ -138,6 +142,7 @@ def problem_json(problem: Problem) -> dict[str, Any]:
 
 
 def _check_scenario(reference: str, project: Project) -> None:
+    """Check a scenario against the system that it names. Raises SpecError."""
     document = project.read(project.path_of(reference))
     node = expand_document(document, project).root.get("of")
     if isinstance(node, ScalarNode):

@@ -1,4 +1,4 @@
-"""Code: the C of an automaton, and what an ECU's engineers want beside it, as functions."""
+"""Code generation: functions for C code, exchange formats, proofs, coverage and metrics."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 
 from codegen.coverage.boundary_values import generate_boundary_sequences
 from codegen.coverage.coverage_exploration import corpus_records, generate_corpus
-from codegen.coverage.mcdc import McdcCoverage, add_infeasibility_proofs, measure_mcdc as covered
+from codegen.coverage.mcdc import McdcCoverage, add_infeasibility_proofs, measure_mcdc
 from codegen.emit.c_module import emit_c_files
 from codegen.exchange.a2l import writer as asam
 from codegen.exchange.cmake import emit_cmake_file
-from codegen.exchange.dbc import FIRST_IDENTIFIER, emit_dbc as dbc_of
-from codegen.exchange.fmi.archive import build_fmu as fmu_of
+from codegen.exchange.dbc import FIRST_IDENTIFIER, emit_dbc
+from codegen.exchange.fmi.archive import build_fmu
 from codegen.exchange.fmi.variable import Version
-from codegen.harness.instruction_count import InstructionCounts, count_instructions as counted
-from codegen.harness.metrics import Metrics, measure_code as measured
+from codegen.harness.instruction_count import InstructionCounts, count_instructions
+from codegen.harness.metrics import Metrics, measure_code
 from codegen.proofs.all import CHECKS, run_checks
 from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.number_type import NumberType
@@ -36,8 +36,9 @@ from modewright.api.simulation import load
 from modewright.api.spec_tests import find_tests, load_tests
 
 RETAINED_PREFIXES = ("latched.", "state.", "discrete.")
+"""Prefixes of the variables that a sampled automaton retains between ticks."""
 SEEDS = (SEED, SEED + 1)
-"""Where libFuzzer starts: what one seed misses, another one may find."""
+"""Seeds of libFuzzer; two of them find more than one."""
 
 
 def generate(
@@ -56,7 +57,7 @@ def cmake(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return the file by which CMake builds the C of an automaton, by name. Raises SpecError."""
+    """Return the CMake file for the C of an automaton by name. Raises SpecError."""
     return emit_cmake_file(_load_program(reference, values, root, calibrations))
 
 
@@ -69,12 +70,12 @@ def fmu(
     *,
     is_source_only: bool = False,
 ) -> bytes:
-    """Return an automaton as a co-simulation FMU, version 2 or 3, with a binary of this machine.
+    """Return an automaton as a co-simulation FMU of version 2 or 3 with a binary for this machine.
 
-    `is_source_only` leaves the binary out. Raises SpecError; ValueError for another version and
-    for an automaton that has no C; ToolMissing, BuildError where there is a binary to make.
+    With `is_source_only` the FMU has no binary. Raises SpecError, ValueError for another version or
+    an automaton without C, and MissingToolError and BuildError if the binary cannot be built.
     """
-    return fmu_of(_load_program(reference, values, root, calibrations), version, is_source_only)
+    return build_fmu(_load_program(reference, values, root, calibrations), version, is_source_only)
 
 
 def a2l(
@@ -86,10 +87,10 @@ def a2l(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> str:
-    """Return the A2L of the C of an automaton, with addresses of a linked program.
+    """Return the A2L file of an automaton's C, with addresses if a linked program `elf` is given.
 
-    `page` and `instance` name structures where that has several. Raises SpecError, ImageError,
-    ToolMissing.
+    `page` and `instance` name the structures if the program has several. Raises SpecError,
+    ImageError and MissingToolError.
     """
     program = _load_program(reference, values, root, calibrations)
     return asam.emit_a2l(program, asam.locate_module(program, elf, page, instance) if elf else None)
@@ -104,12 +105,12 @@ def dbc(
     *,
     is_fd: bool = False,
 ) -> str:
-    """Return a DBC of an automaton's inputs and outputs, from the identifier `first` on.
+    """Return a DBC file of the inputs and outputs of an automaton; identifiers start at `first`.
 
-    Raises SpecError, ToolMissing; ValueError where identifiers run out.
+    Raises SpecError, MissingToolError, and ValueError if the identifiers are exhausted.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
-    return dbc_of(program, _input_ranges(automaton), first, is_fd)
+    return emit_dbc(program, _input_ranges(automaton), first, is_fd)
 
 
 def prove(
@@ -119,9 +120,9 @@ def prove(
     calibrations: Sequence[str] = (),
     checks: Sequence[str] = CHECKS,
 ) -> Iterator[ToolVerdict]:
-    """Yield what tools of others say of the C of an automaton: some of the checks, in turn.
+    """Yield the verdicts of external tools about the C of an automaton, one check after another.
 
-    Raises SpecError, ToolMissing.
+    Raises SpecError and MissingToolError.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
     yield from run_checks(automaton, program, checks)
@@ -137,9 +138,9 @@ def fuzz(
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
 ) -> FuzzReport:
-    """Try `runs` sequences of at most so many `ticks` on the C of an automaton and on the engine.
+    """Compare engine and C of a sampled automaton on `runs` generated sequences of at most `ticks`.
 
-    Raises SpecError, ValueError for a continuous automaton, ToolMissing, BuildError.
+    Raises SpecError, ValueError for a continuous automaton, MissingToolError and BuildError.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     if not automaton.is_sampled:
@@ -157,11 +158,12 @@ def mcdc(
     *,
     is_proven: bool = True,
 ) -> McdcCoverage:
-    """Tell which conditions of the C of an automaton are shown to matter by the tests of the
-    project, by what libFuzzer finds in `runs`, and at the borders of both; and, if that
-    `is_proven`, which cannot be.
+    """Return the MC/DC coverage of the C of an automaton.
 
-    Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
+    The sequences are those of the project's tests, those that libFuzzer finds in `runs`, and
+    boundary values of both. With `is_proven` conditions that cannot be covered are proven
+    infeasible (sampled automata only). Raises SpecError, MissingToolError, BuildError, and
+    ValueError without any sequence.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     sequences = [tape.inputs for tape in _record_project_tests(program, root, numbers)]
@@ -175,14 +177,14 @@ def mcdc(
     if automaton.is_sampled:
         known_sequences = (*sequences, *sorted(corpus_records(program, ranges, corpus), key=len))
         sequences.extend(generate_boundary_sequences(program, known_sequences, ranges))
-    found = covered(program, sequences, corpus, ranges)
+    coverage = measure_mcdc(program, sequences, corpus, ranges)
     if not (is_proven and automaton.is_sampled):
-        return found
-    return add_infeasibility_proofs(found, program, _retained_ranges(automaton, program))
+        return coverage
+    return add_infeasibility_proofs(coverage, program, _retained_ranges(automaton, program))
 
 
 def _retained_ranges(automaton: Automaton, program: Program) -> dict[str, tuple[float, float]]:
-    """Return the ranges [SI] in which a sampled automaton holds its reals, by variable."""
+    """Return the declared ranges [SI] of retained real variables of a sampled automaton."""
     variables: dict[str, Input | State] = {**automaton.inputs, **automaton.state_variables}
     reals = {v.name for v in program.variables if v.type == "real"}
     ranges = {}
@@ -196,7 +198,7 @@ def _retained_ranges(automaton: Automaton, program: Program) -> dict[str, tuple[
 def _record_project_tests(
     program: Program, root: Path | None, numbers: NumberType | None
 ) -> Iterator[TickLog]:
-    """Yield what each test of a project does with a Program."""
+    """Yield the tick logs of a Program in the tests of a project."""
     for test in load_tests(find_tests(root), root):
         run = with_number_type(test.system, numbers) if numbers else test.system
         if any(one.automaton.name == program.name for one in run.instances.values()):
@@ -211,11 +213,11 @@ def metrics(
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
 ) -> Metrics:
-    """Return what the C of an automaton takes of a Cortex-M4F: ROM, RAM, stack.
+    """Return ROM, RAM and stack of the C of an automaton on a Cortex-M4F.
 
-    `numbers` replaces its number type. Raises SpecError, ToolMissing.
+    `numbers` replaces its number type. Raises SpecError and MissingToolError.
     """
-    return measured(_load_program(reference, values, root, calibrations, numbers))
+    return measure_code(_load_program(reference, values, root, calibrations, numbers))
 
 
 def instructions(
@@ -227,9 +229,9 @@ def instructions(
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
 ) -> InstructionCounts:
-    """Return the instructions of the steps of an automaton's C in a scenario of a system.
+    """Return the instruction counts of the steps of an automaton's C in a scenario of a system.
 
-    Raises SpecError, ValueError where no instance of the system is that automaton, ToolMissing.
+    Raises SpecError, MissingToolError, and ValueError if the system has no such instance.
     """
     program = _load_program(reference, values, root, calibrations, numbers)
     loaded = load(system, scenario, None, root, calibrations)
@@ -238,11 +240,11 @@ def instructions(
     if name is None:
         raise ValueError(f"{system} has no instance of {program.name}")
     tape = record_ticks(run, loaded.scenario)[1][name]
-    return counted(program, b"".join(tape.inputs[:MAX_COUNTED_STEPS]))
+    return count_instructions(program, b"".join(tape.inputs[:MAX_COUNTED_STEPS]))
 
 
 def _input_ranges(automaton: Automaton) -> dict[str, tuple[float, float]]:
-    """Return the ranges [SI] of inputs by name."""
+    """Return the declared ranges [SI] of inputs by name."""
     ends = {name: one.range for name, one in automaton.inputs.items() if one.range}
     return {name: (float(low), float(high)) for name, (low, high) in ends.items()}
 
@@ -254,7 +256,7 @@ def _load_program(
     calibrations: Sequence[str],
     numbers: NumberType | None = None,
 ) -> Program:
-    """Return the Program that C is made of."""
+    """Return the Program of an automaton."""
     return _load_automaton_and_program(reference, values, root, calibrations, numbers)[1]
 
 
@@ -265,7 +267,10 @@ def _load_automaton_and_program(
     calibrations: Sequence[str],
     numbers: NumberType | None,
 ) -> tuple[Automaton, Program]:
-    """Return an automaton and the Program that C is made of."""
+    """Return an automaton and its Program, with calibrations, values and number type applied.
+
+    Raises SpecError, also for a sampled automaton with missing ranges.
+    """
     project = Project(root or Path())
     document = load_calibrated_document(reference, project, calibrations)
     automaton = automaton_of(document, project, parse_values(values))

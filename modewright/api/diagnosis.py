@@ -1,4 +1,4 @@
-"""Diagnoses: recordings against a spec, as functions of the public API."""
+"""Diagnosis: compare a spec with recordings, find missing effects and fit parameters."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from diagnosis.data.holdout import require_disjoint
 from diagnosis.model.effect_folder import explain_unplaceable, load_effects
 from diagnosis.model.effect_library import library_effects
 from diagnosis.pipeline.case import BootstrapMode, Case, file_digests
-from diagnosis.pipeline.diagnose import diagnose as diagnosed
-from diagnosis.pipeline.parameter_fit import Fit, fit as fitted
+from diagnosis.pipeline.diagnose import diagnose as run_diagnosis
+from diagnosis.pipeline.parameter_fit import Fit, fit as fit_case
 from diagnosis.pipeline.usable_recordings import LazyRecordings, select_usable
 from diagnosis.quality.finding import format_findings
 from diagnosis.quality.recording import used_columns
@@ -42,47 +42,49 @@ from modewright.runtime.gc_pause import infrequent_gc
 from modewright.runtime.output_files import OutputError, make_folder, remove_files, write_files
 
 Report = Callable[[str], None]
+"""A function that is called with each line of progress."""
 CACHED = "kept"
+"""The word for the thresholds of an earlier bootstrap."""
 CHECKPOINT_FOLDER = "stages"
-"""Where a folder of results keeps what a diagnosis that was ended goes on from."""
+"""The folder of checkpoints in a folder of results; an interrupted diagnosis continues from it."""
 THRESHOLD_WORDS: Mapping[str, BootstrapMode] = {
     CACHED: "kept",
     "bootstrap": "made",
     "usual": "never",
 }
-"""Words for thresholds; anything else is a file."""
+"""The words for thresholds with the mode of the bootstrap; other texts are files."""
 
 
 class BudgetSpent(Exception):
-    """The time that a diagnosis may take has passed before it came to a verdict."""
+    """The time budget of a diagnosis passed before it reached a verdict."""
 
 
 class UnusableRecordings(Exception):
-    """Recordings have errors that make whatever follows from them worthless."""
+    """All recordings have errors, so that no result can be derived."""
 
 
 class _Budget:
-    """The time [s] that a diagnosis may take, and what has been told in it."""
+    """The time budget [s] of a diagnosis and the lines that it reported."""
 
     def __init__(self, seconds: float | None, report: Report) -> None:
         self.begun = time.monotonic()
         self.seconds = seconds
-        self.telling = report
-        self.told: list[str] = []
+        self._report_line = report
+        self.lines: list[str] = []
 
     def report(self, text: str) -> None:
-        """Tell what a stage has found."""
-        self.told.append(text)
-        self.telling(text)
+        """Store a line and pass it on."""
+        self.lines.append(text)
+        self._report_line(text)
 
     def check(self) -> None:
-        """Raise BudgetSpent when the time has passed."""
+        """Raise BudgetSpent if the time has passed."""
         if self.seconds is not None and self.elapsed > self.seconds:
             raise BudgetSpent(f"the {self.seconds:g} s of its budget are over")
 
     @property
     def elapsed(self) -> float:
-        """The time [s] since the beginning."""
+        """The time [s] since the start of the diagnosis."""
         return time.monotonic() - self.begun
 
 
@@ -102,13 +104,13 @@ def diagnose(
     anyway: bool = False,
     tell: Report = lambda text: None,
 ) -> DiagnosisReport:
-    """Say which physics an automaton lacks to show what was recorded; write it into a folder.
+    """Find the effects that an automaton lacks to reproduce recordings; write the results to `out`.
 
-    Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
-    wanted `anyway`. `effects` is a folder of effects in place of those shipped, `budget` a time
-    [s] after which the verdict is `unknown` if none was found. `thresholds` are those that a
-    bootstrap has left (`kept`, else the usual one), those of a `bootstrap` made where it has left
-    none, the `usual` one, or a file. Raises SpecError, ValueError, ToolMissing, OutputError.
+    Recordings with errors give the verdict `unknown`, unless `anyway`. `effects` is a folder of
+    effects instead of the library. After `budget` seconds without a verdict it is `unknown`.
+    `thresholds` are `kept` (of an earlier bootstrap, else the defaults), `bootstrap` (computed if
+    there are none), `usual` (the defaults) or a file. `tell` is called with lines of progress.
+    Raises SpecError, ValueError, MissingToolError and OutputError.
     """
     time_budget = _Budget(budget, tell)
     tell = time_budget.report
@@ -134,29 +136,29 @@ def diagnose(
         for text in reasons:
             tell(text)
         case = dataclasses.replace(case, train=usable_files)
-        dossier = _conclude(case, automaton, checked, left_out, reasons, time_budget)
+        report = _conclude(case, automaton, checked, left_out, reasons, time_budget)
     else:
-        dossier = _build_unusable_dossier(case, automaton, checked, errors, time_budget)
+        report = _report_unusable(case, automaton, checked, errors, time_budget)
     if out is not None:
-        save_diagnosis(dossier, out, spec)
-    return dossier
+        save_diagnosis(report, out, spec)
+    return report
 
 
-def _build_unusable_dossier(
+def _report_unusable(
     case: Case,
     automaton: Automaton,
     checked: CheckedRecordings,
     errors: Sequence[str],
     budget: _Budget,
 ) -> DiagnosisReport:
-    """Return what is told where no recording is left to conclude from."""
+    """Return the report `unknown` for a diagnosis without usable recordings."""
     messages = tuple(dict.fromkeys((*unusable_reasons(checked.check), *errors)))
     verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
     return DiagnosisReport(case, automaton, checked.check, verdict)
 
 
 def _checkpoint_folder(out: str | Path | None) -> Path | None:
-    """Return where stages are kept. Raises OutputError where they cannot be."""
+    """Return the folder of checkpoints; None without `out`. Raises OutputError if it is a file."""
     if out is None:
         return None
     folder = Path(out) / CHECKPOINT_FOLDER
@@ -173,14 +175,14 @@ def _conclude(
     reasons: Sequence[str],
     budget: _Budget,
 ) -> DiagnosisReport:
-    """Return what is concluded from recordings; where the time is over, what was found till then.
+    """Return the report of a diagnosis; the verdict is `unknown` if the budget is spent.
 
-    A verdict from a part of the candidates would look like one from all: it is `unknown`.
+    A verdict from a part of the candidates would be misleading; the lines report what was found.
     """
     try:
-        diagnosis = diagnosed(case, budget.report)
+        diagnosis = run_diagnosis(case, budget.report)
     except BudgetSpent as spent:
-        done = [text for text in budget.told if text.startswith(("accepted", "recalibrated"))]
+        done = [text for text in budget.lines if text.startswith(("accepted", "recalibrated"))]
         advice = "with a larger --budget and the same --out it goes on from there"
         messages = (*reasons, f"not finished: {spent}", *done, advice)
         verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)
@@ -208,9 +210,9 @@ def _conclude(
 
 
 def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
-    """Write verdict, variant, report and figures into a folder; return the files.
+    """Write verdict, variant, report and figures into a folder and return the paths.
 
-    Raises OutputError.
+    Files of earlier diagnoses that are not written again are removed. Raises OutputError.
     """
     from diagnosis.report.page import report_files
 
@@ -235,14 +237,16 @@ def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list
 
 
 def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
-    """Tell whether a file is one that the diagnosis itself has read."""
+    """Return whether a path is a recording or an effect that the diagnosis read."""
     recordings = (*dossier.case.train, *dossier.case.held_out)
     is_recording = path.resolve() in {file_of(one).resolve() for one in recordings}
     return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
 
 
 def base_of(dossier: DiagnosisReport, spec: str, folder: Path) -> str:
-    """Return how a variant in a folder names its base: by name, or by file if need be."""
+    """Return how a variant in a folder refers to its base: by name, or by path if that is
+    ambiguous.
+    """
     project = dossier.case.project
     path = project.path_of(spec)
     if [file.resolve() for file in project.index.get(dossier.name, [])] == [path.resolve()]:
@@ -258,6 +262,7 @@ def _build_case(
     effects: str | Path | None,
     root: Path | None,
 ) -> tuple[Case, Automaton]:
+    """Return the case of a diagnosis and its automaton."""
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
     automaton = checked.automaton or automaton_of(document, project)
@@ -281,7 +286,7 @@ def _build_case(
 
 
 def _read_thresholds(thresholds: str | Path) -> tuple[BootstrapMode, Thresholds]:
-    """Return whether a bootstrap is used, and the thresholds without one. Raises ValueError."""
+    """Return the mode of the bootstrap and the initial thresholds. Raises ValueError."""
     if thresholds in THRESHOLD_WORDS:
         return THRESHOLD_WORDS[str(thresholds)], DEFAULT_THRESHOLDS
     if not Path(thresholds).is_file():
@@ -291,9 +296,9 @@ def _read_thresholds(thresholds: str | Path) -> tuple[BootstrapMode, Thresholds]
 
 
 def _load_effects(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
-    """Return the effects of a folder; without one those of the project and those shipped.
+    """Return the effects of a folder; without a folder those of the project and of the library.
 
-    Raises SpecError, ValueError.
+    Raises SpecError and ValueError.
     """
     return library_effects(project) if folder is None else load_effects(Path(folder))
 
@@ -309,11 +314,11 @@ def fit(
     anyway: bool = False,
     tell: Report = lambda text: None,
 ) -> Fit:
-    """Fit parameters of an automaton within their ranges to what was recorded.
+    """Fit parameters of an automaton within their ranges to recordings.
 
-    `parameters` are those that may move: all that have a range, if none are named. What is odd
-    about the recordings is told. Those with errors are not used, but if it is wanted `anyway`.
-    Raises UnusableRecordings where most of them are, SpecError, ValueError, ToolMissing.
+    `parameters` are the names to fit; by default all with a range. Findings about recordings are
+    reported through `tell`. Recordings with errors are left out, unless `anyway`. Raises
+    UnusableRecordings, SpecError, ValueError and MissingToolError.
     """
     require_disjoint(train, ())
     checked = check_recordings(train, map, spec, root=root)
@@ -329,4 +334,4 @@ def fit(
         if file not in usable_files:
             tell(f"left out: {case.name_of(file)}")
     case = dataclasses.replace(case, train=usable_files)
-    return fitted(case, parameters, tell)
+    return fit_case(case, parameters, tell)

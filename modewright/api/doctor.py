@@ -1,4 +1,4 @@
-"""Doctor: whether what modewright needs is there and works, each with what would help."""
+"""Doctor: check that Python, dependencies, compiler and cache work; suggest remedies."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Literal
 
 MIN_PYTHON = (3, 11)
+"""The oldest supported version of Python."""
 HealthStatus = Literal["ok", "absent", "fault"]
 
 
 @dataclass(frozen=True)
 class HealthCheck:
-    """One thing that was looked at; `absent` is what is not needed for most."""
+    """The result of one check; `absent` means an optional part that is not installed."""
 
     name: str
     verdict: HealthStatus
@@ -27,7 +28,7 @@ class HealthCheck:
 
 
 def run_health_checks() -> Iterator[HealthCheck]:
-    """Yield what is found, one after the other; the last is a self-test that compiles."""
+    """Yield the results of all checks; the last is a self-test if there is a compiler."""
     version = platform.python_version()
     is_new = sys.version_info >= MIN_PYTHON
     yield HealthCheck("python", "ok" if is_new else "fault", f"{version}, {sys.executable}")
@@ -42,6 +43,7 @@ def run_health_checks() -> Iterator[HealthCheck]:
 
 
 def _check_dependencies() -> Iterator[HealthCheck]:
+    """Yield the installed version of each dependency; optional ones may be absent."""
     for line in metadata.requires("modewright") or []:
         requirement, _, marker = line.partition(";")
         name = requirement.split("[")[0].split("<")[0].split(">")[0].split("=")[0].split("~")[0]
@@ -57,6 +59,7 @@ def _check_dependencies() -> Iterator[HealthCheck]:
 
 
 def _check_compiler() -> HealthCheck:
+    """Return the version of the C compiler, or why there is none."""
     from codegen.toolchain.compiler import BuildError, compiler_version
     from language.text.diagnostic import MissingToolError
 
@@ -70,6 +73,7 @@ def _check_compiler() -> HealthCheck:
 
 
 def _check_cache() -> HealthCheck:
+    """Return folder and size of the cache of compiled programs, or why it is unusable."""
     from codegen.toolchain.build_cache import CACHE_VARIABLE, cache_fault, cache_folder
 
     try:

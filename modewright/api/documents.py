@@ -1,4 +1,4 @@
-"""Documents: specs by name or path, with calibrations laid, and values that a user gives."""
+"""Documents: load specs by name or path, apply calibrations and parse parameter values."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Values = Mapping[str, str]
 def load_calibrated_document(
     reference: str, project: Project, calibrations: Sequence[str]
 ) -> Document:
-    """Return a spec with calibrations laid over it. Raises SpecError."""
+    """Return a spec with calibrations applied in their order. Raises SpecError."""
     document = read_document(project.path_of(reference))
     return add_calibrations(document, calibrations, "--calibration")
 
 
 def parse_values(values: Values | None) -> dict[str, ScalarNode]:
-    """Return values that a user gave as the language reads them. Raises SpecError."""
+    """Return parameter values as scalar nodes of the language; empty for None. Raises SpecError."""
     return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

@@ -1,4 +1,4 @@
-"""Effects: the library of physics that a diagnosis can name, as functions of the public API."""
+"""Effects: list, describe and draw the effects that a diagnosis can find."""
 
 from __future__ import annotations
 
@@ -18,22 +18,25 @@ if TYPE_CHECKING:
     from engine.results.plot import Picture
 
 DEFAULT_BASE = "blind_driveline"
-"""The spec over which signatures are drawn where none is named."""
+"""The spec for drawings of effects if none is named."""
 PREFIX_LENGTH = 4
-"""Letters at the start of a word that make two names alike."""
+"""Number of common first letters for which two names are considered similar."""
 
 
 def list_effects(at: str | None = None, root: Path | None = None) -> list[EffectDescription]:
-    """Return all effects of the project and of the product; with a spec, the places they fit."""
+    """Return all effects of the project and of the library; with a spec `at`, also their places in
+    it.
+    """
     project = Project(root or Path())
     document = _load_base(at, project) if at else None
     return [describe_effect(effect, document, project) for effect in library_effects(project)]
 
 
 def find_effect(name: str, at: str | None = None, root: Path | None = None) -> EffectDescription:
-    """Return one effect; with a spec, the places it fits, or the one of `effect@place`.
+    """Return one effect by name; with a spec `at`, also its places in it.
 
-    Raises SpecError.
+    `effect@place` selects one place. Old names of effects are accepted. Raises SpecError for
+    unknown names and places.
     """
     project = Project(root or Path())
     document = _load_base(at, project) if at else None
@@ -57,7 +60,7 @@ def find_effect(name: str, at: str | None = None, root: Path | None = None) -> E
 
 
 def _suggest_name(name: str, known: Iterable[str]) -> str:
-    """Return what may have been meant: the nearest name, or those that begin a word alike."""
+    """Return a hint: the most similar name, else names with a word that begins equally."""
     names = sorted({*known, *VERDICT_ALIASES})
     nearest_name = suggest_name(name, names)
     if nearest_name:
@@ -70,6 +73,7 @@ def _suggest_name(name: str, known: Iterable[str]) -> str:
 
 
 def _raise_name_error(text: str, label: str, help: str) -> NoReturn:
+    """Raise SpecError for a text of the command line."""
     problems = Problems()
     span = Span(Source("command line", (text,)), 1, 1, max(1, len(text)))
     problems.error("name", span, label, help)
@@ -79,22 +83,24 @@ def _raise_name_error(text: str, label: str, help: str) -> NoReturn:
 def draw_signature(
     name: str, at: str | None = None, root: Path | None = None, *, step: str | None = None
 ) -> Picture:
-    """Draw how an effect shows: a spec without and with it, under steps of an input.
+    """Draw the response of a spec to steps of an input, without and with an effect.
 
-    `name` may say where it is laid: `coulomb_friction@w_em`; `step` is like `T_em=40 N*m`.
-    Raises SpecError, ValueError.
+    `name` may contain the place: `coulomb_friction@w_em`; `step` is like `T_em=40 N*m`. Raises
+    SpecError, and ValueError if the effect fits no place or the step is malformed.
     """
-    from diagnosis.model.effect_signature import draw_signature, simulate_signature as runs
+    from diagnosis.model.effect_signature import draw_signature, simulate_signature
 
     project = Project(root or Path())
     document = _load_base(at or DEFAULT_BASE, project)
     layers = find_effect(name, at or DEFAULT_BASE, root).placements
     if not layers:
         raise ValueError(f"`{name}` fits no place of `{document.name}`")
-    return draw_signature(runs(document, project, layers[0], _parse_step(step) if step else None))
+    parsed_step = _parse_step(step) if step else None
+    return draw_signature(simulate_signature(document, project, layers[0], parsed_step))
 
 
 def _parse_step(text: str) -> tuple[str, str]:
+    """Return input and height of a step `input=height`. Raises ValueError."""
     name, _, height = (part.strip() for part in text.partition("="))
     if not (name and height):
         raise ValueError(f"`{text}` is not `input=height`")
@@ -102,7 +108,7 @@ def _parse_step(text: str) -> tuple[str, str]:
 
 
 def _load_base(reference: str, project: Project) -> Document:
-    """Return the expanded automaton of a reference. Raises SpecError."""
+    """Return the expanded document of an automaton that is valid. Raises SpecError."""
     document = expand_document(read_document(project.path_of(reference)), project)
     automaton_of(document, project)
     return document

@@ -1,4 +1,4 @@
-"""Explaining: a spec after each pass as text, and the difference of two."""
+"""Explaining: print a spec after each pass, and compare two specs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,11 @@ Values = Mapping[str, str]
 
 
 def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
-    """Return a spec after a pass, as text. Raises SpecError."""
+    """Return the text of a spec after a pass: `document`, `model`, one of PASSES, ... Raises
+    SpecError.
+
+    A calibration has its own text for all passes but `document`.
+    """
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
     if stage == "document":
@@ -61,7 +65,9 @@ def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None =
 
 
 def _calibration_text(document: Document, project: Project) -> str:
-    """Return the values of a calibration: SI, compiled in (fixed) or not (tunable), and origin."""
+    """Return one line for each value of a calibration: fixed or tunable, standard deviation,
+    origin.
+    """
     problems = Problems()
     calibration = read_calibration(document, problems)
     problems.raise_if_errors()
@@ -88,7 +94,10 @@ def _calibration_text(document: Document, project: Project) -> str:
 def compare_specs(
     spec: str, other: str, stage: PassName, values: Values, root: Path | None = None
 ) -> str:
-    """Return what differs between two specs after a pass, as text. Raises SpecError."""
+    """Return the difference of two specs after a pass as text; empty if they are equal.
+
+    For `document` the differences are by key, else a unified diff. Raises SpecError.
+    """
     if stage == "document":
         project = Project(root or Path())
         old, new = (_load_expanded(name, project).root for name in (spec, other))
@@ -99,14 +108,16 @@ def compare_specs(
 
 
 def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
-    """Return the values of an expanded spec with their places, as plain data. Raises SpecError."""
+    """Return the values of an expanded spec with their places, as a dict for JSON. Raises
+    SpecError.
+    """
     document = _load_expanded(spec, Project(root or Path()))
     found = [_row_json(row) for row in provenance_entries(document.root)]
     return {"kind": document.kind, "name": document.name, "values": found}
 
 
 def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
-    """Return what differs between two expanded specs, as plain data. Raises SpecError."""
+    """Return the differences of two expanded specs as a dict for JSON. Raises SpecError."""
     project = Project(root or Path())
     old, new = (_load_expanded(name, project).root for name in (spec, other))
     found = [
@@ -121,10 +132,12 @@ def spec_differences_json(spec: str, other: str, root: Path | None = None) -> di
 
 
 def _load_expanded(spec: str, project: Project) -> Document:
+    """Return the expanded document of a spec. Raises SpecError."""
     return _expand_document(read_document(project.path_of(spec)), project)
 
 
 def _expand_document(document: Document, project: Project) -> Document:
+    """Return an expanded document. Raises SpecError with all problems."""
     problems = Problems()
     result = expand_document(document, project, problems)
     if problems.has_errors:
@@ -133,6 +146,7 @@ def _expand_document(document: Document, project: Project) -> Document:
 
 
 def _row_json(row: ProvenanceEntry) -> dict[str, Any]:
+    """Return a value with place, overlay and changes as a dict for JSON."""
     return {
         "path": row.path,
         "value": row.value,

@@ -1,4 +1,4 @@
-"""Skeleton: the files of a new project that works at once: plant, controller, scenario, test."""
+"""New project: write the files of a small project with plant, controller, scenario and test."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from pathlib import Path
 from modewright.runtime.output_files import OutputError
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
+"""The form of the name of a project."""
 RESERVED_NAMES = frozenset({"room", "thermostat", "cold_day", "stays_warm", "ev_driveline"})
+"""Names that the files of a project or the shipped specs use."""
 TEMPLATE_TARGETS = {
     "room.yaml": "spec/room.yaml",
     "thermostat.yaml": "spec/thermostat.yaml",
@@ -21,10 +23,11 @@ TEMPLATE_TARGETS = {
     "test_project.py.txt": "tests/test_project.py",
     "README.md.txt": "README.md",
 }
+"""The template files with their paths in the project."""
 
 
 def skeleton_files(name: str) -> dict[str, str]:
-    """Return the files of a project by path; its system has the project's name."""
+    """Return the texts of the project's files by path; its system has the name of the project."""
     folder = resources.files("modewright.api") / "new_project_files"
     return {
         place: (folder / source).read_text("utf-8").replace("PROJECT", name)
@@ -33,7 +36,11 @@ def skeleton_files(name: str) -> dict[str, str]:
 
 
 def write_skeleton(name: str, folder: Path) -> list[Path]:
-    """Write a new project into a folder that is not there yet. Raises OutputError, ValueError."""
+    """Write a new project into a folder that does not exist yet, and return the paths.
+
+    The folder appears complete or not at all. Raises OutputError, and ValueError for an invalid
+    name.
+    """
     if not NAME_PATTERN.fullmatch(name) or name in RESERVED_NAMES:
         raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")
     if folder.exists():

@@ -1,4 +1,4 @@
-"""Recordings: files checked before anything is concluded from them."""
+"""Recordings: read recordings and check their quality before an analysis."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from diagnosis.pipeline.case import Case
 from diagnosis.quality.clock_search import find_clock_and_sign_errors
 from diagnosis.quality.column_guess import guess_map
 from diagnosis.quality.finding import format_findings
-from diagnosis.quality.recording import RecordingCheck, check_recordings as checked, used_columns
+from diagnosis.quality.recording import RecordingCheck, check_recordings as run_checks, used_columns
 from engine.recordings.recording import Recording, read_recording
 from language.loading.load import automaton_of
 from language.loading.map_pairing import check_pairing
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 
 MissingReasons = dict[str, str]
-"""Why a file has none of some columns, by their names in the map."""
+"""Reasons why a file lacks columns, by column of the map."""
 MISSING_KINDS = ("column", "empty")
-"""Problems of a file that lacks a column, or has no value in it."""
+"""Kinds of problems that mean a missing or empty column."""
 
 
 @dataclass(frozen=True)
 class CheckedRecordings:
-    """Recordings with what was found of them, and the automaton of a spec."""
+    """Recordings with the result of their check, and the automaton of the spec."""
 
     check: RecordingCheck
     mapping: RecordingMap
@@ -47,7 +47,7 @@ class CheckedRecordings:
     automaton: Automaton | None = field(default=None, repr=False)
 
     def plot(self, title: str = "") -> Picture:
-        """Return a picture of the channels, what they excite and what was found."""
+        """Return a figure of the channels with their excitation and findings."""
         from diagnosis.quality.recording_picture import draw_recordings
 
         names = ", ".join(recording.name for recording in self.recordings)
@@ -61,10 +61,11 @@ def check_recordings(
     databases: Sequence[str] = (),
     root: Path | None = None,
 ) -> CheckedRecordings:
-    """Check recordings: rates, gaps, noise, what they excite; with a spec units, signs and clocks.
+    """Check rates, gaps, noise and excitation of recordings; with a spec also units, signs and
+    clocks.
 
-    Without a map that of the spec is taken; without either, columns are guessed by their names.
-    Raises SpecError, ToolMissing.
+    The map defaults to that of the spec; without a spec columns are guessed by name. Raises
+    SpecError, MissingToolError, and ValueError if a file occurs twice.
     """
     project = Project(root or Path())
     automaton = _load_automaton(spec, project) if spec else None
@@ -90,20 +91,20 @@ def check_recordings(
     recordings = tuple(recording for recording, _ in read)
     reasons = {recording.name: why for recording, why in read}
     if spec is None or automaton is None:
-        check = _add_missing_reasons(checked(recordings, mapping, automaton), reasons)
+        check = _add_missing_reasons(run_checks(recordings, mapping, automaton), reasons)
         return CheckedRecordings(check, mapping, recordings)
     document = expand_document(read_document(project.path_of(spec)), project)
     mistakes = partial(find_clock_and_sign_errors, document, project, automaton, mapping)
     check = _add_missing_reasons(
-        checked(recordings, mapping, automaton, simulate_resolved, mistakes), reasons
+        run_checks(recordings, mapping, automaton, simulate_resolved, mistakes), reasons
     )
     return CheckedRecordings(check, mapping, recordings, automaton)
 
 
 def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
-    """Return what a check finds of recordings that are held out, for people.
+    """Return the warnings and errors of held-out recordings as lines.
 
-    It is told beside a verdict that is final. What cannot be used is told elsewhere.
+    They do not influence the verdict. Recordings that cannot be read are skipped here.
     """
     used = used_columns(case.mapping, automaton)
     recordings = []
@@ -119,7 +120,7 @@ def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
     mistakes = partial(
         find_clock_and_sign_errors, case.document, case.project, automaton, case.mapping
     )
-    check = checked(recordings, case.mapping, automaton, simulate_resolved, mistakes)
+    check = run_checks(recordings, case.mapping, automaton, simulate_resolved, mistakes)
     serious = [finding for finding in check.findings if finding.severity != "note"]
     return tuple(f"held out, {severity}: {text}" for severity, text in format_findings(serious))
 
@@ -127,9 +128,9 @@ def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
 def _read_available(
     path: Path, name: str, mapping: RecordingMap, columns: Sequence[str]
 ) -> tuple[Recording, MissingReasons]:
-    """Read a recording, without the columns that it has not got; say why it has not.
+    """Read the columns that a file has; return the recording and the reasons for missing ones.
 
-    What else is wrong with a file is a problem of the file. Raises SpecError, ToolMissing.
+    Raises SpecError for other problems of the file, and MissingToolError.
     """
     reasons: MissingReasons = {}
     try:
@@ -146,7 +147,7 @@ def _read_available(
 
 
 def _missing_reason(path: Path, mapping: RecordingMap, column: str) -> str:
-    """Return why a file does not have a column; empty where it has, or is wrong otherwise."""
+    """Return the reason why a file lacks a column; empty if it has it or has another problem."""
     try:
         read_recording(path, mapping, [column])
     except SpecError as error:
@@ -159,7 +160,7 @@ def _missing_reason(path: Path, mapping: RecordingMap, column: str) -> str:
 def _add_missing_reasons(
     check: RecordingCheck, reasons: Mapping[str, MissingReasons]
 ) -> RecordingCheck:
-    """Return a check in which missing signals are told with why they are."""
+    """Return a check whose findings about missing signals contain the reason."""
     findings = []
     for finding in check.findings:
         why = reasons.get(finding.recording, {}).get(finding.channel, "")
@@ -169,7 +170,7 @@ def _add_missing_reasons(
 
 
 def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
-    """Raise SpecError where a map is not one for an automaton."""
+    """Raise SpecError if a map does not fit an automaton."""
     problems = Problems()
     if automaton is not None:
         check_pairing(automaton, mapping, problems)
@@ -177,4 +178,5 @@ def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
 
 
 def _load_automaton(spec: str, project: Project) -> Automaton:
+    """Return the automaton of a spec. Raises SpecError."""
     return automaton_of(read_document(project.path_of(spec)), project)

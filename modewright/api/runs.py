@@ -1,4 +1,4 @@
-"""Runs: read, saved, plotted and compared; a run is a trajectory, a file, or `system:scenario`."""
+"""Runs: read, save, plot and compare trajectories, run files and `system:scenario`."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ Run = Trajectory | str | Path
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
-    """Write a run to `.csv` (with `.csv.json` beside it) or `.parquet`, whole or not at all.
+    """Write a run to `.csv` (with `.csv.json` beside it) or `.parquet`, atomically.
 
-    Raises OutputError, ToolMissing, ValueError (another ending).
+    Raises OutputError, MissingToolError, and ValueError for other suffixes.
     """
     write_files(encode_run(trajectory, Path(path)))
 
 
 def read(run: Run, root: Path | None = None) -> Trajectory:
-    """Return a run: from a file that `save` wrote, or simulated from `system:scenario`.
+    """Return a run: a trajectory as it is, a file that `save` wrote, or a simulated
+    `system:scenario`.
 
-    Raises SpecError, ToolMissing, ValueError (neither a file nor `system:scenario`).
+    Raises SpecError, MissingToolError, and ValueError for other texts.
     """
     if isinstance(run, Trajectory):
         return run
@@ -50,9 +51,9 @@ def plot(
     span: tuple[float, float] | None = None,
     title: str = "",
 ) -> Picture:
-    """Return a picture of one run, or of two: the second dashed, in the same colours.
+    """Return a figure of one run, or of two runs with the second one dashed in the same colours.
 
-    `signals` are patterns such as `plant.*`; `span` is in seconds.
+    `signals` are patterns such as `plant.*` (all signals if empty); `span` is in seconds.
     """
     from engine.results.plot import draw_overview
 
@@ -74,10 +75,11 @@ def compare(
     signals: Sequence[str] = (),
     span: tuple[float, float] | None = None,
 ) -> RunDifference:
-    """Compare two runs signal by signal; `is_within` tells whether all is within tolerance.
+    """Compare two runs signal by signal; `is_within` of the result states whether all are within
+    tolerance.
 
     A signal may differ by `relative` times its peak, or by its entry in `tolerances` (patterns of
-    names, values in SI); modes may disagree for `slack` [s]. Raises ValueError, SpecError.
+    names, values in SI). Modes may disagree for `slack` [s]. Raises ValueError and SpecError.
     """
     return compare_runs(
         read(a), read(b),
@@ -86,7 +88,7 @@ def compare(
 
 
 def run_label(run: Run, default: str) -> str:
-    """Return what a run is called in a picture."""
+    """Return the label of a run in a figure: its name, its file name, or the default."""
     if isinstance(run, Trajectory):
         return run.name or default
     return Path(run).name if Path(run).suffix.lower() in FORMATS else str(run)

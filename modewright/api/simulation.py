@@ -1,4 +1,7 @@
-"""API: what the command line does, as functions. Specs are named or given by path."""
+"""Simulation: load, simulate and replay systems; compare engine and C in lock-step.
+
+Specs are given by name or path.
+"""
 
 from __future__ import annotations
 
@@ -39,12 +42,12 @@ from modewright.api.documents import Values, load_calibrated_document, parse_val
 from modewright.runtime.compiled_run import run_simulation as run_compiled
 
 METHODS = ("RK4", "DOP853", "Radau", "LSODA")
-"""How continuous automata can be integrated: our own method, or one of scipy's."""
+"""Integration methods of continuous automata: RK4 of the Program, or methods of scipy."""
 
 
 @dataclass(frozen=True)
 class Loaded:
-    """A system with a scenario, checked."""
+    """A checked system with a checked scenario."""
 
     system: System
     scenario: Scenario
@@ -52,7 +55,9 @@ class Loaded:
 
 @dataclass(frozen=True)
 class Replayed:
-    """A replay with its lock-step verdict (None if C was not asked for)."""
+    """A replay with its lock-step verdict, None without C; `left_out` are unused columns of the
+    map.
+    """
 
     result: Replay
     verdict: Verdict | None
@@ -67,7 +72,7 @@ def load(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> Loaded:
-    """Return a system with a scenario. Raises SpecError with all problems."""
+    """Return a system with a scenario, values and calibrations applied. Raises SpecError."""
     project = Project(root or Path())
     parsed_system = read_system(
         load_calibrated_document(system, project, calibrations), project, parse_values(values)
@@ -87,18 +92,18 @@ def simulate(
     calibrations: Sequence[str] = (),
     compiled: bool | None = None,
 ) -> Trajectory:
-    """Return the trajectory of a system, or of an automaton alone, through a scenario.
+    """Return the trajectory of a system or automaton in a scenario.
 
-    `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of
-    scipy; `reference` takes scipy (DOP853) and the numbers of filterpy. `compiled` takes C, which
-    has the same bits; None does so for long runs; the log tells what did the work. Raises
-    ValueError.
+    `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of scipy.
+    `reference` uses scipy (DOP853) and the gains of filterpy, independently of the engine.
+    `compiled` uses C, which has the same bits; None uses C for long runs only. The log names the
+    back end. Raises ValueError and SpecError.
     """
     if method not in METHODS:
         raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
     loaded = load(system, scenario, values, root, calibrations)
     if reference or method != "RK4":
-        from engine.reference import scipy_reference as independent  # scipy only where asked for
+        from engine.reference import scipy_reference as independent  # deferred: imports scipy
 
         run = independent.simulate_reference if reference else independent.simulate_with_scipy
         scipy_method: Any = "DOP853" if method == "RK4" else method
@@ -129,13 +134,12 @@ def lockstep(
     calibrations: Sequence[str] = (),
     target: str = HOST.name,
 ) -> tuple[Trajectory, list[Verdict]]:
-    """Simulate, then run the C of every instance on the same inputs and compare bits.
+    """Simulate a system, run the C of each instance on the same inputs and compare all bits.
 
-    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator, where the instructions of
-    steps are counted, too.
-    `numbers` replaces the number type of every instance; `changes` are pages of the calibration
-    like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
-    Raises SpecError, ToolMissing.
+    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator, which also counts
+    instructions. `numbers` replaces the number type of each instance. `changes` are calibration
+    pages such as `1.5 s: k_hs = 6000 N*m/rad` instead of those of the scenario. Raises SpecError
+    and MissingToolError.
     """
     loaded = load(system, scenario, values, root, calibrations)
     if numbers:
@@ -168,9 +172,11 @@ def replay(
     compiled: bool = True,
     calibrations: Sequence[str] = (),
 ) -> Replayed:
-    """Replay a recording through a sampled automaton, in lock-step with its C.
+    """Replay a recording through a sampled automaton, in lock-step with its C unless not
+    `compiled`.
 
-    Raises SpecError, ToolMissing.
+    `map` relates columns to signals; `variant` is an overlay of the automaton. Raises SpecError and
+    MissingToolError.
     """
     automaton, used = _load_estimator(estimator, variant, values, root, calibrations)
     mapping = _load_map(map, root)
@@ -190,6 +196,10 @@ def _load_estimator(
     root: Path | None,
     calibrations: Sequence[str],
 ) -> tuple[Automaton, Program]:
+    """Return a sampled automaton and its Program with variant, calibrations and values applied.
+
+    Raises SpecError, also for a continuous automaton.
+    """
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
     if variant:
@@ -208,5 +218,6 @@ def _load_estimator(
 
 
 def _load_map(reference: str, root: Path | None) -> RecordingMap:
+    """Return a map of recordings. Raises SpecError."""
     project = Project(root or Path())
     return read_map(read_document(project.path_of(reference)), project)

@@ -1,4 +1,4 @@
-"""Tests: the tests of a project, each run on the engine and on compiled C, with one verdict."""
+"""Spec tests: run the tests of a project on the engine and on compiled C."""
 
 from __future__ import annotations
 
@@ -23,10 +23,9 @@ from modewright.runtime.compiled_run import run_in_c
 
 @dataclass(frozen=True)
 class TestRun:
-    """What became of a test: its outcomes on the engine, and where C gave others.
+    """The result of a test: the outcomes on the engine, and the first difference to C.
 
-    `means` is what ran beside the engine, empty if nothing did; `difference` is the first thing in
-    which that run was another, which fails the test.
+    `means` names what ran beside the engine, or is empty. A `difference` fails the test.
     """
 
     __test__ = False  # for pytest
@@ -41,24 +40,25 @@ class TestRun:
 
     @property
     def passed(self) -> bool:
-        """Tell whether everything that was expected was so, in both runs."""
+        """Return whether all expectations are met, the run did not stop, and C gave the same run.
+        """
         all_passed = all(outcome.passed for outcome in self.outcomes)
         return all_passed and not self.difference and self.stopped is None
 
 
 def find_tests(root: Path | None = None) -> list[str]:
-    """Return the files of all tests of a project, in the order of their paths."""
+    """Return the files of all tests of a project in the order of their paths."""
     return [str(path) for path in spec_files(root or Path()) if _is_test(path)]
 
 
 def load_test(reference: str, root: Path | None = None) -> Test:
-    """Return a test by its name or path. Raises SpecError with all problems."""
+    """Return a test by name or path. Raises SpecError with all problems."""
     project = Project(root or Path())
     return read_test(project.read(project.path_of(reference)), project)
 
 
 def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:
-    """Return tests. Raises SpecError with the problems of all of them."""
+    """Return tests by name or path. Raises SpecError with the problems of all of them."""
     problems, tests = Problems(), []
     for reference in references:
         with problems.collect_errors():
@@ -70,9 +70,9 @@ def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test
 def run_tests(
     references: Sequence[str] = (), root: Path | None = None, *, compiled: bool = True
 ) -> Iterator[TestRun]:
-    """Yield what became of each test; of all tests of the project where none is named.
+    """Yield the result of each test; without references of all tests of the project.
 
-    Raises SpecError before anything is run; ToolMissing where there is no compiler.
+    Raises SpecError before any test runs, and MissingToolError without a compiler.
     """
     named = list(references) or find_tests(root)
     if not named:
@@ -85,7 +85,8 @@ def run_tests(
 
 
 def run_test(test: Test, *, compiled: bool = True) -> TestRun:
-    """Return what became of a test on the engine and, if `compiled`, in C. Raises ToolMissing."""
+    """Return the result of a test on the engine and, if `compiled`, in C. Raises MissingToolError.
+    """
     start = time.perf_counter()
     trajectory = simulate(test.system, test.scenario)
     outcomes = evaluate_test(test, trajectory)
@@ -102,7 +103,7 @@ def run_test(test: Test, *, compiled: bool = True) -> TestRun:
 
 
 def _outcome_difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> str:
-    """Return the first expectation that C did not decide as the engine did."""
+    """Return a text about the first expectation that differs in C; empty if none does."""
     for mine, other in zip(ours, theirs, strict=True):
         if mine.passed != other.passed:
             word = "passed" if other.passed else f"failed: {other.message}"
@@ -111,7 +112,7 @@ def _outcome_difference(ours: Sequence[Outcome], theirs: Sequence[Outcome]) -> s
 
 
 def _trajectory_difference(ours: Trajectory, theirs: Trajectory) -> str:
-    """Return in what the run in C was another: the first event, signal or end."""
+    """Return a text about the first end, event or signal that differs in C; empty if none does."""
     if ours.stopped != theirs.stopped:
         return f"C ended with {theirs.stopped or 'no stop'}, the engine with {ours.stopped}"
     for mine, other in zip(ours.events, theirs.events, strict=False):
@@ -129,5 +130,6 @@ def _trajectory_difference(ours: Trajectory, theirs: Trajectory) -> str:
 
 
 def _is_test(path: Path) -> bool:
+    """Return whether a file contains a test, from its first 64 KiB."""
     text = path.read_text("utf-8", errors="replace")[:65536]
     return any(match.group(1) == "test" for match in HEAD_PATTERN.finditer(text))

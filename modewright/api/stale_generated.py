@@ -1,4 +1,4 @@
-"""Generated: the committed C of a project, one folder per folder of specs, guarded."""
+"""Generated C: compare the C below `generated/` with the specs of the project."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from language.overlays.expand_document import Project, expand_document, read_doc
 from modewright.api.checking import spec_files
 
 MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
+"""The files of the mathematical library among the generated files."""
 
 
 def generated_files(root: Path) -> dict[Path, bytes]:
-    """Return every file that belongs below `generated/`. Raises SpecError."""
+    """Return the bytes of each file that belongs below `generated/`. Raises SpecError."""
     project = Project(root)
     files: dict[Path, bytes] = {}
     for path in spec_files(root):
@@ -28,7 +29,7 @@ def generated_files(root: Path) -> dict[Path, bytes]:
 
 
 def stale_files(root: Path) -> list[str]:
-    """Return what is missing, different or left over below `generated/`, one line each."""
+    """Return one line for each missing, different or superfluous file below `generated/`."""
     expected = generated_files(root)
     present = {path for path in (root / "generated").rglob("*.[ch]") if path.is_file()}
     lines = []

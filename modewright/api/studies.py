@@ -1,4 +1,4 @@
-"""Studies: many variants run into a folder, gone on with, summed up and drawn."""
+"""Studies: run the variants of a study into a folder, summarise and plot the results."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from sweep.analysis.sensitivity import Sensitivity
 
 WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.workers.study_worker")
-"""What starts a process that computes blocks."""
+"""The command that starts a worker process."""
 
 TEMPLATE_MODULE = "modewright.workers.dask_template"
-"""What the workers of a cluster of this machine are copies of."""
+"""The module that the fork server loads for the workers of a local cluster."""
 
 
 def sweep(
@@ -56,13 +56,13 @@ def sweep(
     cluster: str | None = None,
     credentials: Credentials | None = None,
 ) -> StudyRun:
-    """Run a study into a folder, or go on with it there; what is finished is never lost.
+    """Run a study into a folder, or continue it; finished blocks are always kept.
 
-    `workers` processes (all cores), 1: in this process; `cluster`: on the workers of a Dask
-    cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
-    are kept at once; `samples` and `seed` replace those of the study. `warn` is told what the
-    study is warned of, and which blocks were damaged; without it Python warns.
-    Raises SpecError, ValueError, ClusterError, ToolMissing, OutputError (what is done is kept).
+    `workers` is the number of processes (default: all cores; 1: this process). `cluster` is
+    `local:4` or the address of a Dask scheduler, with `credentials` for TLS. `block` is the number
+    of variants that are stored at once; `samples` and `seed` replace those of the study. `warn` is
+    called with warnings of the study and with damaged blocks; by default these are Python warnings.
+    Raises SpecError, ValueError, ClusterError, MissingToolError and OutputError.
     """
     place = parse_address(cluster) if cluster else None
     if place and place.count:
@@ -85,15 +85,15 @@ def sweep(
 
 
 def _local_executor(workers: int | None) -> Executor:
-    """Return processes of this machine, one for each core; of one this process is enough."""
+    """Return the executor for a number of processes, by default one for each core."""
     count = workers or os.cpu_count() or 1
     return ProcessExecutor(count, WORKER_COMMAND) if count > 1 else SerialExecutor(run_block)
 
 
 def _read_study(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
-    """Return a study with values of the command line; tell its warnings.
+    """Return a study with values of the command line; passes its warnings to `warn`.
 
-    Raises SpecError, and ValueError for a value of what the study gives one itself.
+    Raises SpecError, and ValueError for a value of a parameter that the study sets.
     """
     document = read_document(project.path_of(study))
     scalars: dict[str, ScalarNode] = {
@@ -108,7 +108,7 @@ def _read_study(study: str, values: Mapping[str, str], project: Project, warn: W
 
 
 def _override_sampling(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
-    """Return a study with points of the command line; warn of a number that suits it badly."""
+    """Return a study with another number of samples or seed; warns of an unbalanced number."""
     result = resample_study(study, samples, seed)
     fault = find_imbalance(result.sampling.method, samples) if samples is not None else None
     if fault:
@@ -118,7 +118,10 @@ def _override_sampling(study: Study, samples: int | None, seed: int | None, warn
 
 @contextmanager
 def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Executor]:
-    """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
+    """Yield the executor of a cluster whose workers have the same code. Raises ClusterError.
+
+    Raises MissingToolError if the package `distributed` is not installed.
+    """
     try:
         from sweep.execution.dask_client import WorkerSetup, open_client
         from sweep.execution.dask_executor import DaskExecutor
@@ -133,19 +136,19 @@ def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Exec
 
 
 def study_summary(out: str | Path) -> Summary:
-    """Return the summary of what is in the folder of a study so far. Raises SpecError."""
+    """Return the summary of the results in the folder of a study. Raises SpecError."""
     return summary_of(read_store(Path(out)))
 
 
 def study_pictures(out: str | Path) -> dict[str, Picture]:
-    """Return the pictures that the study asks for, by name. Raises SpecError."""
+    """Return the plots of a study by name, from the results in its folder. Raises SpecError."""
     from sweep.analysis.plots import draw_pictures
 
     return draw_pictures(read_store(Path(out)))
 
 
 def sensitivity(out: str | Path) -> Sensitivity:
-    """Return which of the things that a study draws move its measures. Raises SpecError."""
+    """Return the sensitivity indices of the random variables of a study. Raises SpecError."""
     from sweep.analysis.sensitivity import sensitivity_of
 
     return sensitivity_of(read_store(Path(out)))

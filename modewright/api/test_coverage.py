@@ -1,4 +1,4 @@
-"""Covered: what tests have reached of specs - told, as plain data, and on the diagram of modes."""
+"""Test coverage: present the coverage of specs as text, as JSON and in the diagram of modes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from expectation.coverage_measurement import (
     Coverage,
-    measure_coverage as reached_by,
+    measure_coverage,
     merge_coverages,
     names_of,
 )
@@ -21,7 +21,7 @@ from modewright.diagram.diagram import Diagram, graph
 
 
 def coverage_lines(coverage: Coverage) -> Iterator[str]:
-    """Yield the lines that tell of a coverage: the counts, then what is missing."""
+    """Yield the lines of a coverage report: the counts, then what is not covered."""
     counts = coverage.count()
     counts_text = ", ".join(f"{done} of {total} {what}" for what, (done, total) in counts.items())
     yield f"{coverage.name}: {counts_text} (MC/DC)"
@@ -29,7 +29,7 @@ def coverage_lines(coverage: Coverage) -> Iterator[str]:
 
 
 def coverage_json(coverage: Coverage) -> dict[str, Any]:
-    """Return what was reached of an automaton as plain data."""
+    """Return the coverage of an automaton as a dict for JSON."""
     return {
         "automaton": coverage.name,
         "file": coverage.automaton.span.source.name,
@@ -42,20 +42,20 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
 
 
 def coverage_diagram(coverage: Coverage, root: Path | None = None) -> Diagram:
-    """Return the diagram of an automaton, shaded by what tests reached. Raises SpecError."""
+    """Return the diagram of an automaton shaded by coverage. Raises SpecError."""
     return shade_diagram(graph(coverage.automaton.span.source.name, root), coverage)
 
 
 def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagram:
-    """Return the diagram of an automaton, shaded by what the tests of the project reach of it.
+    """Return the diagram of an automaton shaded by the coverage of the project's tests.
 
-    Raises SpecError.
+    Raises SpecError, also if no test runs the automaton.
     """
     diagram = graph(reference, root)
     tests = load_tests(find_tests(root), root)
     names = [{each.automaton.name for each in t.system.instances.values()} for t in tests]
     used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
-    parts = [part for test in used for part in reached_by(test) if part.name == diagram.name]
+    parts = [part for test in used for part in measure_coverage(test) if part.name == diagram.name]
     if not parts:
         problems = Problems()
         label = f"no test of the project runs `{diagram.name}`"
@@ -65,7 +65,7 @@ def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagra
 
 
 def shade_diagram(diagram: Diagram, coverage: Coverage) -> Diagram:
-    """Return a diagram whose modes and transitions are shaded by what tests reached."""
+    """Return a diagram whose modes and transitions are shaded by a coverage."""
     entered = {names_of(key) for key in coverage.modes}
     decisions = {names_of(decision.key): decision for decision in coverage.decisions}
     return dataclasses.replace(
@@ -76,18 +76,23 @@ def shade_diagram(diagram: Diagram, coverage: Coverage) -> Diagram:
 
 
 def _shade_region(region: RegionBox, entered: set[ModePath]) -> RegionBox:
+    """Return a region whose modes are shaded."""
     return dataclasses.replace(
         region, modes=tuple(_shade_mode(mode, entered) for mode in region.modes)
     )
 
 
 def _shade_mode(mode: ModeBox, entered: set[ModePath]) -> ModeBox:
+    """Return a mode and its inner modes, shaded as entered or not."""
     is_entered = mode.path in entered
     inner = tuple(_shade_region(region, entered) for region in mode.regions)
     return dataclasses.replace(mode, shade="covered" if is_entered else "missed", regions=inner)
 
 
 def _shade_arrow(arrow: Arrow, coverage: Coverage, decisions: dict[ModePath, Decision]) -> Arrow:
+    """Return a transition shaded as missed, partly or fully covered; conditions that are not
+    covered are added.
+    """
     decision = decisions.get((*arrow.source, arrow.name))
     if decision is None:
         return arrow
@@ -102,6 +107,7 @@ def _shade_arrow(arrow: Arrow, coverage: Coverage, decisions: dict[ModePath, Dec
 
 
 def _transition_json(coverage: Coverage, decision: Decision) -> dict[str, Any]:
+    """Return the coverage of one transition as a dict for JSON."""
     seen = coverage.combinations.get(decision.key, frozenset())
     return {
         "key": decision.key,

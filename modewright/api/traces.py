@@ -1,4 +1,4 @@
-"""Traces: requirements of a project's specs, their C and their tests, brought together."""
+"""Traces: relate requirements and keys of specs to C code and tests."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from language.text.node_edit import entries, find_node
 from modewright.api.spec_tests import find_tests, load_tests, run_test
 
 HEADINGS = ("name", "id", "requirement")
-"""What a first row begins with that names the columns, in any case of its letters."""
+"""First cells, in lower case, that mark a row as headings."""
 
 
 def trace(
@@ -34,10 +34,10 @@ def trace(
     *,
     run: bool = False,
 ) -> RequirementTrace:
-    """Return which requirements specs, their C and the tests of the project name.
+    """Return the requirements that specs, their C and the tests of the project name.
 
-    A spec is an automaton, or a system: then that and the automata of its instances. `listed` is
-    a CSV of requirements with their texts; `run` runs the tests. Raises SpecError, ToolMissing.
+    A system includes the automata of its instances. `listed` is a CSV file of requirements with
+    texts; with `run` the tests are run. Raises SpecError and MissingToolError.
     """
     project = Project(root or Path())
     documents = _load_documents(specs, project)
@@ -59,7 +59,7 @@ def trace(
 
 @dataclass(frozen=True)
 class KeyTraceReport:
-    """Which keys show in which lines of C; `specs` and `code` are the texts by file."""
+    """The relation of keys and lines of C; `specs` and `code` are the texts by file."""
 
     traces: KeyTraces
     specs: dict[str, str]
@@ -67,7 +67,7 @@ class KeyTraceReport:
 
 
 def trace_keys(specs: Sequence[str], root: Path | None = None) -> KeyTraceReport:
-    """Return which lines of C come from which keys of specs: of automata, and all in systems.
+    """Return the lines of C that come from each key of the specs; a system includes its automata.
 
     Raises SpecError.
     """
@@ -86,9 +86,9 @@ def trace_keys(specs: Sequence[str], root: Path | None = None) -> KeyTraceReport
 
 
 def read_requirements(path: Path | None) -> dict[str, str]:
-    """Return the requirements of a CSV: names in its first column, texts in the second.
+    """Return the requirements of a CSV file: name in the first column, text in the second.
 
-    Its first row may name the columns. Raises SpecError.
+    A first row of headings is skipped; None as path gives an empty dict. Raises SpecError.
     """
     if path is None:
         return {}
@@ -103,7 +103,7 @@ def read_requirements(path: Path | None) -> dict[str, str]:
 
 
 def _load_documents(specs: Sequence[str], project: Project) -> list[Document]:
-    """Return the documents of specs, of the instances of systems, and of models, each once."""
+    """Return the documents of specs, of instances of systems and of models, each once."""
     documents: dict[str, Document] = {}
     for spec in specs:
         document = read_document(project.path_of(spec))
@@ -123,7 +123,7 @@ def _load_documents(specs: Sequence[str], project: Project) -> list[Document]:
 
 
 def _expand_with_instances(document: Document, project: Project) -> Document:
-    """Return a document with what it extends, and with the instances of an automaton laid."""
+    """Return an expanded document; instances of an automaton are included as regions."""
     made = expand_document(document, project)
     if made.kind != "automaton":
         return made
@@ -131,7 +131,7 @@ def _expand_with_instances(document: Document, project: Project) -> Document:
 
 
 def _generate_code(documents: Sequence[Document], project: Project) -> dict[str, dict[str, str]]:
-    """Return the C files of those documents that are automata."""
+    """Return the C files of each document that is an automaton, by name."""
     return {
         document.name: emit_c_files(program_of(automaton_of(document, project)))
         for document in documents
@@ -140,7 +140,7 @@ def _generate_code(documents: Sequence[Document], project: Project) -> dict[str,
 
 
 def _instance_types(document: Document, project: Project) -> Iterator[str]:
-    """Yield the names of what an automaton has instances of."""
+    """Yield the names of the automata of which an automaton has instances."""
     made = expand_document(document, project)
     if made.kind == "automaton":
         for entry in entries(made.root.get("instances")):
@@ -150,7 +150,7 @@ def _instance_types(document: Document, project: Project) -> Iterator[str]:
 
 
 def _tested_names(test: Test, project: Project) -> set[str]:
-    """Return the names of a test's system, and of all that is in it."""
+    """Return the names of a test's system and of all automata in it."""
     found = {test.system.name}
     for instance in test.system.instances.values():
         document = read_document(Path(instance.automaton.span.source.name))
@@ -159,7 +159,7 @@ def _tested_names(test: Test, project: Project) -> set[str]:
 
 
 def _run_expectations(test: Test) -> dict[str, bool]:
-    """Return the verdict of each expectation, on engine and C."""
+    """Return whether each expectation of a test passes on engine and C, by name."""
     run = run_test(test)
     fine = not run.difference and run.stopped is None
     return {outcome.name: outcome.passed and fine for outcome in run.outcomes}

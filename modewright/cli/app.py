@@ -1,4 +1,4 @@
-"""Command line: a thin skin over the API; every command has an example in its help."""
+"""Application: assemble the commands and run the command line."""
 
 from __future__ import annotations
 
@@ -52,13 +52,14 @@ from modewright.runtime.gc_pause import raise_gc_threshold
 from modewright.runtime.output_files import require_writable
 
 MULTI_VALUE_OPTIONS = ("--train", "--held-out")
-"""Options that take values until the next option; each is repeatable as well."""
+"""Options that take all values up to the next option; each may also be repeated."""
 
 
 def expand_arguments(arguments: Sequence[str]) -> list[str]:
-    """Return the words of a command line with such an option written before each of its values.
+    """Return the arguments with such an option inserted before each of its values.
 
-    Only where the command has its argument in front: else it could be among the values.
+    Unchanged if the first argument of the command is an option, because the positional argument
+    could then be among the values.
     """
     if len(arguments) < 2 or arguments[1].startswith("-"):
         return list(arguments)
@@ -74,20 +75,20 @@ def expand_arguments(arguments: Sequence[str]) -> list[str]:
 
 
 COMPLETION_VARIABLE = "_MODEWRIGHT_COMPLETE"
-"""Set by a shell that asks for completions; its words are elsewhere."""
+"""Set by a shell that requests completions; the words are in other variables."""
 
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
     lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
     explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
+"""The commands in the order of the help."""
 
 
 def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
-    """Return the application; with the words of a command line only what they need is made whole.
+    """Return the application; given the arguments, with full parameters only for named commands.
 
-    Parameters of a command take longer to look at than a page of help to print: a command that
-    no word names has its name and its help alone.
+    The inspection of parameters is slow, so other commands have their name and help only.
     """
     typer_app = typer.Typer(
         no_args_is_help=True,
@@ -106,21 +107,20 @@ def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
 
 
 def command_stub(command: Callable[..., None]) -> Callable[[], None]:
-    """Return a function with the name and the help of a command and without its parameters."""
+    """Return a function with the name and the help of a command but without parameters."""
 
-    def stand_in() -> None:
-        raise AssertionError(f"{command.__name__} is not made whole")
-
-    stand_in.__name__, stand_in.__doc__ = command.__name__, command.__doc__
-    return stand_in
+    def stub() -> None:
+        raise AssertionError(f"{command.__name__} has no parameters")
+    stub.__name__, stub.__doc__ = command.__name__, command.__doc__
+    return stub
 
 
 def options(
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="tell problems only")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="tell each step")] = False,
-    log_file: Annotated[Path | None, typer.Option(help="append what is done to this file")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print problems only")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="print each step")] = False,
+    log_file: Annotated[Path | None, typer.Option(help="append the log to this file")] = None,
     allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="specs may name files outside of their project")
+        bool, typer.Option("--allow-outside", help="allow specs to refer to files outside their project")
     ] = False,
 ) -> None:
     """Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step."""
@@ -134,19 +134,19 @@ app = build_application()
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and exit with its exit code."""
     raise_gc_threshold()
-    logging.raiseExceptions = False  # a log that cannot be written is no reason to stop
+    logging.raiseExceptions = False  # do not stop if the log cannot be written
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - for the whole process
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files need not be text
+            stream.reconfigure(errors="backslashreplace")  # file names may not be valid text
     arguments = expand_arguments(sys.argv[1:])
     is_completion = COMPLETION_VARIABLE in os.environ
     run = build_application(None if is_completion else arguments)
     code = run_with_exit_code(lambda: run(arguments, standalone_mode=False))
     if code == INTERRUPTED:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # more of them disturb nothing but the exit
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # ignore further interrupts during exit
     sys.exit(code)

@@ -1,1 +1,1 @@
-"""Analysis of a study: summaries, intervals, sensitivity, plots."""
+"""Analysis of a study: summaries, confidence intervals, sensitivity indices and plots."""

@@ -1,12 +1,14 @@
-"""Interval: confidence intervals of means, medians and rates of numbers that come in draws.
+"""Confidence intervals: compute intervals of means, medians and rates of clustered observations.
 
-Numbers of one independent draw - replicates, points of a grid that see the same samples, entries of
-one list - are not independent of each other: a draw counts once, however many numbers it gives.
-Means: a ratio of totals by draw, its variance by linearization (Cochran, Sampling Techniques, 3rd
-ed. 1977, section 6.4), Student's t of the draws. Rates: the score interval (Wilson 1927, "Probable
-inference") at the effective number of Korn and Graubard (Survey Methodology 24 (1998) 193).
-Medians: order statistics (David and Nagaraja, Order Statistics, section 7.1) at that number
-(Woodruff, J. Am. Stat. Assoc. 47 (1952) 635). With one number a draw these are the usual intervals.
+The numbers of one independent draw (replicates, grid points with the same samples, entries of one
+list) are correlated. They form a cluster that counts as one draw.
+
+Mean: ratio estimator over the totals of the draws, variance by linearisation (Cochran, Sampling
+Techniques, 3rd ed. 1977, section 6.4), Student's t with the number of draws minus one. Rate: score
+interval (Wilson 1927, "Probable inference") at the effective sample size of Korn and Graubard
+(Survey Methodology 24 (1998) 193). Median: order statistics (David and Nagaraja, Order Statistics,
+section 7.1) at the effective sample size (Woodruff, J. Am. Stat. Assoc. 47 (1952) 635). With one
+number in each draw these are the usual intervals.
 """
 
 from __future__ import annotations
@@ -24,15 +26,18 @@ DrawIndices = NDArray[np.int64]
 
 
 def sum_by_draw(values: Reals, draws: DrawIndices) -> Reals:
-    """Return the total of the values (n,) of each draw that has some, in the order of draws."""
+    """Return the sum of the values (n,) of each draw (n_draws,), in ascending order of the draw
+    index.
+    """
     _, places = np.unique(draws, return_inverse=True)
     return np.bincount(places.reshape(-1), values).astype(np.float64)
 
 
 def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> Interval:
-    """Return the interval of a mean [unit of the values] (n,); None for fewer than two draws.
+    """Return the confidence interval of the mean of values (n,) that belong to draws (n,).
 
-    None too where an end is more than a number can hold.
+    The ends have the unit of the values. Return None for fewer than two draws, or if an end is not
+    finite.
     """
     count = len(values)
     own, exponent = scale_to_squarable(values)
@@ -50,9 +55,10 @@ def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> In
 
 
 def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
-    """Return the interval of a rate: `hits` of `sizes` (n_draws,) were seen in each draw.
+    """Return the score interval of the rate sum(hits) / sum(sizes), with arrays (n_draws,).
 
-    None for fewer than two draws.
+    `hits[k]` of the `sizes[k]` trials of draw k were successful. Return None for fewer than two
+    draws.
     """
     count = effective_sample_size(hits, sizes, confidence)
     return (
@@ -63,12 +69,13 @@ def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
 
 
 def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float:
-    """Return how many independent numbers say as much of a rate as `hits` of `sizes` (n_draws,).
+    """Return the number of independent trials that determine a rate as precisely as the clustered
+    ones.
 
-    As many as there are numbers where each is a draw of its own, or where draws differ no more than
-    such would; as many as there are draws where all numbers of a draw are the same: then, and for
-    fewer, their variance is less sure, which the quotient of the two t says. Of a rate of 0 or 1
-    nothing is known of that variance: the draws count. 0 for fewer than two draws.
+    The arrays (n_draws,) hold the successes and the trials of each draw (Korn and Graubard 1998).
+    The result is at most the number of trials. It is the number of draws if the rate is 0 or 1,
+    because the variance is then unknown. A factor (ratio of the two Student quantiles) accounts for
+    the uncertainty of the variance. Return 0 for fewer than two draws with trials.
     """
     sizes, hits = sizes[sizes > 0], hits[sizes > 0]
     draws, count = len(sizes), float(np.sum(sizes))
@@ -87,7 +94,11 @@ def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float
 
 
 def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
-    """Return the interval of a rate: `hits` of so many independent numbers; None without any."""
+    """Return the score interval (Wilson 1927) of `hits` successes in `count` trials; None for no
+    trial.
+
+    The numbers may be fractional, because effective sample sizes are.
+    """
     if count == 0:
         return None
     from scipy.special import ndtri
@@ -103,10 +114,11 @@ def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
 def interval_of_quantile(
     values: Reals, draws: DrawIndices, level: float, confidence: float
 ) -> Interval:
-    """Return the interval of a quantile between two of the values (n,); None for too few.
+    """Return the interval of the quantile at `level`, whose ends are two of the values (n,).
 
-    Of m independent numbers it is from the l-th to the u-th smallest: P(l <= B < u) >= confidence,
-    B binomial(m, share). Of n numbers that say as much as m it is as far in shares of them.
+    For m independent values the ends are the l-th and the u-th smallest value with P(l <= B < u) >=
+    confidence, B binomial(m, level). With an effective sample size m < n the ranks are scaled by n
+    / m. Return None if there are too few values.
     """
     count = len(values)
     if count == 0:
@@ -127,4 +139,4 @@ def interval_of_quantile(
 
 
 COUNT_ROUNDING = 1e-6
-"""Relative to one number: what rounding takes of an effective number that is whole."""
+"""Added to an effective sample size before it is truncated, so that rounding does not lose one."""

@@ -1,4 +1,4 @@
-"""Picture: the plots of a study - heat map, parallel coordinates, tornado, histogram."""
+"""Plots of a study: draw heat maps, parallel coordinates, tornado charts and histograms."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable, to_display_unit
 
 RELATIVE_ROUNDING = 1.0e-9
-"""Part of their magnitude by which values differ that are drawn as one: rounding is less."""
+"""Relative range of values below which a histogram has one bin. It is larger than rounding errors.
+"""
 
 MAX_BINS = 60
-"""Bins of a histogram: a picture of 7.5 inches shows no more apart."""
+"""Largest number of bins of a histogram: a figure of 7.5 inches does not resolve more."""
 
 
 def histogram_bin_edges(values: Reals) -> Reals:
-    """Return the ends of bins (bins + 1,) of values (n,): as many as Freedman and Diaconis (1981)
-    or Sturges (1926) ask for, the larger number; one bin where values differ by next to nothing.
+    """Return the edges (n_bins + 1,) of the bins of a histogram of values (n,).
+
+    The number of bins is the larger one of Freedman and Diaconis (1981) and Sturges (1926), at most
+    MAX_BINS. Values that differ by rounding only get one bin; no values give [0, 1].
     """
     if not len(values):
         return np.array([0.0, 1.0])
@@ -45,24 +48,30 @@ def histogram_bin_edges(values: Reals) -> Reals:
 
 
 MAX_LINES = 2000
-"""Lines of parallel coordinates; of more variants evenly spread ones are drawn."""
+"""Largest number of lines in a plot of parallel coordinates; of more variants every k-th is drawn.
+"""
 
 MAX_HEAT_MAP_BINS = 12
-"""Bins along each axis of a heat map of drawn values, and of histograms at most."""
+"""Bins along each axis of a heat map if the variable has more than twice as many different values.
+"""
 
 MAX_ANNOTATED_CELLS = 144
-"""Cells of a heat map up to which each has its number written in it."""
+"""Largest number of cells of a heat map whose values are written into the cells."""
 
 MAX_DRAWN_MAGNITUDE = 1.0e300
-"""Magnitudes above it are not drawn: axes have room beside the numbers, up to 1e308 in all."""
+"""Values of larger magnitude are not drawn, because axis limits with margins would overflow."""
 
 MAX_LABEL_CHARACTERS = 75
-"""Characters of labels, with a space each, that stand side by side below a heat map: 0.06 inch each
-in 4.8 inches."""
+"""Largest number of characters of horizontal tick labels below a heat map, with one space each.
+A character is 0.06 inch wide and the axis 4.8 inches.
+"""
 
 
 def draw_pictures(store: Store) -> dict[str, Picture]:
-    """Return the pictures of a study by name, from the variants that are done so far."""
+    """Return the plots of a study by name, drawn from the variants that are finished.
+
+    A plot without finished variants contains a note instead. Raises SpecError for a damaged store.
+    """
     table = StudyTable(store)
     draw = {
         "heat_map": _draw_heat_map, "parallel": _draw_parallel, "tornado": _draw_tornado, "histogram": _draw_histogram,
@@ -78,17 +87,21 @@ def draw_pictures(store: Store) -> dict[str, Picture]:
 
 
 def _draw_empty() -> Figure:
+    """Return a figure that states that no variant is finished."""
     figure = Figure(figsize=(5.0, 2.0))
     figure.text(0.5, 0.4, "no variant is done yet", ha="center")
     return figure
 
 
 def _find_column(table: StudyTable, name: str) -> StoreColumn:
+    """Return the column of a variable or a measure with this name. Raises StopIteration if unknown.
+    """
     manifest = table.store.manifest
     return next(c for c in (*manifest.varied, *manifest.measures) if c.name == name)
 
 
 def _axis_label(table: StudyTable, name: str) -> str:
+    """Return the label of an axis: name, physical quantity if known, and unit unless it is 1."""
     column = _find_column(table, name)
     quantity = QUANTITIES.get(column.unit, "")
     extra = f", {quantity}" if quantity not in ("", "number") else ""
@@ -96,18 +109,23 @@ def _axis_label(table: StudyTable, name: str) -> str:
 
 
 def _finished_values(table: StudyTable, name: str) -> Reals:
-    """Return a column of the variants that are done, in the unit in which it is shown."""
+    """Return a column of the finished variants (n_done,) in the display unit.
+
+    Values that cannot be drawn are NaN.
+    """
     return _mask_undrawable(
         to_display_unit(table.read_reals(name)[table.is_done], _find_column(table, name))
     )
 
 
 def _mask_undrawable(values: Reals) -> Reals:
+    """Return the values with NaN in place of magnitudes above MAX_DRAWN_MAGNITUDE."""
     return np.where(np.abs(values) <= MAX_DRAWN_MAGNITUDE, values, np.nan)
 
 
 def _omission_text(table: StudyTable, plot: Mapping[str, Any]) -> str:
-    """Return how many numbers of the measures of a picture are too large for it, if any."""
+    """Return a note with the number of values that are too large to draw; empty if there are none.
+    """
     drawn = [table.read_pooled(name) for name in plot["of"]]
     count = sum(
         int(np.sum(np.abs(p.values[table.is_done[p.rows]]) > MAX_DRAWN_MAGNITUDE)) for p in drawn
@@ -116,7 +134,10 @@ def _omission_text(table: StudyTable, plot: Mapping[str, Any]) -> str:
 
 
 def _draw_heat_map(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
-    """Each cell is the median of its variants; white: no variant, or none with this measure."""
+    """Return a heat map whose cells are medians of a measure over two variables.
+
+    A cell without a variant, or without a value of the measure, is white.
+    """
     (x_name, y_name), measure = plot["over"], plot["of"][0]
     x, y, z = (_finished_values(table, name) for name in (x_name, y_name, measure))
     (xs, x_ticks), (ys, y_ticks) = _assign_bins(x), _assign_bins(y)
@@ -141,13 +162,15 @@ def _draw_heat_map(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
 
 
 def _label_rotation(names: Sequence[str]) -> float:
-    """Return how far labels below an axis are turned [deg]: so that none is over another."""
+    """Return the rotation [deg] of tick labels: 90 if they would overlap horizontally, else 0."""
     return (
         90.0 if len(names) * (max(map(len, names), default=0) + 1) > MAX_LABEL_CHARACTERS else 0.0
     )
 
 
 def _annotate(axis: Axes, cells: Reals) -> None:
+    """Write the finite values into the cells of a heat map; do nothing if there are too many cells.
+    """
     if cells.size > MAX_ANNOTATED_CELLS or not np.any(np.isfinite(cells)):
         return
     middle = (np.nanmin(cells) + np.nanmax(cells)) / 2.0
@@ -160,9 +183,10 @@ def _annotate(axis: Axes, cells: Reals) -> None:
 
 
 def _assign_bins(values: Reals) -> tuple[NDArray[np.int64], Reals]:
-    """Return the bin of each value, and the middles of the bins: the values where they are few.
+    """Return the bin index of each value (n,) and the centres of the bins (n_bins,).
 
-    Of many values those that are not there are in no bin: -1.
+    Each different value is a bin of its own if there are few. Else the bins divide the range
+    equally, and the index of NaN is -1.
     """
     unique, places = np.unique(values, return_inverse=True)
     if len(unique) <= 2 * MAX_HEAT_MAP_BINS:
@@ -174,7 +198,10 @@ def _assign_bins(values: Reals) -> tuple[NDArray[np.int64], Reals]:
 
 
 def _draw_parallel(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
-    """One line a variant, over what varies and the measures; coloured by the last measure."""
+    """Return parallel coordinates with one line for each variant, coloured by the last measure.
+
+    The axes are the variables and then the measures. Variants with a missing value are left out.
+    """
     manifest = table.store.manifest
     names = [column.name for column in manifest.varied] + list(plot["of"])
     columns = np.array([_finished_values(table, name) for name in names])
@@ -205,13 +232,16 @@ def _draw_parallel(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
 
 
 def _wrap_label(label: str) -> str:
-    """Return a label in two lines: the name, then what it is."""
+    """Return a label with a line break after its name; unchanged if the label is the name only."""
     head, comma, rest = label.partition(", ")
     return f"{head}\n{rest}" if comma else label
 
 
 def _row_limits(columns: Reals) -> tuple[Reals, Reals]:
-    """Return low and high of each row; a row of one value has room around it."""
+    """Return minimum and maximum of each row of columns (n_rows, n); widened if they are equal.
+
+    Without columns the limits are 0 and 1.
+    """
     if columns.shape[1] == 0:
         return np.zeros(len(columns)), np.ones(len(columns))
     low, high = columns.min(axis=1), columns.max(axis=1)
@@ -221,9 +251,10 @@ def _row_limits(columns: Reals) -> tuple[Reals, Reals]:
 
 
 def _draw_tornado(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
-    """How far each thing that varies moves a measure.
+    """Return a tornado chart: the influence of each variable on a measure, largest at the top.
 
-    One at a time: from its lowest to its highest result; else Spearman's rank correlation.
+    With one-at-a-time sampling a bar goes from the lowest to the highest result. Else it is
+    Spearman's rank correlation.
     """
     measure = plot["of"][0]
     result = _finished_values(table, measure)
@@ -260,20 +291,23 @@ def _draw_tornado(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
 
 
 def _is_one_at_a_time(table: StudyTable) -> bool:
-    """Tell whether things vary one at a time: then no variant has a value of two."""
+    """Return whether the variables vary one at a time, so that no variant has values of two."""
     columns = [table.read_reals(column.name) for column in table.store.manifest.varied]
     return bool(columns) and int(np.max(np.sum(~np.isnan(np.array(columns)), axis=0))) <= 1
 
 
 def _nominal_result(table: StudyTable, result: Reals) -> float:
-    """Return the result of the variant in which all is left alone."""
+    """Return the result of the variant without values of variables; NaN if there is none."""
     columns = [_finished_values(table, column.name) for column in table.store.manifest.varied]
     left = np.all(np.isnan(np.array(columns)), axis=0) if columns else np.zeros(0, dtype=bool)
     return float(result[left][0]) if left.any() else float("nan")
 
 
 def rank_correlation(a: Reals, b: Reals) -> float:
-    """Return Spearman's rank correlation of two columns (n,); ties share their mean rank."""
+    """Return Spearman's rank correlation of two columns (n,); ties get their mean rank.
+
+    Return 0 if a column is constant.
+    """
     from scipy.stats import rankdata
 
     x, y = rankdata(a), rankdata(b)
@@ -283,7 +317,7 @@ def rank_correlation(a: Reals, b: Reals) -> float:
 
 
 def _draw_histogram(table: StudyTable, plot: Mapping[str, Any]) -> Figure:
-    """How often which values came, with the median; one panel for each group."""
+    """Return histograms of a measure with its median, one panel for each group."""
     measure = plot["of"][0]
     pooled = table.read_pooled(measure)
     by = plot.get("by") or []

@@ -1,8 +1,9 @@
-"""Sensitivity: which of the things that are drawn move a measure - indices from a store.
+"""Sensitivity analysis: compute Sobol indices or elementary effects from the results of a study.
 
-Of Saltelli's blocks: first order and total (Saltelli and others, Comput. Phys. Commun. 181 (2010)
-259, Table 2 b and f). Of Morris' paths: mean, mean magnitude and spread of elementary effects
-(Campolongo and others, Environ. Model. Softw. 22 (2007) 1509). Intervals are those of a bootstrap.
+Saltelli design: first-order and total indices (Saltelli et al., Comput. Phys. Commun. 181 (2010)
+259, Table 2 b and f). Morris design: mean, mean magnitude and standard deviation of elementary
+effects (Campolongo et al., Environ. Model. Softw. 22 (2007) 1509). Confidence intervals are
+percentiles of a bootstrap over blocks or paths.
 """
 
 from __future__ import annotations
@@ -27,24 +28,25 @@ from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable
 
 BOOTSTRAP_REPLICATES = 500
-"""Of the bootstrap: the ends of an interval at 95 % stand on a dozen of them each."""
+"""Replicates of the bootstrap: about a dozen lie beyond each end of a 95 % interval."""
 BOOTSTRAP_SEED = 1
+"""Seed of the bootstrap, so that the same store gives the same intervals."""
 MAX_RESAMPLED = 1 << 17
-"""Numbers that are drawn again at once: as many as a cache holds."""
+"""Largest number of values that are resampled in one array operation, for the cache."""
 MIN_COMPLETE = 4
-"""Complete blocks or paths below which nothing is told."""
+"""Smallest number of complete blocks or paths for which indices are computed."""
 INDEX_NAMES = {"saltelli": ("first", "total"), "morris": ("mu_star", "mu", "sigma")}
-"""The indices of a design."""
+"""The names of the indices by sampling method."""
 
 
 @dataclass(frozen=True)
 class Index:
-    """How one thing that is drawn moves a measure in one group.
+    """Sensitivity indices of one measure with respect to one random variable in one group.
 
-    `values` and `intervals` by name: `first`, `total` (shares of the variance), or `mu_star`, `mu`,
-    `sigma` [unit of the measure]: of the change from one share to another, over their difference.
-    `used` blocks or paths of `count` are complete: every point is done and has the measure. Of
-    fewer than FEWEST nothing is told: the values are NaN.
+    `values` and `intervals` have the keys `first` and `total` (fractions of the variance), or
+    `mu_star`, `mu` and `sigma` [unit of the measure]: the change of the measure over the change of
+    the quantile level. `used` of `count` blocks or paths are complete, i.e. each point is finished
+    and has the measure. With fewer than MIN_COMPLETE the values are NaN.
     """
 
     group: Mapping[str, str]
@@ -59,9 +61,10 @@ class Index:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The indices of a study, and of which design they are.
+    """The sensitivity indices of a study with its sampling method.
 
-    So many variants of those `expected` are there; `counts`: how they ended.
+    `expected` is the number of variants of the study, `counts` the number of stored variants by
+    status.
     """
 
     study: str
@@ -73,7 +76,8 @@ class Sensitivity:
     indices: tuple[Index, ...]
 
     def csv(self) -> str:
-        """Return the indices as CSV, numbers in SI."""
+        """Return the indices as CSV text with numbers in SI; NaN and missing intervals are empty.
+        """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         groups = list(self.indices[0].group) if self.indices else []
@@ -90,7 +94,11 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class DesignGroup:
-    """What has a design of its own: its names, its variants (n_variants,), and what moved there."""
+    """The variants of one complete design: variant, scenario and grid point are the same for all.
+
+    `labels` are the names and values of the group, `mask` (n_variants,) selects its rows, `varying`
+    are the random variables that have more than one value in it.
+    """
 
     labels: Mapping[str, str]
     mask: NDArray[np.bool_]
@@ -98,7 +106,11 @@ class DesignGroup:
 
 
 def sensitivity_of(store: Store) -> Sensitivity:
-    """Return the indices of what a store holds so far. Raises SpecError, ToolMissing."""
+    """Return the sensitivity indices of the finished variants of a store.
+
+    Raises SpecError if the study has no design for indices or the store is damaged, and
+    MissingToolError without pyarrow.
+    """
     manifest, design = store.manifest, store.manifest.design
     if not design.has_indices:
         label = f"the points of `{manifest.study}` are no design of which indices are made"
@@ -124,7 +136,11 @@ def sensitivity_of(store: Store) -> Sensitivity:
 
 
 def sobol_indices(results: Reals) -> dict[str, Reals]:
-    """Return indices (..., d) of results (..., n, d + 2) at A, B and A with a column of B."""
+    """Return first-order and total Sobol indices (..., d) of results (..., n, d + 2).
+
+    The last axis holds the results at A, at B and at A with column i of B. The indices are NaN or
+    infinite if the variance is zero.
+    """
     a, b, mixed = results[..., :1], results[..., 1:2], results[..., 2:]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         variance = np.var(results[..., :2], axis=(-2, -1))[..., None]
@@ -135,8 +151,8 @@ def sobol_indices(results: Reals) -> dict[str, Reals]:
 
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
-    """Return indices (..., d) of elementary effects (..., n, d)."""
-    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is no number: not told
+    """Return mu_star, mu and sigma (..., d) of elementary effects (..., n, d)."""
+    with np.errstate(over="ignore", invalid="ignore"):  # an overflow gives a value that is not finite
         return {
             "mu_star": np.mean(np.abs(effects), axis=-2),
             "mu": np.mean(effects, axis=-2),
@@ -145,10 +161,12 @@ def morris_indices(effects: Reals) -> dict[str, Reals]:
 
 
 def elementary_effects(results: Reals, points: Reals) -> Reals:
-    """Return effects (n, d) of results (n, d + 1) at shares (n, d + 1, d) of paths.
+    """Return the elementary effects (n, d) of results (n, d + 1) at levels (n, d + 1, d) of Morris
+    paths.
 
-    Each step changes the share of one thing by the stride, whatever becomes of its value: one that
-    draws the same value again has no effect.
+    Each step changes the level of one variable by the stride. The effect is the signed difference
+    of the results over the change of the level; it is zero if the changed level draws the same
+    value.
     """
     moved = np.diff(points, axis=1)
     changed = np.argmax(np.abs(moved), axis=2)
@@ -163,7 +181,7 @@ def elementary_effects(results: Reals, points: Reals) -> Reals:
 def _measure_indices(
     table: StudyTable, design: Design, column: StoreColumn, groups: Iterable[DesignGroup]
 ) -> Iterator[Index]:
-    """Yield the indices of a measure in each group: variant, scenario, point of the grid."""
+    """Yield the indices of a measure for each group and each random variable of the design."""
     size = len(design.names)
     samples = table.read_reals("sample").astype(np.int64)
     values = np.where(table.is_done, table.read_reals(column.name), np.nan)
@@ -172,7 +190,7 @@ def _measure_indices(
         chosen = group.mask
         results = _arrange_results(samples[chosen], values[chosen], design)
         fine = np.flatnonzero(~np.isnan(results).any(axis=1))
-        used, _ = scale_to_squarable(results[fine])  # shares of a variance have no unit
+        used, _ = scale_to_squarable(results[fine])  # relative to the variance, hence without unit
         estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
         if design.method == "morris":
             numbers = (fine[:, None] * design.group_size + np.arange(design.group_size)).reshape(-1)
@@ -206,17 +224,20 @@ def _measure_indices(
 
 
 def _is_varying(values: Reals) -> bool:
-    """Tell whether drawn values (n,) are not all one: of what never changed nothing is known."""
+    """Return whether drawn values (n,) have more than one value; False without values."""
     return len(values) > 0 and float(np.min(values)) < float(np.max(values))
 
 
 def _finite_interval(low: float, high: float) -> Interval:
-    """Return an interval, None where an end is no number."""
+    """Return the interval (low, high); None if an end is not finite."""
     return (float(low), float(high)) if np.isfinite(low) and np.isfinite(high) else None
 
 
 def _arrange_results(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:
-    """Return values (n, each) by their place in the design, the mean over all replicates."""
+    """Return values (n,) as an array (n_groups, group_size) in the order of the design.
+
+    Each entry is the mean over the replicates; NaN if a replicate is missing.
+    """
     total = np.bincount(samples, values, design.count)
     times = np.bincount(samples, minlength=design.count)
     means = total / np.where(times == design.replicates, times, np.nan)
@@ -224,7 +245,7 @@ def _arrange_results(samples: NDArray[np.int64], values: Reals, design: Design) 
 
 
 def _design_groups(table: StudyTable, design: Design) -> Iterator[DesignGroup]:
-    """Yield what has a design of its own: told by name where there are several."""
+    """Yield the groups of variants that form a complete design each."""
     drawn = {name: table.read_reals(name) for name in design.names}
     for named, chosen in _group_masks(table, design):
         moved = {name for name, values in drawn.items() if _is_varying(values[chosen])}
@@ -234,7 +255,10 @@ def _design_groups(table: StudyTable, design: Design) -> Iterator[DesignGroup]:
 def _group_masks(
     table: StudyTable, design: Design
 ) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
-    """Yield the names of each group, and which variants (n_variants,) are its own."""
+    """Yield labels and mask (n_variants,) of each combination of variant, scenario and grid values.
+
+    The labels contain only columns with more than one value.
+    """
     axes = [c.name for c in table.store.manifest.varied if c.name not in design.names]
     keys = {name: group_values(table, name) for name in ("variant", "scenario", *axes)}
     keys = {name: key for name, key in keys.items() if len(key[1]) > 1}
@@ -250,7 +274,10 @@ def _group_masks(
 def _bootstrap_intervals(
     samples: Reals, estimate: Callable[[Reals], dict[str, Reals]], confidence: float
 ) -> dict[str, tuple[Reals, Reals]]:
-    """Return the ends (d,) of the intervals of indices: whole blocks or paths are drawn again."""
+    """Return the ends (d,) of percentile intervals of each index by name.
+
+    The bootstrap resamples whole blocks or paths, the second-last but one axis of `samples`.
+    """
     source, count = np.random.default_rng(BOOTSTRAP_SEED), len(samples)
     size = max(1, MAX_RESAMPLED // samples.size)
     drawn = [

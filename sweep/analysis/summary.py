@@ -1,6 +1,7 @@
-"""Summary: how often, how large, how sure - the numbers of a study over its variants.
+"""Summary of a study: compute statistics of measures, rates and reasons of failure by group.
 
-Only variants that are done count; those with a fault bit, stopped or refused are counted apart.
+Statistics include finished variants only. Variants with a fault bit, stopped and refused ones are
+counted separately.
 """
 
 from __future__ import annotations
@@ -29,12 +30,14 @@ from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable, to_display_unit
 
 NUMBER_PATTERN = re.compile(r"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*`)")
-"""A number of a message: two that differ in numbers alone tell one reason."""
+"""A number in a message. Messages that differ in numbers only belong to one reason of failure."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A reason: `count` variants ended so; `message` is that of `number`, the first of them."""
+    """A reason of failure: `count` variants have `status`; `message` and `number` are of the first
+    one.
+    """
 
     status: str
     message: str
@@ -43,7 +46,10 @@ class Failure:
 
 
 def failures_of(table: StudyTable) -> tuple[Failure, ...]:
-    """Return why the variants of a store that are not done are not."""
+    """Return the reasons of failure of the unfinished variants, the most frequent one first.
+
+    Messages that differ in numbers only are merged. Ties are in the order of the first variant.
+    """
     if table.is_done.all():
         return ()
     states, names = table.read_categories("status")
@@ -65,24 +71,29 @@ def failures_of(table: StudyTable) -> tuple[Failure, ...]:
 
 
 def _first_number(row: tuple[list[int], int, int]) -> int:
+    """Return the number of the first variant of a row, the key of the sort."""
     return row[1]
 
 
 RATE_DENOMINATORS = {"missed": "truths", "first_missed": ""}
-"""Parts of a match that are rates: of how many; an empty text: of the variants that have one."""
+"""Parts of a match that are rates, with the part that holds the number of trials.
+
+An empty text means one trial for each variant that has a value.
+"""
 
 LINE_FIELDS = ("mean", "deviation", "median", "p5", "p95", "low", "high", "total")
+"""The statistics of a measure in the CSV file, besides intervals."""
 
 RATE_FIELDS = ("hits", "share")
-"""What a line, and what a rate, has in a table beside its intervals."""
+"""The columns of a rate in the CSV file, besides its interval."""
 
 
 @dataclass(frozen=True)
 class SummaryLine:
-    """One measure in one group: `count` numbers [unit], and what they are like; NaN: too few.
+    """Statistics of one measure in one group: `count` numbers [unit] from `draws` independent
+    draws.
 
-    They come from so many independent `draws`. `mean_interval`, `median_interval` are at the
-    confidence of the study.
+    A statistic that needs more numbers is NaN. The intervals have the confidence of the study.
     """
 
     group: Mapping[str, str]
@@ -104,7 +115,9 @@ class SummaryLine:
 
 @dataclass(frozen=True)
 class Rate:
-    """How often something was the case in one group: `hits` of `count` in so many `draws`."""
+    """The frequency of an outcome in one group: `hits` of `count` trials in `draws` independent
+    draws.
+    """
 
     group: Mapping[str, str]
     measure: str
@@ -115,13 +128,15 @@ class Rate:
 
     @property
     def share(self) -> float:
-        """The rate; NaN without any."""
+        """The rate hits / count; NaN without trials."""
         return self.hits / self.count if self.count else math.nan
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The results of a study: how many variants ended how and why, lines and rates by group."""
+    """The results of a study: number of variants by status, failures, statistics and rates by
+    group.
+    """
 
     study: str
     digest: str
@@ -133,7 +148,10 @@ class Summary:
     rates: tuple[Rate, ...]
 
     def csv(self) -> str:
-        """Return lines and rates as CSV, numbers in SI; what one of them has not is empty."""
+        """Return statistics and rates as CSV text with numbers in SI.
+
+        Columns that do not apply to a row are empty.
+        """
         text = io.StringIO()
         entries: list[SummaryLine | Rate] = [*self.lines, *self.rates]
         groups = list(entries[0].group) if entries else []
@@ -156,11 +174,12 @@ class Summary:
 
 
 def _interval_columns(name: str, interval: Interval) -> dict[str, float]:
+    """Return the columns `<name>_from` and `<name>_to`; empty without an interval."""
     return {f"{name}_from": interval[0], f"{name}_to": interval[1]} if interval else {}
 
 
 def summary_of(store: Store) -> Summary:
-    """Return the summary of what a store holds so far. Raises SpecError, ToolMissing."""
+    """Return the summary of the stored variants. Raises SpecError and MissingToolError."""
     table = StudyTable(store)
     manifest = store.manifest
     confidence = manifest.presentation.confidence
@@ -188,7 +207,10 @@ def summary_of(store: Store) -> Summary:
 
 
 def _group_masks(table: StudyTable) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
-    """Yield each group that has variants: its names, and which variants (n_variants,) count."""
+    """Yield labels and mask (n_variants,) of finished variants for each group that has any.
+
+    Without grouping columns there is one group, also if it is empty.
+    """
     keys = [group_values(table, name) for name in group_names(table)]
     for places in itertools.product(*(range(len(names)) for _, names in keys)):
         chosen = table.is_done
@@ -200,14 +222,20 @@ def _group_masks(table: StudyTable) -> Iterator[tuple[dict[str, str], NDArray[np
 
 
 def group_names(table: StudyTable) -> list[str]:
-    """Return what is told apart: what the study says, else variants and scenarios if several."""
+    """Return the columns by which results are grouped.
+
+    These are the columns in the study's `summary: by`, else `variant` and `scenario` if they have
+    more than one value.
+    """
     if table.store.manifest.presentation.by:
         return list(table.store.manifest.presentation.by)
     return [name for name in ("variant", "scenario") if len(table.read_categories(name)[1]) > 1]
 
 
 def group_values(table: StudyTable, name: str) -> tuple[NDArray[np.int64], list[str]]:
-    """Return the places (n_variants,) of a column in the list of its different values."""
+    """Return the index (n_variants,) of each value in the list of different values, and their
+    names.
+    """
     if name in ("variant", "scenario"):
         return table.read_categories(name)
     manifest = table.store.manifest
@@ -219,7 +247,7 @@ def group_values(table: StudyTable, name: str) -> tuple[NDArray[np.int64], list[
 
 
 def format_value(value: float, column: StoreColumn) -> str:
-    """Return a value [SI] of a column to six digits, with the unit in which it is shown."""
+    """Return a value [SI] of a column with six digits in the display unit; `-` for NaN."""
     if math.isnan(value):
         return "-"
     number = f"{to_display_unit(value, column):.6g}"
@@ -233,6 +261,7 @@ def _summarise_column(
     draws: NDArray[np.int64],
     confidence: float,
 ) -> SummaryLine:
+    """Return the statistics of the values (n,) [SI] of a column in one group."""
     count = len(values)
     ordered = np.sort(values)
     nothing = math.nan
@@ -262,7 +291,10 @@ def _count_rates(
     groups: Sequence[tuple[dict[str, str], NDArray[np.bool_]]],
     confidence: float,
 ) -> Iterator[Rate]:
-    """Yield how often something is the case; how many truths, how often the first, were missed."""
+    """Yield the rates of a truth measure, or of the missed events of a match, for each group.
+
+    Yield nothing for other columns.
+    """
     base, _, part = column.name.rpartition(".")
     if column.type != "truth" and part not in RATE_DENOMINATORS:
         return

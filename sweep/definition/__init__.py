@@ -1,1 +1,1 @@
-"""The definition of a study: variables, distributions, measures, plots."""
+"""Definition of a study: variables, distributions, measures and plots, read from YAML."""

@@ -1,4 +1,4 @@
-"""Description: what a study says of itself, as texts for the readers of its results."""
+"""Description of a study: store its sections as text for readers of the results."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from language.text.sanitise import escape_invisible
 Description = Mapping[str, str | Mapping[str, str]]
 """The sections of a study by key: a text, or texts by name."""
 DESCRIBED_SECTIONS = ("about", "of", "scenarios", "variants", "vary", "set", "measures", "record")
+"""The sections of a study that the description contains."""
 NAMED_SECTIONS = ("vary", "set", "measures")
-"""Sections that are told name by name."""
+"""Sections that are described entry by entry."""
 
 
 def description_of(tree: MappingNode, overrides: Mapping[str, ScalarNode]) -> Description:
-    """Return what the sections of a study say, as they are written, and what `--set` does."""
+    """Return the texts of the sections of a study by key, and the overrides under `--set`.
+
+    Sections without content are absent.
+    """
     found: dict[str, str | dict[str, str]] = {}
     for key in DESCRIBED_SECTIONS:
         node = tree.get(key)
@@ -30,5 +34,5 @@ def description_of(tree: MappingNode, overrides: Mapping[str, ScalarNode]) -> De
 
 
 def _text_of(node: YamlNode) -> str:
-    """Return a node as one line; what is not seen is written as an escape."""
+    """Return a node as one line of YAML with invisible characters escaped."""
     return escape_invisible(" ".join(format_inline(node).split()))

@@ -1,4 +1,4 @@
-"""Shape: whether a distribution is one that can be drawn from, and how an axis is divided."""
+"""Distribution check: find invalid parameters of distributions; space axes logarithmically."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from fractions import Fraction
 from sweep.definition.study import Distribution
 
 MIN_LEVELS_WITHIN = 2.0**20
-"""Different shares that `within` leaves at least: with fewer a drawn value has no six digits."""
+"""Smallest number of representable quantile levels that a truncation must leave.
+
+With fewer levels a drawn value has less than six digits.
+"""
 MAX_RATIO = 2**1000
-"""Of the ends of an axis; a larger one is no number, and a smaller inverse has fewer digits."""
+"""Largest ratio of the ends of an axis that is computed exactly; larger ones overflow a float."""
 FORM_TEXTS = {
     "uniform": "`uniform` is `[low, high]`",
     "log_uniform": "`log_uniform` is `[low, high]`, above zero",
     "normal": "`normal` is `[mean, standard deviation]`",
     "lognormal": "`lognormal` is `[median, sigma of the logarithm]`",
 }
+"""The form of each distribution, as an error message states it."""
 
 
 def fault_of_distribution(distribution: Distribution) -> tuple[str, str] | None:
-    """Return the kind of the problem of a distribution and what is wrong; None: it is fine."""
+    """Return the code and the text of the problem of a distribution; None if it is valid."""
     if distribution.shape == "choice":
         return _fault_of_choice(distribution)
     if distribution.weights:
@@ -56,6 +60,7 @@ def fault_of_distribution(distribution: Distribution) -> tuple[str, str] | None:
 
 
 def _fault_of_choice(distribution: Distribution) -> tuple[str, str] | None:
+    """Return the code and the text of the problem of a choice; None if it is valid."""
     numbers, weights = distribution.numbers, distribution.weights
     fits_weights = not weights or len(weights) == len(numbers)
     if not numbers or not fits_weights or any(w <= 0 for w in weights):
@@ -66,7 +71,11 @@ def _fault_of_choice(distribution: Distribution) -> tuple[str, str] | None:
 
 
 def log_spaced(first: Fraction, last: Fraction, count: int) -> tuple[float, ...]:
-    """Return numbers above zero with equal ratios from one to the next, the ends among them."""
+    """Return `count` numbers from `first` to `last` with a constant ratio; the ends are included.
+
+    Both ends are positive and `count` is at least 2. An extreme ratio is computed from powers of
+    the ends.
+    """
     start, end = float(first), float(last)
     shares = [k / (count - 1) for k in range(count - 1)]
     if Fraction(1, MAX_RATIO) < last / first < MAX_RATIO:

@@ -1,4 +1,8 @@
-"""Measure: what is kept of one variant - events, delays between them, numbers of signals."""
+"""Measures: define the quantities that a study computes from each variant.
+
+A measure is an event time, a count, a delay, a match of events, a statistic of a signal or an
+expression of other measures.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,12 @@ from language.text.diagnostic import Span
 
 SignalKind = Literal["peak", "max", "min", "mean", "rms", "final", "settling", "frequency"]
 Bound = Fraction | str | None
-"""An end of a window: a time [s], the name of an earlier measure, or none."""
+"""An end of a time window: a time [s], the name of an earlier measure, or None for no limit."""
 
 
 @dataclass(frozen=True)
 class EventMeasure:
-    """The time [s] of the n-th event in a window, or how many there are."""
+    """The time [s] of the n-th event in a window, or the number of events."""
 
     name: str
     kind: Literal["time", "count"]
@@ -32,9 +36,10 @@ class EventMeasure:
 
 @dataclass(frozen=True)
 class DelayMeasure:
-    """From the n-th event `after` [s] to the first `event` that is not earlier than `before`.
+    """The delay [s] from the n-th `after` event to the first `event` not earlier than `before`.
 
-    Negative: it came before. None where there is no such event, or not `within` [s].
+    The delay is negative if the event comes first. It is None without such an event, or if it is
+    later than `within` [s].
     """
 
     name: str
@@ -51,11 +56,11 @@ class DelayMeasure:
 
 @dataclass(frozen=True)
 class MatchMeasure:
-    """Every entry of a mode by a truth against the entries by a detector.
+    """A comparison of the entries of a truth mode with the entries of a detector mode.
 
-    The window of a truth is from `before` [s] ahead of it until its mode is left, or for `within`
-    [s] at most. The first detection in a window matches. One that is farther than `before` from all
-    stays in that mode is false.
+    The window of a truth extends from `before` [s] ahead of the entry to the exit of its mode, at
+    most for `within` [s]. The first unmatched detection in the window matches. A detection farther
+    than `before` from each interval of the truth mode is false.
     """
 
     name: str
@@ -71,10 +76,10 @@ class MatchMeasure:
 
 @dataclass(frozen=True)
 class SignalMeasure:
-    """A number of a recorded signal over a window.
+    """A statistic of a recorded signal in a time window.
 
-    `signal` is the recorded name; an expression is recorded under a name of its own. `within` [unit
-    of the signal] is the band of `settling` around the final value, `by` how a frequency is found.
+    `signal` is the recorded name; an expression is recorded as an additional output. `within` [unit
+    of the signal] is the settling band around the final value, `by` the method of a frequency.
     """
 
     name: str
@@ -90,7 +95,7 @@ class SignalMeasure:
 
 @dataclass(frozen=True)
 class ValueMeasure:
-    """An expression of earlier measures: a quantity, or whether something is the case."""
+    """An expression of earlier measures: a quantity, or a truth value if `is_truth`."""
 
     name: str
     formula: Formula
@@ -105,14 +110,14 @@ MATCH_PARTS = {
     "truths": "whole", "matched": "whole", "missed": "whole", "detections": "whole",
     "false_events": "whole", "first": "real", "first_missed": "whole", "delays": "list",
 }  # fmt: skip
-"""The columns of a match, `<measure>.<part>`, and what they hold."""
+"""The columns `<measure>.<part>` of a match, with their types."""
 
 
 @dataclass(frozen=True)
 class StoreColumn:
-    """A column of the store; a list is one of reals, `unit` is in SI.
+    """A column of the store: name, type and SI unit; a list is a list of reals.
 
-    It is shown in the unit `shown`: value in SI = factor * shown value + offset.
+    The display unit is `shown`: value in SI = factor * shown value + offset.
     """
 
     name: str
@@ -124,12 +129,12 @@ class StoreColumn:
 
     @property
     def label(self) -> str:
-        """The unit in which it is shown, for readers."""
+        """The display unit as readers see it."""
         return display_unit(self.shown or self.unit)
 
 
 def columns_of(measure: Measure) -> tuple[StoreColumn, ...]:
-    """Return the columns that a measure fills."""
+    """Return the columns that a measure fills: eight for a match, else one."""
     if isinstance(measure, MatchMeasure):
         return tuple(
             StoreColumn(f"{measure.name}.{part}", kind, "1" if kind == "whole" else "s")  # type: ignore[arg-type]

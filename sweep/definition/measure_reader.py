@@ -1,4 +1,4 @@
-"""Measure reader: the section `measures` of a study, each measure checked against its systems."""
+"""Measure reader: read the section `measures` of a study and check it against the systems."""
 
 from __future__ import annotations
 
@@ -54,27 +54,35 @@ MEASURE_KEYS: dict[str, tuple[str, ...]] = {
     "value": WINDOW_KEYS,
     "is": WINDOW_KEYS,
 }
-"""What stands beside each kind of measure; a window of `value` or `is` is refused by its reason."""
+"""The keys beside each kind of measure. A window of `value` or `is` is refused with its own
+message.
+"""
 VALUE_KINDS = ("value", "is")
+"""Kinds of measures that are expressions of other measures."""
 MAX_EVENTS = 1_000_000
+"""Largest event number of a measure."""
 
 
 class MeasureReader(Reader):
-    """Reads measures in their order: each may read those before it."""
+    """Reader of measures in their order; a measure may refer to earlier ones.
+
+    `dimensions` holds the type of each column read so far, None for a measure with a problem.
+    `expressions` holds the expressions of signals by the name of their additional output.
+    """
 
     def __init__(self, problems: Problems, systems: Sequence[System]) -> None:
-        """Check against all systems of the study; units are those of the first."""
+        """Check names against all systems of the study; the first system gives the units."""
         super().__init__(problems)
         self.systems = systems
         self.dimensions: dict[str, ExprType | None] = {}
         self.expressions: dict[str, tuple[Formula, Dimension]] = {}
 
     def measures(self, node: YamlNode | None, at: Span) -> tuple[Measure, ...]:
-        """Return the measures; an expression of signals is in `expressions` by its new name."""
+        """Return the valid measures of a section and report the problems of the others."""
         found = []
         for entry in self.named_entries(node, "measures"):
             measure = self._measure(entry)
-            self.dimensions[entry.key] = None  # what has a problem is not reported again
+            self.dimensions[entry.key] = None   # None suppresses further reports about a faulty measure
             if measure:
                 del self.dimensions[entry.key]
                 found.append(measure)
@@ -88,11 +96,13 @@ class MeasureReader(Reader):
         return tuple(found)
 
     def _dimension(self, measure: Measure, unit: str) -> Dimension:
+        """Return the dimension of a column of a measure."""
         if isinstance(measure, SignalMeasure | ValueMeasure):
             return self._last_dimension
         return SECOND if unit == "s" else PURE_NUMBER
 
     def _measure(self, entry: Entry) -> Measure | None:
+        """Return the measure of an entry; None if a problem was reported."""
         found = self.read_alternative(entry, f"measures.{entry.key}", MEASURE_KEYS, "measures")
         if found is None:
             return None
@@ -112,6 +122,7 @@ class MeasureReader(Reader):
         return self._event(entry, kind, scalar, own, since, until)
 
     def _bound(self, node: YamlNode | None, what: str) -> Bound:
+        """Return a bound of a window: a time [s], an earlier measure that is a time, or None."""
         if node is None:
             return None
         if isinstance(node, ScalarNode) and not node.text[:1].isdecimal():
@@ -126,6 +137,7 @@ class MeasureReader(Reader):
         return self._time(node, what)
 
     def _time(self, node: YamlNode | None, what: str) -> Fraction:
+        """Return a time [s] that is not negative; 0 without a node. Reports other quantities."""
         if node is None:
             return Fraction(0)
         value, unit = self.read_quantity(node, what, node.span, None)
@@ -142,6 +154,8 @@ class MeasureReader(Reader):
         since: Bound,
         until: Bound,
     ) -> Measure | None:
+        """Return a measure of events (time, count, delay or match); None if a problem was reported.
+        """
         event = self._event_name(scalar)
         if event is None:
             return None
@@ -168,12 +182,16 @@ class MeasureReader(Reader):
         )
 
     def _event_name(self, scalar: ScalarNode) -> ModeEntryEvent | None:
+        """Return the event of a text if all systems have it; None if a problem was reported.
+
+        Events of charts are refused, because their transitions do not determine all entries.
+        """
         found = [read_event(scalar, system, self.problems) for system in self.systems]
         event = found[0] if all(found) else None
         for system in self.systems if event else ():
             assert event is not None
             if system.instances[event.instance].automaton.statechart is not None:
-                label = f"`{event.instance}` is a chart: its transitions do not tell all entries"
+                label = f"`{event.instance}` is a chart: its transitions do not determine all entries"
                 hint = "a test of the spec does: docs/testing.md"
                 self.problems.error("event", scalar.span, label, hint)
                 return None
@@ -188,6 +206,7 @@ class MeasureReader(Reader):
         since: Bound,
         until: Bound,
     ) -> Measure | None:
+        """Return a statistic of a signal; None if a problem was reported."""
         signal, dimension = self._recorded_signal(entry.key, scalar)
         if dimension is None:
             return None
@@ -209,7 +228,11 @@ class MeasureReader(Reader):
         )  # fmt: skip
 
     def _recorded_signal(self, name: str, scalar: ScalarNode) -> tuple[str, Dimension | None]:
-        """Return the recorded signal of a text, and its dimension; None with a problem told."""
+        """Return the recorded signal of a text and its dimension; None as dimension after a
+        problem.
+
+        The text must be valid in all systems. An instance alone in a system needs no prefix.
+        """
         found: list[tuple[str, Dimension | None]] = []
         for system in self.systems:
             known = signal_kinds(system)
@@ -237,6 +260,7 @@ class MeasureReader(Reader):
     def _named_signal(
         self, name: str, formula: Formula, kind: ExprType | None, system: System
     ) -> tuple[str, Dimension | None]:
+        """Return the name and the dimension of a signal, or of an expression as a new output."""
         if kind is None:
             return "", None
         if isinstance(kind, IntType):
@@ -250,6 +274,9 @@ class MeasureReader(Reader):
         return f"measured_{name}", kind
 
     def _value(self, entry: Entry, scalar: ScalarNode, is_truth: bool) -> Measure | None:
+        """Return a measure that is an expression of earlier measures; None if a problem was
+        reported.
+        """
         formula = self.read_expression(scalar, entry.key, scalar.span)
         if formula is None:
             return None

@@ -1,4 +1,4 @@
-"""Override: a value from outside for a parameter, which a study must leave alone to have it."""
+"""Override check: refuse values from the command line for parameters that the study itself sets."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from sweep.definition.study import Study, Target
 
 
 def require_overridable(study: Study, names: Iterable[str]) -> None:
-    """Raise ValueError where a parameter has values of the study's own in every variant.
+    """Raise ValueError if the study assigns one of the named parameters in each variant.
 
-    Of what varies one at a time a value from outside is the one that all other variants have.
+    A variable of one-at-a-time sampling may be overridden: the value holds in the variants that
+    vary another variable.
     """
     for name in names:
         owner, _, short = name.rpartition(".")
@@ -22,7 +23,7 @@ def require_overridable(study: Study, names: Iterable[str]) -> None:
 
 
 def _assigned_targets(study: Study) -> Iterator[tuple[Target, str]]:
-    """Yield the places that have a value of the study's own in every variant, and why."""
+    """Yield the targets that the study assigns in each variant, with the reason for the message."""
     alone = study.sampling.one_at_a_time
     left = {varied.name for varied in study.variables if not varied.targets} if alone else set()
     for varied in () if alone else study.variables:
@@ -33,7 +34,10 @@ def _assigned_targets(study: Study) -> Iterator[tuple[Target, str]]:
 
 
 def _free_parameters_hint(study: Study, target: Target) -> str:
-    """Return a hint where instances have the parameter that the study leaves alone."""
+    """Return a hint with the instances whose parameter of this name the study does not assign.
+
+    The hint is empty if there are none.
+    """
     owned = {each.path for each, _ in _assigned_targets(study)}
     instances = study.system_variants[0].system.instances
     found = [

@@ -1,4 +1,4 @@
-"""Presentation reader: the sections `summary` and `plots` of a study."""
+"""Presentation reader: read the sections `summary` and `plots` of a study."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ PLOT_OPTIONS: dict[str, tuple[str, ...]] = {
     "tornado": (),
     "histogram": ("by",),
 }
-"""The pictures and what stands beside each: the axes, and what is told apart."""
+"""The kinds of plots with their options: axes (`over`) and grouping (`by`)."""
 
 
 class PresentationReader(Reader):
-    """How results are shown; `by` may name what has few values."""
+    """Reader of summary and plots; `by` may name a column with few values only."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class PresentationReader(Reader):
         varied: Sequence[SweepVariable],
         measures: Sequence[Measure],
     ) -> None:
-        """Read against what varies and what is measured."""
+        """Store the names of the variables and measures to which the sections may refer."""
         super().__init__(problems)
         self.groups = ["variant", "scenario", *(v.name for v in varied if not v.is_random)]
         self.groups += [v.name for v in varied if getattr(v.distribution, "shape", "") == "choice"]
@@ -50,7 +50,9 @@ class PresentationReader(Reader):
         self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: YamlNode | None, plots: YamlNode | None) -> Presentation:
-        """Return what the sections say."""
+        """Return the presentation of both sections; reports unknown names and a confidence out of
+        range.
+        """
         table = self.read_mapping(summary, "summary", ("by", "confidence"))
         by = self._names(table.get("by"), "by", self.groups, True)
         confidence = 0.95
@@ -64,6 +66,10 @@ class PresentationReader(Reader):
         return Presentation(tuple(by), confidence, found)
 
     def _plot(self, entry: Entry) -> dict[str, Any]:
+        """Return the options of one plot: `kind`, `of` and, by kind, `over` and `by`.
+
+        Return an empty dict if its kind is missing or ambiguous.
+        """
         problem_count = len(self.problems.reported)
         options = {key for keys in PLOT_OPTIONS.values() for key in keys}
         table = self.read_mapping(entry.node, f"plots.{entry.key}", (*PLOT_OPTIONS, *options))
@@ -96,6 +102,9 @@ class PresentationReader(Reader):
     def _names(
         self, node: YamlNode | None, what: str, known: Sequence[str], is_single: bool = False
     ) -> list[str]:
+        """Return the names in a list, or in a scalar if `is_single`; reports names that are not
+        known.
+        """
         items: list[ScalarNode] = []
         if is_single and isinstance(node, ScalarNode):
             items = [node]

@@ -1,4 +1,4 @@
-"""Sampling reader: the section `sampling` of a study."""
+"""Sampling reader: read the section `sampling` of a study."""
 
 from __future__ import annotations
 
@@ -18,16 +18,24 @@ from sweep.definition.study import (
 )
 
 METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
+"""The methods that draw random points."""
 MAX_POINTS = 10_000_000
-"""Most variants of a study: at 10 000 per second a quarter of an hour, 2 GB of results."""
+"""Largest number of variants of a study: a quarter of an hour at 10 000 per second, 2 GB of
+results.
+"""
 MAX_SEED = 2**31 - 1
+"""Largest seed of a study."""
 
 
 class SamplingReader(Reader):
-    """How points are drawn; what contradicts `vary` is reported."""
+    """Reader of the sampling; it reports contradictions to the section `vary`."""
 
     def sampling(self, node: YamlNode | None, varied: Sequence[SweepVariable]) -> Sampling:
-        """Return what the section says of what varies."""
+        """Return the sampling of a section for the given variables.
+
+        The count of a design is the number of its points. Warns if a Sobol sequence is unbalanced
+        or a Morris design cannot reach a value.
+        """
         drawn = [each for each in varied if each.is_random]
         if node is None or isinstance(node, ScalarNode):
             return self._grid_sampling(node, drawn)
@@ -55,7 +63,7 @@ class SamplingReader(Reader):
         return Sampling(method, count, seed)  # type: ignore[arg-type]
 
     def _warn_unreached_choices(self, variable: SweepVariable) -> None:
-        """Warn of values of a choice that no level of a path draws."""
+        """Warn if the levels of Morris paths never draw some values of a choice."""
         course = variable.distribution
         if not isinstance(course, Distribution) or course.shape != "choice":
             return
@@ -65,13 +73,17 @@ class SamplingReader(Reader):
         missed = len(course.numbers) - len(reached)
         if missed:
             words = "1 value" if missed == 1 else f"{missed} values"
-            label = f"paths of Morris draw {words} of `{variable.name}` never: {MORRIS_LEVELS} levels see shares"
-            hint = "weights that are more alike, or `saltelli`"
-            self.problems.warning(
-                "sampling", variable.span, f"{label} of {1 / MORRIS_LEVELS:g} each", hint
+            label = (
+                f"paths of Morris draw {words} of `{variable.name}` never: "
+                f"{MORRIS_LEVELS} levels see shares of {1 / MORRIS_LEVELS:g} each"
             )
+            hint = "weights that are more alike, or `saltelli`"
+            self.problems.warning("sampling", variable.span, label, hint)
 
     def _grid_sampling(self, node: YamlNode | None, drawn: Sequence[SweepVariable]) -> Sampling:
+        """Return a full grid or one-at-a-time sampling; reports random variables, which need a
+        count.
+        """
         word = self.read_choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
         if drawn:
             first = drawn[0]
@@ -82,7 +94,8 @@ class SamplingReader(Reader):
 
 
 def find_imbalance(method: str, count: int) -> tuple[str, str] | None:
-    """Return what is wrong with a number of points of a sequence, and what helps; None: nothing."""
+    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method; else None.
+    """
     if method not in ("sobol", "saltelli") or not count & (count - 1):
         return None
     label = f"{count} is no power of 2: a Sobol sequence loses its balance"

@@ -1,4 +1,4 @@
-"""Study: what varies, in which systems and scenarios, and what is measured of each variant."""
+"""Study model: variables, targets, sampling, measures and the size of a study."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ Shape = Literal["uniform", "log_uniform", "normal", "lognormal", "choice"]
 
 
 TIME_DECIMALS = 9
-"""Decimals of a drawn time [s] in an input: so all times of a run are multiples of one tick."""
+"""Decimals of a drawn time [s] in an input, so that all times of a run are whole nanoseconds."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A place where a value goes: a parameter of an instance, a start value, a part of an input.
+    """The place to which a value is assigned: parameter, initial value, part of an input, sensor,
+    clock.
 
     `path` is (instance, parameter), (instance, state), (input, part ...), (sensor, field) or
     (instance, period | step | offset).
@@ -37,23 +38,26 @@ class Target:
 
     @property
     def is_input_time(self) -> bool:
-        """Tell whether it is a time in an input; these are rounded to nanoseconds."""
+        """Return whether the target is a time in an input; drawn times are rounded to nanoseconds.
+        """
         is_time = "times" in self.path[1:2] or self.path[-1] in ("from", "to")
         return self.kind == "input" and is_time
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Values [SI] that are taken one after the other: an axis of the grid."""
+    """The values [SI] of a grid axis in their order."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """What is drawn from, in SI; `within` truncates it, `weights` are those of the choices.
+    """A probability distribution with parameters in SI.
 
-    `numbers` are low and high, mean and sd, median and sigma of the logarithm, or the choices.
+    `numbers` are low and high, mean and standard deviation, median and sigma of the logarithm, or
+    the values of a choice. `within` truncates the distribution; `weights` are the weights of the
+    choices.
     """
 
     shape: Shape
@@ -64,10 +68,10 @@ class Distribution:
 
 @dataclass(frozen=True)
 class SweepVariable:
-    """Something that varies: `targets` is empty for a name that only `set` reads.
+    """A variable of a study with its values or its distribution [SI].
 
-    `words` are the values of an enumeration; values are in SI, `unit` is the one they are written
-    and shown in.
+    `targets` is empty for a name to which only `set` refers. `words` are the values of an
+    enumeration. `unit` is the unit in the study file, in which values are also displayed.
     """
 
     name: str
@@ -79,13 +83,13 @@ class SweepVariable:
 
     @property
     def is_random(self) -> bool:
-        """Tell whether values are drawn, not taken from a list."""
+        """Return whether the values are drawn from a distribution."""
         return isinstance(self.distribution, Distribution)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A value that follows from what varies and from parameters: an expression in SI."""
+    """An assignment of the section `set`: an expression [SI] of variables and parameters."""
 
     name: str
     targets: tuple[Target, ...]
@@ -95,11 +99,11 @@ class Setting:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How many points are drawn, how, and from which seed; 0 points: nothing is drawn.
+    """The number of drawn points, the method and the seed; 0 points mean a grid only.
 
-    Of a design (`saltelli`, `morris`) `count` are all its points, several a block or path.
-
-    `one_at_a_time`: instead of the product of the axes, each value with all others left alone.
+    The count of a design (`saltelli`, `morris`) is the number of all its points, several for each
+    block or path. With `one_at_a_time` each axis value is one variant and the other variables keep
+    their nominal values.
     """
 
     method: SamplingMethod = "random"
@@ -110,7 +114,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class ScenarioBinding:
-    """A scenario as one system reads it; `document` is there where parts of inputs vary."""
+    """A scenario that is read for one system; `document` is present if parts of inputs vary."""
 
     scenario: Scenario
     document: Document | None = None
@@ -118,7 +122,7 @@ class ScenarioBinding:
 
 @dataclass(frozen=True)
 class SystemVariant:
-    """One of the variants of a study: a system with the study's scenarios for it."""
+    """A named variant of the system with the scenarios of the study bound to it."""
 
     name: str
     system: System
@@ -126,14 +130,14 @@ class SystemVariant:
 
 
 MIN_CONFIDENCE, MAX_CONFIDENCE = 0.5, 0.999999
-"""Shares that a confidence is between: of less an interval is empty, of more without end."""
+"""Limits of the confidence of an interval."""
 MORRIS_LEVELS = 4
-"""Of each thing that varies in a path of Morris: the middles of so many equal shares."""
+"""Number of levels of a variable in a Morris path: the centres of as many equal intervals."""
 
 
 @dataclass(frozen=True)
 class Presentation:
-    """How results are shown: no influence on them. `plots` are options by name."""
+    """Grouping, confidence and plots (options by name); they do not influence the results."""
 
     by: tuple[str, ...] = ()
     confidence: float = 0.95
@@ -142,10 +146,10 @@ class Presentation:
 
 @dataclass(frozen=True)
 class Study:
-    """A checked study: everything that a worker needs, without its files.
+    """A checked study with everything that a worker needs; no files are read later.
 
-    `every` [s] is the distance of rows, None for that of the scenarios; `identity` are digests of
-    what the results depend on, by part; `description` are its sections as they are written.
+    `every` [s] is the distance of recorded rows, None for that of the scenarios. `identity` holds
+    digests of the parts on which the results depend. `description` holds the sections as text.
     """
 
     name: str
@@ -164,17 +168,19 @@ class Study:
 
     @property
     def grid_variables(self) -> tuple[SweepVariable, ...]:
-        """What takes its values from a list."""
+        """The variables with a list of values."""
         return tuple(varied for varied in self.variables if not varied.is_random)
 
     @property
     def random_variables(self) -> tuple[SweepVariable, ...]:
-        """What is drawn."""
+        """The variables with a distribution."""
         return tuple(varied for varied in self.variables if varied.is_random)
 
     @property
     def grid_count(self) -> int:
-        """The number of points of the grid, 1 where there are no axes."""
+        """The number of grid points; 1 without axes, 1 + the sum of the sizes for one-at-a-time
+        sampling.
+        """
         sizes = [
             len(v.distribution.values)
             for v in self.grid_variables
@@ -189,12 +195,13 @@ class Study:
 
     @property
     def count(self) -> int:
-        """The number of variants."""
+        """The number of variants: system variants * scenarios * grid points * samples * replicates.
+        """
         samples = max(1, self.sampling.count)
         shared = self.grid_count * samples * self.replicates
         return len(self.system_variants) * len(self.scenarios) * shared
 
 
 def design_group_size(method: str, dimensions: int) -> int:
-    """Return how many points belong together: those of a block or a path; else each is alone."""
+    """Return the number of points of a block (saltelli: d + 2) or path (morris: d + 1); else 1."""
     return {"saltelli": dimensions + 2, "morris": dimensions + 1}.get(method, 1)

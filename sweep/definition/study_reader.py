@@ -1,4 +1,4 @@
-"""Study reader: a study from its document, checked with everything that it names."""
+"""Study reader: read a study from its document and check it against its systems and scenarios."""
 
 from __future__ import annotations
 
@@ -38,11 +38,17 @@ from sweep.definition.vary_reader import VaryReader
 STUDY_KEYS = tuple(
     "language study of scenarios variants vary set sampling replicates measures record summary plots".split()  # noqa: SIM905
 )
+"""The sections of a study."""
 PRESENTATION_KEYS = ("summary", "plots", "sampling", "study", *TEXT_KEYS)
-"""Keys without influence on the results; but sampling, which may come from elsewhere."""
+"""Sections that the digest of the study leaves out.
+
+They do not influence the results, except `sampling`, which has a digest of its own because options
+can change it.
+"""
 MAX_REPLICATES = 1_000_000
+"""Largest number of replicates."""
 BASE_VARIANT = "base"
-"""The name of the variant that is the system as it is."""
+"""The name of the only variant of a study without `variants`."""
 
 
 def read_study(
@@ -51,7 +57,10 @@ def read_study(
     overrides: Overrides | None = None,
     problems: Problems | None = None,
 ) -> Study:
-    """Read a study with its systems and scenarios. Raises SpecError with all problems."""
+    """Return a checked study with its systems and scenarios. Raises SpecError with all problems.
+
+    `overrides` are parameter values from the command line.
+    """
     document = expand_document(document, project)
     problems = problems if problems is not None else Problems()
     require_kind(document, "study", problems)
@@ -62,7 +71,7 @@ def read_study(
 
 
 class _StudyReader(Reader):
-    """The sections of a study, one method each."""
+    """Reader with one method for each section of a study."""
 
     def __init__(
         self, problems: Problems, project: Project, overrides: dict[str, ScalarNode]
@@ -71,9 +80,10 @@ class _StudyReader(Reader):
         self.project = project
         self.overrides = overrides
         self.identity: dict[str, str] = {}
-        self.alone = ""  # an automaton alone is called like the first in all variants
+        self.alone = ""  # the name of a lone automaton in the first variant
 
     def read(self, document: Document) -> Study:
+        """Return the study of an expanded document; reports problems section by section."""
         tree = self.read_mapping(document.root, f"study {document.name}", STUDY_KEYS)
         at = document.name_span
         systems = self._systems(tree, at)
@@ -122,13 +132,14 @@ class _StudyReader(Reader):
         return study
 
     def _check_count(self, study: Study) -> None:
+        """Report a study with more than MAX_POINTS variants."""
         if study.count > MAX_POINTS:
             label = f"the study has {study.count} variants; at most {MAX_POINTS} are run"
             hint = "fewer values on an axis, or drawn points"
             self.problems.error("range", study.span, label, hint)
 
     def _systems(self, tree: MappingNode, at: Span) -> dict[str, System]:
-        """The systems by the name of the variant; `base` where there are no variants."""
+        """Return the systems by variant; a study without `variants` has the variant `base`."""
         of = self.read_scalar(tree.get("of"), "of", at)
         node = tree.get("variants")
         self.problems.raise_if_errors()
@@ -149,7 +160,9 @@ class _StudyReader(Reader):
         return found
 
     def _variant(self, entry: Entry, of: ScalarNode) -> System:
-        """A name of a system, or automata that take the place of others: `{plant: worn}`."""
+        """Return the system of a variant: another system, or replaced automata such as `{plant:
+        worn}`.
+        """
         if isinstance(entry.node, ScalarNode):
             return self._system(entry.key, entry.node, {})
         replacements: dict[str, ScalarNode] = {}
@@ -162,6 +175,7 @@ class _StudyReader(Reader):
         return self._system(entry.key, of, replacements)
 
     def _require_instance(self, of: ScalarNode, item: Entry) -> None:
+        """Report a replaced instance that the system does not have."""
         base = expand_document(
             self.project.read(self.project.path_of(of.text, of.span)), self.project
         )
@@ -172,6 +186,10 @@ class _StudyReader(Reader):
             self.problems.error("name", item.span, label, suggest_name(item.key, known))
 
     def _system(self, name: str, of: ScalarNode, replacements: Mapping[str, ScalarNode]) -> System:
+        """Return a system with replaced automata and overrides; store the digest of its text.
+
+        A lone automaton gets the same name in each variant, so that targets agree.
+        """
         document = self.project.read(self.project.path_of(of.text, of.span))
         if replacements:
             document = expand_document(document, self.project)
@@ -189,6 +207,9 @@ class _StudyReader(Reader):
         return single_instance_system(dataclasses.replace(only, name=self.alone))
 
     def _scenarios(self, tree: MappingNode, at: Span) -> dict[str, Document]:
+        """Return the expanded scenario documents by name; store their digests and report
+        duplicates.
+        """
         found: dict[str, Document] = {}
         items = self.read_list(tree.get("scenarios"), "scenarios")
         for item in items:
@@ -207,6 +228,7 @@ class _StudyReader(Reader):
     def _read_scenarios(
         self, system: System, scenarios: Mapping[str, Document]
     ) -> dict[str, Scenario]:
+        """Return the scenarios bound to a system; those with problems are reported and left out."""
         found = {}
         for name, document in scenarios.items():
             with self.problems.collect_errors():
@@ -216,7 +238,7 @@ class _StudyReader(Reader):
     def _common_targets(
         self, systems: Mapping[str, System], scenarios: list[Document]
     ) -> dict[str, TargetInfo]:
-        """The places that all variants and scenarios have in common."""
+        """Return the targets that all variants and scenarios have."""
         found: dict[str, TargetInfo] | None = None
         for system in systems.values():
             for scenario in scenarios:
@@ -225,6 +247,7 @@ class _StudyReader(Reader):
         return found or {}
 
     def _every(self, tree: MappingNode) -> Fraction | None:
+        """Return the distance [s] of recorded rows; None without `record`."""
         node = self.read_mapping(tree.get("record"), "record", ("every",)).get("every")
         if node is None:
             return None
@@ -238,7 +261,7 @@ class _StudyReader(Reader):
 def _intersect_targets(
     first: Mapping[str, TargetInfo], other: Mapping[str, TargetInfo]
 ) -> dict[str, TargetInfo]:
-    """Return the places that both have, each with the targets of both."""
+    """Return the names that are in both mappings, each with the targets of both."""
     found = {}
     for name, place in first.items():
         if name in other:
@@ -248,7 +271,7 @@ def _intersect_targets(
 
 
 def _has_input_targets(variables: tuple[SweepVariable, ...], settings: tuple[Setting, ...]) -> bool:
-    """Tell whether parts of inputs vary: then scenarios are read anew in each variant."""
+    """Return whether parts of inputs vary, so that each variant needs its scenario read again."""
     targets = [target for each in variables for target in each.targets]
     targets += [target for each in settings for target in each.targets]
     return any(target.kind == "input" for target in targets)
@@ -257,7 +280,7 @@ def _has_input_targets(variables: tuple[SweepVariable, ...], settings: tuple[Set
 def _with_measure_outputs(
     system: System, reader: MeasureReader, measures: tuple[Measure, ...]
 ) -> System:
-    """Return the system with the expressions of the measures as outputs."""
+    """Return the system with the expressions of the measures as additional outputs."""
     outputs, dimensions = dict(system.outputs), dict(system.dimensions)
     for name, (formula, dimension) in reader.expressions.items():
         outputs[name] = dataclasses.replace(formula, key=f"measures.{name}")
@@ -268,6 +291,7 @@ def _with_measure_outputs(
 def _bind_scenarios(
     scenarios: Mapping[str, Scenario], documents: Mapping[str, Document], keep_documents: bool
 ) -> dict[str, ScenarioBinding]:
+    """Return the scenario bindings by name, with documents if `keep_documents`."""
     return {
         name: ScenarioBinding(scenario, documents[name] if keep_documents else None)
         for name, scenario in scenarios.items()
@@ -275,13 +299,16 @@ def _bind_scenarios(
 
 
 def signals_of(measures: tuple[Measure, ...]) -> tuple[str, ...]:
-    """Return the signals that measures read."""
+    """Return the names of the signals of the measures in their order, without duplicates."""
     found = [measure.signal for measure in measures if isinstance(measure, SignalMeasure)]
     return tuple(dict.fromkeys(found))
 
 
 def _to_plain_data(node: YamlNode, omitted: tuple[str, ...] | frozenset[str]) -> Any:
-    """Return a tree as plain data, without its places and what has no influence."""
+    """Return a node as nested dicts, lists and strings, without the omitted keys at the top level.
+
+    Below the top level only the keys of texts are omitted.
+    """
     match node:
         case ScalarNode():
             return node.text
@@ -292,4 +319,5 @@ def _to_plain_data(node: YamlNode, omitted: tuple[str, ...] | frozenset[str]) ->
 
 
 def _digest(data: Any) -> str:
+    """Return the SHA-256 digest of the JSON form of data."""
     return hashlib.sha256(json.dumps(data).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Target: which place of a system or a scenario a name of a study means."""
+"""Targets: find the places of a system and its scenarios to which a study can assign values."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ from language.typecheck.types import TypeName
 from sweep.definition.study import Target
 
 TIME = parse_unit("s")
+"""The unit of times."""
 SENSOR_FIELDS = {
     "noise.sd": "noise", "filter.lag": "lag", "delay": "delay", "quantise": "quantum",
     "sample": "period",
 }  # fmt: skip
-"""Stages of a sensor, by the key path of the language: the field of the model."""
+"""The stages of a sensor by key path of the language, with the field of the model."""
 CLOCKS = ("period", "step", "offset")
+"""The fields of an instance's clock."""
 
 
 @dataclass(frozen=True)
 class TargetInfo:
-    """What a name means: where its values go, and what they are.
+    """The targets of a name with unit, type, enumeration values and range [SI].
 
-    `is_width`: a difference, which is in no unit with a zero of its own.
+    `is_width` marks differences and standard deviations, whose unit has no offset.
     """
 
     targets: tuple[Target, ...]
@@ -38,9 +40,10 @@ class TargetInfo:
 
 
 def find_targets(system: System, scenarios: list[Document]) -> dict[str, TargetInfo]:
-    """Return every place of a system and of the (expanded) scenarios, by name.
+    """Return all targets of a system and of expanded scenarios by name.
 
-    A parameter without an instance is that of all instances that have it.
+    A parameter name without an instance refers to all instances that have it. With a single
+    instance, `initial.<state>` needs no instance.
     """
     found: dict[str, TargetInfo] = {}
     for name, place in (*_parameters(system), *_initial_values(system), *_sensors(system)):
@@ -66,6 +69,7 @@ def find_targets(system: System, scenarios: list[Document]) -> dict[str, TargetI
 
 
 def _parameters(system: System) -> Iterator[tuple[str, TargetInfo]]:
+    """Yield `<instance>.<parameter>` for parameters that are neither derived nor tables."""
     for owner, instance in system.instances.items():
         for name, parameter in instance.automaton.parameters.items():
             if parameter.derived is None and parameter.table is None:
@@ -79,6 +83,7 @@ def _parameters(system: System) -> Iterator[tuple[str, TargetInfo]]:
 
 
 def _initial_values(system: System) -> Iterator[tuple[str, TargetInfo]]:
+    """Yield `initial.<instance>.<state>` for real states."""
     for owner, instance in system.instances.items():
         for name, state in instance.automaton.states.items():
             if state.type == "real":
@@ -89,6 +94,7 @@ def _initial_values(system: System) -> Iterator[tuple[str, TargetInfo]]:
 
 
 def _sensors(system: System) -> Iterator[tuple[str, TargetInfo]]:
+    """Yield `<sensor>.<stage>` for the stages that a sensor has."""
     for name, sensor in system.sensors.items():
         for path, field in SENSOR_FIELDS.items():
             if getattr(sensor, field):
@@ -101,6 +107,8 @@ def _sensors(system: System) -> Iterator[tuple[str, TargetInfo]]:
 
 
 def _clocks(system: System) -> Iterator[tuple[str, TargetInfo]]:
+    """Yield `<instance>.period` of sampled, `.step` of continuous instances, and `.offset` of all.
+    """
     for owner, instance in system.instances.items():
         for clock in CLOCKS:
             is_sampled = instance.automaton.is_sampled
@@ -109,7 +117,7 @@ def _clocks(system: System) -> Iterator[tuple[str, TargetInfo]]:
 
 
 def _inputs(system: System, document: Document) -> Iterator[tuple[str, TargetInfo]]:
-    """Yield the parts of the inputs that a scenario gives: `inputs.<name>.<part>`."""
+    """Yield the parts of the real inputs that a scenario defines, as `inputs.<name>.<part>`."""
     node = document.root.get("inputs")
     for entry in node if isinstance(node, MappingNode) else ():
         thing = system.inputs.get(entry.key)
@@ -124,11 +132,14 @@ def _inputs(system: System, document: Document) -> Iterator[tuple[str, TargetInf
 
 
 def _difference_unit(unit: Unit) -> Unit:
-    """Return the unit of differences of what is in a unit: K for degC."""
+    """Return the unit of differences of quantities in a unit: K for degC."""
     return Unit(str(unit.dimension), unit.factor, unit.dimension) if unit.offset else unit
 
 
 def _parts(node: object, unit: Unit) -> Iterator[tuple[tuple[str, ...], Unit]]:
+    """Yield path and unit of each number in the node of an input: value, start, steps, table, ramp,
+    chirp.
+    """
     if isinstance(node, ScalarNode):
         yield (), unit
     if not isinstance(node, MappingNode):

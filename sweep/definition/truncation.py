@@ -1,4 +1,4 @@
-"""Levels of a distribution that lie within bounds."""
+"""Truncation: compute the quantile levels at the bounds of a truncated distribution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sweep.definition.study import Distribution
 
 
 def truncation_levels(distribution: Distribution) -> tuple[float, float]:
-    """Return the shares of a normal or lognormal at the ends of its `within`."""
+    """Return the cumulative probabilities of a normal or lognormal at the ends of `within`."""
     from scipy.special import ndtr
 
     assert distribution.within

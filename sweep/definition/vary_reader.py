@@ -1,4 +1,4 @@
-"""Vary reader: the sections `vary` and `set` of a study."""
+"""Vary reader: read the sections `vary` and `set` of a study."""
 
 from __future__ import annotations
 
@@ -21,18 +21,25 @@ from sweep.definition.study import Axis, Distribution, Setting, Shape, SweepVari
 from sweep.definition.target import TargetInfo
 
 AXIS_FORMS = ("values", "linspace", "logspace")
+"""The forms of a grid axis."""
 DISTRIBUTION_FORMS: tuple[Shape, ...] = ("uniform", "log_uniform", "normal", "lognormal", "choice")
+"""The forms of a random variable."""
 DISTRIBUTION_OPTIONS = ("within", "weights")
+"""The keys beside the form of a distribution."""
 MAX_AXIS_VALUES = 100_000
+"""Largest number of values of `linspace` and `logspace`."""
 
 
 class VaryReader(Reader):
-    """What varies and where it goes; `places` are what names of the study may mean."""
+    """Reader of variables and settings; `places` are the targets by name.
+
+    `taken` holds the targets that have a value already, with the place of the assignment.
+    """
 
     def __init__(
         self, problems: Problems, places: Mapping[str, TargetInfo], system: System
     ) -> None:
-        """Read against the places of the study's systems and scenarios."""
+        """Read names with the targets of the study's systems and scenarios."""
         super().__init__(problems)
         self.places = places
         self.system = system
@@ -40,7 +47,7 @@ class VaryReader(Reader):
         self.kinds: dict[str, ExprType] = {}
 
     def variables(self, node: YamlNode | None) -> tuple[SweepVariable, ...]:
-        """Return what varies, in the order of the file."""
+        """Return the valid variables in the order of the file; reports the others."""
         found = []
         for entry in self.read_mapping(node, "vary"):
             with self.problems.collect_errors():
@@ -50,6 +57,7 @@ class VaryReader(Reader):
         return tuple(found)
 
     def _variable(self, entry: Entry) -> SweepVariable | None:
+        """Return the variable of an entry; None if a problem was reported."""
         place = self.places.get(entry.key)
         if place is None and "." in entry.key:
             self._report_unknown(entry)
@@ -72,6 +80,7 @@ class VaryReader(Reader):
         return SweepVariable(entry.key, course, targets, unit, entry.span, words)
 
     def _report_unknown(self, entry: Entry) -> None:
+        """Report a name that is no target, with the most similar name as hint."""
         label = f"`{entry.key}` is nothing that can vary here"
         hint = suggest_name(entry.key, self.places)
         if not hint:
@@ -79,7 +88,7 @@ class VaryReader(Reader):
         self.problems.error("name", entry.span, label, hint)
 
     def _claim_targets(self, targets: Sequence[Target], span: Span) -> None:
-        """Each place has one value: two that give it are a problem."""
+        """Record that targets get a value; report a target that has one already."""
         for target in targets:
             first = self.taken.setdefault(target, span)
             if first is not span:
@@ -90,6 +99,9 @@ class VaryReader(Reader):
     def _distribution(
         self, entry: Entry, place: TargetInfo | None
     ) -> tuple[Axis | Distribution | None, Unit]:
+        """Return axis or distribution of an entry and its unit; None in place of it after some
+        problems.
+        """
         first = place.unit if place else None
         problem_count = len(self.problems.reported)
         if isinstance(entry.node, SequenceNode):
@@ -127,7 +139,7 @@ class VaryReader(Reader):
         return shape, unit
 
     def _axis(self, numbers: Sequence[Fraction], span: Span, problem_count: int) -> Axis:
-        """Return an axis; one of which a value could not be read has no other fault."""
+        """Return an axis; report duplicate values unless an earlier problem was reported."""
         if len(set(numbers)) < len(numbers) and len(self.problems.reported) == problem_count:
             self.problems.error("duplicate", span, "a value stands in the list twice")
         return Axis(tuple(map(_to_float, numbers)))
@@ -135,7 +147,10 @@ class VaryReader(Reader):
     def _numbers(
         self, node: YamlNode | None, what: str, unit: Unit | None, place: TargetInfo | None
     ) -> tuple[list[Fraction], Unit]:
-        """Return literals in SI and their unit; the second of a normal is a width."""
+        """Return literals as SI values, and their unit.
+
+        The second number of a normal is a difference, that of a lognormal has no unit.
+        """
         found: list[Fraction] = []
         if isinstance(node, SequenceNode) and not node.nodes:
             self.problems.error("missing", node.span, f"`{what}` has at least one value")
@@ -158,6 +173,7 @@ class VaryReader(Reader):
         return found, unit or NO_UNIT
 
     def _require_in_range(self, value: Fraction, span: Span, place: TargetInfo | None) -> None:
+        """Report a value [SI] outside the declared range of its parameter."""
         limits = (place.low, place.high) if place else (None, None)
         if limits[0] is not None and limits[1] is not None and not limits[0] <= value <= limits[1]:
             assert place is not None
@@ -167,6 +183,7 @@ class VaryReader(Reader):
     def _spaced_axis(
         self, node: YamlNode | None, form: str, unit: Unit | None, place: TargetInfo | None
     ) -> tuple[Axis | None, Unit]:
+        """Return the axis of `linspace` or `logspace` and its unit; None after a problem."""
         items = self.read_list(node, form)
         if len(items) != 3:
             if isinstance(node, SequenceNode):
@@ -186,7 +203,7 @@ class VaryReader(Reader):
         return Axis(tuple(map(_to_float, steps))), unit
 
     def _plain_numbers(self, node: YamlNode | None, what: str) -> list[Fraction]:
-        """Return numbers without a unit."""
+        """Return numbers without a unit; reports those with a unit."""
         found = []
         for item in self.read_list(node, what):
             value, unit = self.read_quantity(item, what, item.span, None)
@@ -198,6 +215,8 @@ class VaryReader(Reader):
     def _truncation(
         self, node: YamlNode | None, unit: Unit, form: str, place: TargetInfo | None
     ) -> tuple[float, float] | None:
+        """Return the bounds `within` [SI]; None without. Reports them for other than (log)normals.
+        """
         limits = self.read_range(node, unit) if node else None
         for item in self.read_list(node, "within") if limits and place and place.is_width else ():
             read_difference(self, item, "within", item.span, unit)
@@ -207,12 +226,14 @@ class VaryReader(Reader):
             self.problems.error("form", node.span, label)
         return (_to_float(limits[0]), _to_float(limits[1])) if limits else None
 
-    # What follows from what varies.
 
     def settings(
         self, node: YamlNode | None, variables: Sequence[SweepVariable]
     ) -> tuple[Setting, ...]:
-        """Return the values that follow; report names that vary and go nowhere."""
+        """Return the assignments of the section `set`, checked for types and dimensions.
+
+        Reports variables that have no target and appear in no setting.
+        """
         parameters = {
             name: place.unit.dimension
             for name, place in self.places.items()
@@ -251,8 +272,10 @@ class VaryReader(Reader):
 
 
 def _is_discrete(distribution: Axis | Distribution) -> bool:
+    """Return whether a variable has a finite list of values."""
     return isinstance(distribution, Axis) or distribution.shape == "choice"
 
 
 def _to_float(value: Fraction) -> float:
+    """Return the nearest float of a fraction."""
     return value.numerator / value.denominator

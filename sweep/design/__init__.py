@@ -1,1 +1,1 @@
-"""The design of a study: from the number of a variant to its values."""
+"""Design of a study: map the number of a variant to its values."""

@@ -1,7 +1,7 @@
-"""Draw: the drawn values of any sample, without those before it.
+"""Random draws: compute the drawn values of any sample without computing the previous ones.
 
-Random numbers come from Philox 4x64 (Salmon and others 2011), one stream per name; Latin hypercubes
-and scrambled Sobol sequences are those of scipy.stats.qmc.
+Random numbers come from Philox 4x64 (Salmon et al. 2011) with one stream for each variable name.
+Latin hypercubes and scrambled Sobol sequences come from scipy.stats.qmc.
 """
 
 from __future__ import annotations
@@ -22,14 +22,17 @@ from sweep.design.sensitivity_design import morris_points, saltelli_points
 Reals = NDArray[np.float64]
 
 NUMBERS_PER_COUNTER = 4
-"""Numbers that Philox makes of one count."""
+"""Numbers that Philox 4x64 generates for one counter value."""
 
 OPEN_UNIT_MARGIN = 2.0**-54
-"""Half of the distance of two random numbers in [0, 1): so none is 0 or 1."""
+"""Half the distance of two random numbers in [0, 1); it is added so that no level is 0 or 1."""
 
 
 def draw_values(study: Study, samples: Sequence[int]) -> list[dict[str, float]]:
-    """Return the values [SI] of what is drawn, by name, for each of some samples."""
+    """Return the drawn values [SI] by variable name, one dict for each of the samples.
+
+    Times in inputs are rounded to nanoseconds. Without random variables the dicts are empty.
+    """
     drawn = study.random_variables
     if not drawn:
         return [{} for _ in samples]
@@ -46,7 +49,7 @@ def draw_values(study: Study, samples: Sequence[int]) -> list[dict[str, float]]:
 
 
 def quantile(distribution: Distribution, level: Reals) -> Reals:
-    """Return the values [SI] (n,) of a distribution at shares (n,) in (0, 1)."""
+    """Return the values [SI] (n,) of a distribution at the quantile levels (n,) in (0, 1)."""
     if distribution.shape == "choice":
         weights = np.asarray(distribution.weights or [1.0] * len(distribution.numbers))
         bounds = np.cumsum(weights) / np.sum(weights)
@@ -57,7 +60,7 @@ def quantile(distribution: Distribution, level: Reals) -> Reals:
         return first + (second - first) * level
     if distribution.shape == "log_uniform":
         return np.asarray(np.exp(np.log(first) + np.log(second / first) * level))
-    from scipy.special import ndtri  # scipy only where it is needed
+    from scipy.special import ndtri  # deferred: the import of scipy takes long
 
     is_log = distribution.shape == "lognormal"
     if distribution.within:
@@ -69,7 +72,7 @@ def quantile(distribution: Distribution, level: Reals) -> Reals:
 
 
 def _unit_cube_points(study: Study, samples: NDArray[np.int64]) -> Reals:
-    """Return shares in (0, 1) (n_samples, n_drawn)."""
+    """Return the quantile levels (n_samples, n_random) in (0, 1) of the samples."""
     names = tuple(varied.name for varied in study.random_variables)
     sampling = study.sampling
     if sampling.method == "latin_hypercube":
@@ -95,7 +98,8 @@ def _unit_cube_points(study: Study, samples: NDArray[np.int64]) -> Reals:
 
 
 def _random_stream(seed: int, name: str, first: int, count: int) -> Reals:
-    """Return the numbers `first` to `first + count` of the stream of a name."""
+    """Return the numbers `first` to `first + count` (exclusive) of the stream of a variable name.
+    """
     digest = hashlib.sha256(name.encode()).digest()
     key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
     source = np.random.Philox(key=key).advance(first // NUMBERS_PER_COUNTER)
@@ -105,10 +109,12 @@ def _random_stream(seed: int, name: str, first: int, count: int) -> Reals:
 
 
 def _sobol_points(dimensions: int, seed: int, first: int, count: int) -> Reals:
+    """Return rows `first` to `first + count` (exclusive) of a scrambled Sobol sequence (count, d).
+    """
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a part that is no power of 2
+        warnings.simplefilter("ignore", UserWarning)   # the number of rows is no power of 2
         engine = qmc.Sobol(d=dimensions, scramble=True, seed=seed)
         if first:
             engine.fast_forward(first)
@@ -117,10 +123,12 @@ def _sobol_points(dimensions: int, seed: int, first: int, count: int) -> Reals:
 
 @lru_cache(maxsize=1)
 def _latin_hypercube_points(dimensions: int, count: int, seed: int) -> Reals:
+    """Return all points (count, d) of a Latin hypercube; the last design is cached."""
     from scipy.stats import qmc
 
     return _clip_to_open_unit(qmc.LatinHypercube(d=dimensions, seed=seed).random(count))
 
 
 def _clip_to_open_unit(points: Reals) -> Reals:
+    """Return points clipped to the open interval (0, 1)."""
     return np.clip(points, OPEN_UNIT_MARGIN, 1.0 - 2.0 * OPEN_UNIT_MARGIN)

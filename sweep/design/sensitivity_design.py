@@ -1,6 +1,6 @@
-"""Design: drawn points of which sensitivity indices are made - Saltelli's blocks, Morris' paths.
+"""Sensitivity designs: generate the points of Saltelli blocks and Morris paths.
 
-Saltelli and others, Comput. Phys. Commun. 181 (2010) 259; Morris, Technometrics 33 (1991) 161.
+Saltelli et al., Comput. Phys. Commun. 181 (2010) 259; Morris, Technometrics 33 (1991) 161.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from sweep.definition.study import MORRIS_LEVELS
 
 Reals = NDArray[np.float64]
 STRIDE = MORRIS_LEVELS // 2
-"""Levels of one step of a path; so all levels come equally often."""
+"""Levels of one step of a Morris path, half of all, so that all levels are equally frequent."""
 
 
 def saltelli_points(
     dimensions: int, samples: NDArray[np.int64], sobol: Callable[[int], Reals]
 ) -> Reals:
-    """Return shares (n_samples, dimensions): A, B, then A with one column after the other of B.
+    """Return the quantile levels (n_samples, dimensions) of samples of a Saltelli design.
 
-    `sobol` gives a row of a sequence in twice as many dimensions.
+    A block has dimensions + 2 samples: row A, row B, then A with column i of B for each i. `sobol`
+    returns a row (2 * dimensions,) of a sequence, A and B side by side.
     """
     points = np.empty((len(samples), dimensions))
     for place, sample in enumerate(samples.tolist()):
@@ -35,7 +36,10 @@ def saltelli_points(
 
 
 def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Reals:
-    """Return shares (n_samples, dimensions) along paths that change one thing after the other."""
+    """Return the quantile levels (n_samples, dimensions) of samples of Morris paths.
+
+    A path has dimensions + 1 samples; each step changes one variable by STRIDE levels.
+    """
     paths: dict[int, Reals] = {}
     points = np.empty((len(samples), dimensions))
     for place, sample in enumerate(samples.tolist()):
@@ -47,6 +51,8 @@ def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Rea
 
 
 def _morris_path(dimensions: int, seed: int, number: int) -> Reals:
+    """Return the quantile levels (dimensions + 1, dimensions) of one path, by seed and path number.
+    """
     key = np.array([seed, number], dtype=np.uint64)
     source = np.random.Generator(np.random.Philox(key=key))
     order = source.permutation(dimensions)

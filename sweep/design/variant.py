@@ -1,4 +1,4 @@
-"""Point: which variant a number means - a pure function of the study and the number."""
+"""Variant: compute the indices and the values of a variant from its number."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from sweep.definition.study import Axis, Study
 from sweep.design.random_draws import draw_values
 
 SEED_MODULUS = 2**31
+"""Seeds of noise are smaller than this number."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One variant: places in the lists of the study, and the values [SI] of what varies.
+    """One variant of a study: its indices and the values [SI] of the variables by name.
 
-    What is left alone (`sampling: one_at_a_time`) has no value.
+    With one-at-a-time sampling only the variable that changes has a value.
     """
 
     number: int
@@ -26,19 +27,20 @@ class Variant:
     values: dict[str, float]
 
     def seed(self, base: int, replicates: int, group_size: int = 1) -> int:
-        """Return the seed of the noise: each sample and each replicate has noise of its own.
+        """Return the seed of the noise; each sample and each replicate has its own.
 
-        `group_size` samples of one block or path share it: their differences are not those of noise
-        (common random numbers; Law, Simulation Modeling and Analysis, 5th ed. 2015, section 11.2).
+        The `group_size` samples of a block or path share it, so that their differences are not due
+        to noise (common random numbers; Law, Simulation Modeling and Analysis, 5th ed. 2015,
+        section 11.2).
         """
         return (base + self.sample // group_size * replicates + self.replicate) % SEED_MODULUS
 
 
 def variants_of(study: Study, start: int, stop: int) -> list[Variant]:
-    """Return the variants from `start` to before `stop`.
+    """Return the variants with numbers from `start` to `stop` (exclusive).
 
-    The replicate runs fastest, then the sample, the grid (its last axis first), the scenario and
-    the variant: so all of these see the same samples.
+    The replicate changes fastest, then the sample, the grid (its last axis first), the scenario and
+    the system variant. Hence all of these share the same samples.
     """
     samples = max(1, study.sampling.count)
     places = []
@@ -58,6 +60,7 @@ def variants_of(study: Study, start: int, stop: int) -> list[Variant]:
 
 
 def _grid_values(study: Study, place: int) -> dict[str, float]:
+    """Return the values of the grid variables at a grid point; its last axis changes fastest."""
     axes = [
         (v.name, v.distribution.values)
         for v in study.grid_variables
@@ -75,7 +78,9 @@ def _grid_values(study: Study, place: int) -> dict[str, float]:
 def _one_at_a_time_values(
     axes: Sequence[tuple[str, tuple[float, ...]]], place: int
 ) -> dict[str, float]:
-    """The first point has all left alone; then each value of each axis."""
+    """Return the value at a point of one-at-a-time sampling: none at 0, then each value of each
+    axis.
+    """
     place -= 1
     for name, values in axes:
         if 0 <= place < len(values):

@@ -1,4 +1,7 @@
-"""Structure: a system and a scenario with values that no batch takes as an array."""
+"""Variant system: apply the values of a variant that change the structure of system or scenario.
+
+These are values of sensors, clocks and inputs; a batch has no arrays for them.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,9 @@ TargetValues = Iterable[tuple[Target, float]]
 
 
 def apply_to_system(system: System, values: TargetValues) -> System:
-    """Return a system with other stages of sensors, periods, steps and offsets."""
+    """Return the system with changed sensor stages, periods, steps and offsets; other targets are
+    ignored.
+    """
     sensors, instances = dict(system.sensors), dict(system.instances)
     for target, value in values:
         exact = exact_fraction(value)
@@ -38,7 +43,10 @@ def apply_to_system(system: System, values: TargetValues) -> System:
 
 
 def apply_to_scenario(binding: ScenarioBinding, system: System, values: TargetValues) -> Scenario:
-    """Return the scenario with other parts of inputs. Raises SpecError (steps out of order)."""
+    """Return the scenario with changed parts of inputs; unchanged without such targets.
+
+    Raises SpecError if the changed inputs are invalid, e.g. steps out of order.
+    """
     input_values = [(target, value) for target, value in values if target.kind == "input"]
     if not input_values:
         return binding.scenario
@@ -57,6 +65,7 @@ def apply_to_scenario(binding: ScenarioBinding, system: System, values: TargetVa
 def _with_input_part(
     root: MappingNode, target: Target, value: float, system: System
 ) -> MappingNode:
+    """Return the scenario document with one part of an input set to a value [SI]."""
     name, *part = target.path
     is_time = target.is_input_time
     value = round(value, TIME_DECIMALS) if is_time else value
@@ -77,7 +86,7 @@ def _with_input_part(
 
 
 def _with_point(table: MappingNode, number: int, text: str, is_time: bool) -> MappingNode:
-    """Return steps or points of a table in which the n-th has another time or value."""
+    """Return a table of steps or points whose n-th entry has another time or another value."""
     made: dict[str, Entry] = {}
     for place, entry in enumerate(table, start=1):
         key, node = entry.key, entry.node
@@ -89,14 +98,15 @@ def _with_point(table: MappingNode, number: int, text: str, is_time: bool) -> Ma
 
 
 def _scalar(node: YamlNode, text: str) -> ScalarNode:
+    """Return a scalar node with a text at the place of another node."""
     return ScalarNode(text, node.span)
 
 
 def format_decimal(value: float) -> str:
-    """Return the shortest decimal of a number, without an exponent: as the language reads it."""
+    """Return the shortest decimal that reads back as this float, without an exponent."""
     return format(Decimal(repr(value)), "f")
 
 
 def exact_fraction(value: float) -> Fraction:
-    """Return the shortest decimal of a number, exactly: 0.001 is 1/1000."""
+    """Return the shortest decimal of a float as a fraction: 0.001 gives 1/1000."""
     return Fraction(format_decimal(value))

@@ -1,4 +1,4 @@
-"""Case: a point of a study as values for instances, start values, parts of inputs, sensors."""
+"""Variant values: evaluate settings and assign the values of a variant to targets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from sweep.design.variant import Variant
 
 @dataclass(frozen=True)
 class VariantValues:
-    """The values [SI] of one variant, by target; `refused` says why it cannot be simulated."""
+    """The values [SI] of one variant by target, and the seed of its noise.
+
+    `refusal` is the reason why the variant cannot be simulated, or empty. `structural_values` are
+    the values other than parameters and initial values.
+    """
 
     variant: Variant
     values: Mapping[Target, float]
@@ -27,7 +31,11 @@ class VariantValues:
 
 
 def variant_values_of(study: Study, variant: Variant) -> VariantValues:
-    """Return the values of a variant, with those that follow from what varies."""
+    """Return the values of all targets of a variant, including those that `set` computes.
+
+    A setting is skipped if it refers to a variable without a value. Targets that the system variant
+    does not have are left out.
+    """
     kind = study.system_variants[variant.system_variant]
     scenario = kind.scenario_bindings[study.scenarios[variant.scenario]].scenario
     values: dict[Target, float] = {}
@@ -47,7 +55,7 @@ def variant_values_of(study: Study, variant: Variant) -> VariantValues:
 
 
 def _has_target(system: System, target: Target) -> bool:
-    """Tell whether a system has a place: of several variants, one may lack what others have."""
+    """Return whether a system has a target; system variants may differ in instances and sensors."""
     owner = target.path[0]
     if target.kind in ("input", "sensor"):
         return owner in (system.inputs if target.kind == "input" else system.sensors)
@@ -59,6 +67,7 @@ def _has_target(system: System, target: Target) -> bool:
 
 
 def _is_parameter(system: System, name: str) -> bool:
+    """Return whether a name, with or without an instance, is a parameter of the system."""
     owner, _, short = name.rpartition(".")
     instances = [system.instances.get(owner)] if owner else system.instances.values()
     return any(each and short in each.automaton.parameters for each in instances)
@@ -70,6 +79,7 @@ def _evaluate_setting(
     target_values: Mapping[Target, float],
     system: System,
 ) -> float:
+    """Return the value [SI] of a formula of variables and parameters."""
     read: dict[str, float] = {}
     operands: dict[str, Expr] = {}
     for name in dict.fromkeys(formula.reads):
@@ -81,7 +91,10 @@ def _evaluate_setting(
 
 
 def parameter_value(system: System, name: str, target_values: Mapping[Target, float]) -> float:
-    """Return the value [SI] of a parameter in a variant; of one name in several the first's."""
+    """Return the value [SI] of a parameter in a variant; derived parameters are evaluated.
+
+    A name without an instance means the first instance that has the parameter.
+    """
     owner, _, short = name.rpartition(".")
     if not owner:
         owner = next(o for o, i in system.instances.items() if short in i.automaton.parameters)
@@ -104,7 +117,11 @@ def parameter_value(system: System, name: str, target_values: Mapping[Target, fl
 
 
 def _find_refusal(system_variant: SystemVariant, values: Mapping[Target, float]) -> str:
-    """Return why values cannot be used: not finite, outside a declared range, no time."""
+    """Return the reason why values are invalid; empty if they are valid.
+
+    A value must be finite; a parameter must be in its range; a time must be positive (an offset
+    zero or positive).
+    """
     for target, value in values.items():
         name = ".".join(target.path)
         if not math.isfinite(value):

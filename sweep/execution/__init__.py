@@ -1,1 +1,1 @@
-"""Execution of a study: blocks, processes, clusters."""
+"""Execution of a study: compute blocks of variants serially, in processes or on a Dask cluster."""

@@ -1,4 +1,4 @@
-"""Block: the variants from one number to before another, simulated and measured."""
+"""Block computation: simulate the variants of a block in batches and evaluate their measures."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ from sweep.measurement.observation import observe_variant
 from sweep.store.row import DONE, FAULT, REFUSED, STOPPED, Block, Row
 
 INITIAL_MAX_EVENTS = 64
-"""Events that are kept of a variant at first; one with more is run again."""
+"""Events that a batch stores for each variant; if one has more, the batch runs again."""
 
 MAX_VALUES = 4_000_000
-"""Rows times signals times variants of one batch: 32 MB."""
+"""Largest number of stored values (rows * signals * variants) of one batch: 32 MB."""
 
 MAX_PLANS = 50
-"""Variants of one batch whose inputs step at times of their own: each has all its instants."""
+"""Largest batch if its variants have different step times, since each stores its own time events.
+"""
 
 
 @dataclass(frozen=True)
 class _BatchGroup:
-    """Cases that share a system and, but for values of steps, a scenario."""
+    """Variants that share a system and a scenario, except for the values of steps of inputs."""
 
     system: System
     scenario: Scenario
@@ -43,7 +44,7 @@ class _BatchGroup:
 
 
 def compute_rows(study: Study, block: Block, run: BatchRunner) -> list[Row]:
-    """Return the rows of a block in the order of their numbers."""
+    """Return the rows of a block in the order of the variant numbers."""
     cases = [
         variant_values_of(study, point) for point in variants_of(study, block.start, block.stop)
     ]
@@ -58,7 +59,10 @@ def compute_rows(study: Study, block: Block, run: BatchRunner) -> list[Row]:
 def _group_cases(
     study: Study, cases: Sequence[VariantValues], rows: dict[int, Row]
 ) -> Iterable[_BatchGroup]:
-    """Yield the cases by what they share; one that is refused has its row at once."""
+    """Yield groups of variants that one batch can simulate.
+
+    Variants that cannot be simulated are added to `rows` with the status `refused`.
+    """
     groups: dict[object, _BatchGroup] = {}
     for case in cases:
         if case.refusal:
@@ -88,9 +92,9 @@ def _group_cases(
 
 
 def _formula_signature(scenario: Scenario) -> object:
-    """Return what scenarios of one batch have in common: the formulas of inputs in time.
+    """Return a key that is equal for scenarios whose inputs have the same formulas of time.
 
-    Lines between points are numbers of a plan, as steps are; a formula is compiled.
+    Formulas are compiled, hence the same in a batch; steps and lines between points are data.
     """
     return repr(
         [
@@ -102,7 +106,7 @@ def _formula_signature(scenario: Scenario) -> object:
 
 
 def _split_group(study: Study, group: _BatchGroup) -> Iterable[_BatchGroup]:
-    """Yield a group in parts whose recorded rows fit into memory."""
+    """Yield parts of a group whose stored values do not exceed the memory limits."""
     every = group.scenario.every
     rows = int((group.scenario.horizon or 0) / every) + 1
     each = max(1, rows * len(signals_of(study.measures)))
@@ -117,7 +121,7 @@ def _split_group(study: Study, group: _BatchGroup) -> Iterable[_BatchGroup]:
 
 
 def _run_group(study: Study, group: _BatchGroup, run: BatchRunner) -> list[Row]:
-    """Return the rows of a group; where its batch is refused, of each of its cases alone."""
+    """Return the rows of a group; if its batch is refused, simulate each variant separately."""
     batch = _build_batch(study, group)
     try:
         result = run(batch)
@@ -136,6 +140,7 @@ def _run_group(study: Study, group: _BatchGroup, run: BatchRunner) -> list[Row]:
 
 
 def _build_batch(study: Study, group: _BatchGroup) -> Batch:
+    """Return the batch of a group with arrays of parameters, initial values, inputs and seeds."""
     cases, signals = group.cases, signals_of(study.measures)
     shared = [t for t in cases[0].values if t.kind in ("parameter", "initial")]
     arrays = {
@@ -159,7 +164,9 @@ def _build_batch(study: Study, group: _BatchGroup) -> Batch:
 
 
 def _build_input_tables(group: _BatchGroup) -> dict[str, InputTable]:
-    """Return the inputs whose steps have other values in some cases."""
+    """Return the inputs whose values differ between the variants, with arrays (n_variants,
+    n_pieces).
+    """
     found = {}
     for name, stimulus in group.scenario.inputs.items():
         pieces = [scenario.inputs[name].pieces for scenario in group.scenarios]
@@ -171,7 +178,8 @@ def _build_input_tables(group: _BatchGroup) -> dict[str, InputTable]:
 
 
 def _share_step_times(group: _BatchGroup) -> bool:
-    """Tell whether the inputs of all cases step at the same times, and vary alike in between."""
+    """Return whether the inputs of all variants step at the same times and vary equally in between.
+    """
     return all(
         [piece.start for piece in scenario.inputs[name].pieces]
         == [piece.start for piece in stimulus.pieces]
@@ -182,10 +190,12 @@ def _share_step_times(group: _BatchGroup) -> bool:
 
 
 def _to_float(value: Fraction) -> float:
+    """Return the nearest float of a fraction."""
     return value.numerator / value.denominator
 
 
 def _row_of_result(study: Study, group: _BatchGroup, result: BatchResult, place: int) -> Row:
+    """Return the row of the variant at a place of a batch: stopped, with a fault, or done."""
     case = group.cases[place]
     if place in result.stopped:
         return _make_row(study, case, STOPPED, result.stopped[place])
@@ -205,6 +215,7 @@ def _make_row(
     message: str,
     measures: Mapping[str, Cell] | None = None,
 ) -> Row:
+    """Return a row of the store; without measures all its cells are None."""
     point = case.variant
     return Row(
         number=point.number,
@@ -221,4 +232,5 @@ def _make_row(
 
 
 def _empty_measures(measures: Sequence[Measure]) -> dict[str, Cell]:
+    """Return None for each column of the measures."""
     return {column.name: None for measure in measures for column in columns_of(measure)}

@@ -1,4 +1,4 @@
-"""Address: where a study is computed - processes of a cluster here, or a scheduler elsewhere."""
+"""Cluster address: parse the address of a local cluster or of a remote Dask scheduler."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ADDRESS_FORMS = "`local:4`, `tcp://host:8786` or `tls://host:8786`"
+"""The valid forms of an address, for messages."""
 LOCAL_PATTERN = re.compile(r"local:([1-9]\d{0,3})")
 REMOTE_PATTERN = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d{1,5})/?")
 
 
 @dataclass(frozen=True)
 class Address:
-    """`count` workers started here; or, where it is 0, the scheduler at `url`."""
+    """A cluster: `count` local workers, or the scheduler at `url` if `count` is 0."""
 
     count: int = 0
     url: str = ""
@@ -22,13 +23,14 @@ class Address:
 
     @property
     def is_unprotected(self) -> bool:
-        """Tell whether others can read and write what goes there: no TLS, no loopback."""
+        """Return whether the connection can be read by others: neither TLS nor a loopback address.
+        """
         return self.url.startswith("tcp:") and not _is_loopback(self.host)
 
 
 @dataclass(frozen=True)
 class Credentials:
-    """Files of TLS in PEM; None: what the configuration of Dask says."""
+    """PEM files for TLS; None refers to the configuration of Dask."""
 
     authority: Path | None = None
     certificate: Path | None = None
@@ -36,7 +38,7 @@ class Credentials:
 
 
 def parse_address(text: str) -> Address:
-    """Return an address from its text. Raises ValueError."""
+    """Return the address that a text denotes. Raises ValueError for other forms."""
     local = LOCAL_PATTERN.fullmatch(text)
     if local:
         return Address(count=int(local[1]))
@@ -47,6 +49,7 @@ def parse_address(text: str) -> Address:
 
 
 def _is_loopback(host: str) -> bool:
+    """Return whether a host is `localhost` or a loopback IP address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

@@ -1,4 +1,4 @@
-"""Clustering: a client of a Dask cluster, started here or reached, whose workers have our code."""
+"""Dask client: start or connect to a cluster and check that its workers have the same code."""
 
 from __future__ import annotations
 
@@ -19,36 +19,39 @@ from sweep.execution.fork_server import start_method
 from sweep.execution.processes import MAX_DEATHS
 
 CONNECT_TIMEOUT = 30.0
-"""How long [s] a scheduler may take to answer, and the first worker to join."""
+"""Longest time [s] until a scheduler answers, and until the first worker joins."""
 CONNECT_ATTEMPTS = 4
-"""How often a scheduler is asked whose first answer comes with something else."""
+"""Connection attempts to a scheduler whose first answer contains other messages."""
 BUSY_SCHEDULER = "its scheduler was asked {} times, and each answer came with something else"
+"""Message after the last attempt."""
 CLOSE_TIMEOUT = 5.0
-"""How long [s] a connection may take to end."""
+"""Longest time [s] for closing a connection."""
 DASK_LOGGERS = ("distributed", "tornado", "asyncio")
-"""Loggers that tell of a lost connection, each in its way."""
+"""Loggers that report lost connections."""
 DASHBOARD_ADDRESS = "127.0.0.1:0"
-"""Dask serves its own pages on any free port of this machine alone."""
+"""The dashboard of Dask: any free port, reachable from this machine only."""
 NO_CREDENTIALS = (
     "TLS takes an authority, a certificate and its key: --tls-ca, --tls-cert and --tls-key, or "
     "distributed.comm.tls in the configuration of Dask"
 )
+"""Message for TLS without credentials."""
 ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
+"""Dask setting: worker deaths that a task may cause before it fails."""
 DASK_SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1 GB",
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
-    "distributed.worker.profile.enabled": False,  # it looks into workers a hundred times a second
+    "distributed.worker.profile.enabled": False,  # its profiler samples a hundred times a second
     "distributed.worker.multiprocessing-method": start_method(),
 }
-"""What Dask does beside computing, seldom."""
+"""Settings that reduce the background work of Dask."""
 
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What workers have: `fingerprint` is a function that tells theirs.
+    """Requirements on workers: `fingerprint` is a function that returns theirs.
 
-    `preload` is a module whose `dask_setup` each that is started here does first.
+    `preload` is a module whose `dask_setup` runs first in each worker that is started here.
     """
 
     fingerprint: Callable[[], Mapping[str, str]]
@@ -63,10 +66,10 @@ def open_client(
     timeout: float = CONNECT_TIMEOUT,
     max_deaths: int = MAX_DEATHS,
 ) -> Iterator[Client]:
-    """Yield a client of a cluster; what was started for it ends with it.
+    """Yield a client of a cluster; a cluster that was started for it is closed at the end.
 
-    `max_deaths` workers started here may die of a block before it is told.
-    Raises ClusterError where nobody answers, no worker is there, or one has other code.
+    A block that kills `max_deaths` local workers fails. Raises ClusterError if no scheduler
+    answers, no worker joins, or a worker has different code.
     """
     with ExitStack() as stack, dask.config.set({**DASK_SETTINGS, ALLOWED_FAILURES: max_deaths - 1}):
         scheduler: Any = address.url
@@ -89,9 +92,10 @@ def open_client(
 
 
 def _connect(scheduler: Any, security: Security | None, timeout: float) -> Client:
-    """Return a client; a scheduler that is busy with another one's blocks is asked again.
+    """Return a client; repeat the connection if the scheduler is busy with blocks of another
+    client.
 
-    Dask asserts that the first answer comes alone, and a message to all clients may come with it.
+    Dask asserts that the first answer is a single message, but a broadcast may accompany it.
     """
     for _ in range(CONNECT_ATTEMPTS - 1):
         with suppress(AssertionError):
@@ -101,7 +105,8 @@ def _connect(scheduler: Any, security: Security | None, timeout: float) -> Clien
 
 @contextmanager
 def _silence_dask_loggers() -> Iterator[None]:
-    """Leave it to us to tell what goes wrong: Dask would log it, with tracebacks."""
+    """Disable the loggers of Dask, which would log tracebacks of failures that are reported here.
+    """
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in DASK_LOGGERS]
     loggers = [logging.getLogger(name) for name in (*DASK_LOGGERS, *names)]
     before = [logger.level for logger in loggers]
@@ -115,14 +120,14 @@ def _silence_dask_loggers() -> Iterator[None]:
 
 
 def _close_client(client: Client) -> None:
-    """Close a client; a scheduler that does not answer any more is not waited for."""
-    with suppress(Exception):  # all is told by now, and the connection ends with us
+    """Close a client within CLOSE_TIMEOUT and ignore all errors."""
+    with suppress(Exception):  # the results are complete; the connection ends with the process
         client.close(timeout=CLOSE_TIMEOUT)
 
 
 @contextmanager
 def _local_cluster(count: int, preload: str) -> Iterator[LocalCluster]:
-    """Yield a cluster of processes of this machine, which tell nothing of their own."""
+    """Yield a cluster of `count` silent worker processes on this machine."""
     with LocalCluster(
         n_workers=count,
         threads_per_worker=1,
@@ -135,7 +140,10 @@ def _local_cluster(count: int, preload: str) -> Iterator[LocalCluster]:
 
 
 def _tls_security(address: Address, credentials: Credentials) -> Security | None:
-    """Return the credentials of TLS, from files or from the configuration of Dask."""
+    """Return TLS credentials from files or from the configuration of Dask; None without TLS.
+
+    Raises ClusterError if they are missing or unusable.
+    """
     if not address.url.startswith("tls:"):
         return None
     named = {
@@ -147,7 +155,7 @@ def _tls_security(address: Address, credentials: Credentials) -> Security | None
     security = Security(require_encryption=True, **given)
     try:
         context = security.get_connection_args("client")["ssl_context"]
-    except OSError as error:  # also what is no certificate
+    except OSError as error:  # includes invalid certificates
         raise ClusterError(f"{address.url}: its credentials cannot be used: {error}") from None
     if context is None:
         raise ClusterError(f"{address.url}: {NO_CREDENTIALS}")
@@ -155,7 +163,9 @@ def _tls_security(address: Address, credentials: Credentials) -> Security | None
 
 
 def _require_workers(client: Client, worker_setup: WorkerSetup, timeout: float) -> None:
-    """Raise ClusterError unless a worker is there and all that are have our code."""
+    """Raise ClusterError unless a worker joins and all workers have the fingerprint of this
+    process.
+    """
     try:
         client.wait_for_workers(1, timeout=timeout)
     except TimeoutError:
@@ -163,7 +173,7 @@ def _require_workers(client: Client, worker_setup: WorkerSetup, timeout: float) 
     try:
         found = client.run(worker_setup.fingerprint, on_error="return", callback_timeout=timeout)
     except OSError:
-        label = f"a worker does not tell its code, or the scheduler not answer, for {timeout:g} s"
+        label = f"a worker did not report its code, or the scheduler did not answer, within {timeout:g} s"
         raise ClusterError(label) from None
     for name, there in found.items():
         if isinstance(there, ImportError):

@@ -1,7 +1,11 @@
-"""Cluster error: a cluster that cannot be used, or no longer; what is finished is kept."""
+"""Cluster error: the exception for a cluster that cannot be used.
+
+Blocks that are finished remain in the store.
+"""
 
 from __future__ import annotations
 
 
 class ClusterError(Exception):
-    """Nobody answers, no worker is there, or one has other code; the message says which."""
+    """No scheduler answers, no worker is present, or a worker has different code; see the message.
+    """

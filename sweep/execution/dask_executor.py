@@ -1,7 +1,8 @@
-"""Cluster: an executor on the workers of a Dask cluster, here or elsewhere.
+"""Dask executor: compute blocks on the workers of a Dask cluster.
 
-A worker that dies is survived: its blocks are given to others. A block that several have died of is
-computed again at the end, alone; where that ends workers too, it is left out, and said to be.
+If a worker dies, other workers compute its blocks. A block during which several workers died is
+computed again at the end, without other blocks. If workers die again, the block is lost and
+reported.
 """
 
 from __future__ import annotations
@@ -25,35 +26,36 @@ from sweep.execution.processes import WorkerError
 from sweep.store.row import Block
 
 BlockTask = Callable[[Mapping[str, str], bytes, int, int], Answer]
-"""What a worker does: with the client's fingerprint, a packed study, the ends of a block.
+"""The function that a worker runs: client fingerprint, packed study, start and stop of a block.
 
-It is sent by its name, so workers have it from their own installation.
+Dask sends it by name, so workers run the function of their own installation.
 """
 
 PLACE_STUDY: Callable[[bytes], bytes] = bytes
-"""What a worker does with the study, and then has it: of Python's own, so that workers with other
-code can do it, too, and refuse the rest.
+"""The function that places the study on a worker.
+
+It is a built-in of Python, so that workers with different code can run it and then refuse blocks.
 """
 BLOCKS_PER_THREAD = 2
-"""Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
+"""Largest number of blocks for each thread of a worker: one in computation, one waiting."""
 MAX_STUDY_DEATHS = 10
-"""How often workers may die that were given the study: then it is the study that they die of."""
+"""Worker deaths during the transfer of the study after which the study is considered the cause."""
 POLL_INTERVAL = 5.0
-"""Time [s] between two looks at how many workers there are."""
+"""Time [s] between two checks of the number of workers."""
 WORKER_TIMEOUT = 60.0
-"""Time [s] without any worker, or an answer of the scheduler, after which a cluster is given up."""
+"""Time [s] without a worker, or without an answer, after which the cluster is given up."""
 
 
 @dataclass(frozen=True)
 class DaskExecutor:
-    """The workers of a client; each does `task`."""
+    """Executor on the workers of a client; each worker runs `task`."""
 
     client: Client
     task: BlockTask
     timeout: float = WORKER_TIMEOUT
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield each block as it is finished; closing the iterator ends the work."""
+        """Yield the blocks in the order of completion; closing the iterator cancels the rest."""
         flight = _DaskRun(self, pack_study(study))
         try:
             flight.place_study()
@@ -71,9 +73,9 @@ class DaskExecutor:
 
 @dataclass
 class _DaskRun:
-    """What is under way: the `study` that workers hold, and the blocks that they have.
+    """The state of a run: the study on the workers and the pending blocks.
 
-    `former` are the keys of what was held by workers that died.
+    `former_study_keys` are the Dask keys of copies of the study that dead workers had.
     """
 
     executor: DaskExecutor
@@ -87,7 +89,9 @@ class _DaskRun:
     threads: int = 0
 
     def iterate_results(self, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield blocks as they are finished; those that workers died of are lost."""
+        """Yield the blocks in the order of completion; those during which workers died have a
+        `lost_reason`.
+        """
         waiting = iter(blocks)
         while True:
             self._check_workers()
@@ -105,13 +109,13 @@ class _DaskRun:
                 yield found
 
     def place_study(self) -> None:
-        """Give the study to a worker, from which the others have it."""
+        """Send the study to a worker, from which the other workers copy it."""
         if self.study_future:
             self.former_study_keys.add(self.study_future.key)
         self.study_future = self.executor.client.submit(PLACE_STUDY, self.study, pure=False)
 
     def cancel(self) -> None:
-        """Take back what is under way."""
+        """Cancel the pending blocks and release the study."""
         client = self.executor.client
         if client.status == "running":
             client.cancel(
@@ -120,6 +124,7 @@ class _DaskRun:
         self.pending.clear()
 
     def _submit(self, block: Block) -> None:
+        """Send a block to the cluster."""
         future = self.executor.client.submit(
             self.executor.task,
             fingerprint(),
@@ -132,7 +137,10 @@ class _DaskRun:
         future.add_done_callback(self.completed.put)
 
     def _check_workers(self) -> None:
-        """See how many threads there are. Raises ClusterError where nobody is left to compute."""
+        """Update the number of threads, at most once each POLL_INTERVAL.
+
+        Raises ClusterError if the connection is lost or no worker is present for the timeout.
+        """
         client, patience = self.executor.client, self.executor.timeout
         if client.status in ("closing", "closed"):
             raise ClusterError("the connection to the scheduler is lost")
@@ -152,7 +160,9 @@ class _DaskRun:
             raise ClusterError(f"there is no worker any more for {self.executor.timeout:g} s")
 
     def _wait_for_answer(self, future: Future) -> Answer:
-        """Return an answer; it may be lost with its worker, and made again, which takes a while."""
+        """Return the answer of a block; check the workers at each timeout, since Dask may recompute
+        it.
+        """
         while True:
             try:
                 found: Answer = future.result(timeout=self.executor.timeout)
@@ -162,8 +172,10 @@ class _DaskRun:
                 self._check_workers()
 
     def _collect_result(self, future: Future) -> BlockResult | None:
-        """Return what became of a block; None where it is under way again, since a worker died of
-        another one while it was given the study.
+        """Return the result of a block, or None if it was submitted again.
+
+        This happens if a worker died of another block while it received the study. Raises
+        ClusterError if a worker refuses the block, and WorkerError for a defect.
         """
         block = self.pending.pop(future)
         try:
@@ -191,5 +203,6 @@ class _DaskRun:
 
 
 def _death_message(error: KilledWorker) -> str:
+    """Return the reason of a lost block, with the number of dead workers."""
     deaths = int(error.allowed_failures) + 1
     return f"{deaths} worker{'s' * (deaths > 1)} died while it was computed alone"

@@ -1,7 +1,6 @@
-"""Cluster worker: what a process of a cluster does with a block - checks, computes, answers.
+"""Dask worker: check, compute and encode a block in a process of a cluster.
 
-It computes for a client with the same fingerprint alone, and what it keeps of a study (Programs,
-compiled libraries) is made once in a process.
+A worker computes only for clients with the same fingerprint. It unpacks a study once.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ from sweep.store.manifest import Manifest, manifest_of
 from sweep.store.row import Block
 
 COMPUTE_LOCK = threading.Lock()
-"""A process computes one block at a time, however many threads its worker has."""
+"""A process computes one block at a time, also if its worker has several threads."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The file of a block; or why the worker computes none; or the traceback of a defect."""
+    """The file of a block, the reason of a refusal, or the traceback of a defect."""
 
     file: bytes = b""
     refusal: str = ""
@@ -37,16 +36,19 @@ class Answer:
 
 
 def pack_study(study: Study) -> bytes:
-    """Return a prepared study as bytes that a worker takes."""
+    """Return a prepared study as compressed pickle."""
     return zlib.compress(pickle.dumps(study, protocol=pickle.HIGHEST_PROTOCOL))
 
 
 def answer_block(
     client_fingerprint: Mapping[str, str], packed_study: bytes, block: Block, run: BatchRunner
 ) -> Answer:
-    """Return the file of a block of a packed study, for a client with a fingerprint."""
+    """Return the file of a block of a packed study, or why it was not computed.
+
+    The worker refuses clients with another fingerprint and studies whose Programs differ here.
+    """
     refusal = describe_differences(client_fingerprint, fingerprint())
-    if refusal:  # before anything is unpickled: other code may have other classes
+    if refusal:  # before unpickling: different code may have different classes
         return Answer(refusal=f"has other code: {refusal}")
     try:
         with COMPUTE_LOCK:
@@ -60,7 +62,9 @@ def answer_block(
 
 @lru_cache(maxsize=2)
 def _unpack_study(packed_study: bytes) -> tuple[Study, Manifest, str]:
-    """Return a study, and why it must not be computed: its Programs are others here."""
+    """Return the study, its manifest and the reason of a refusal (a Program that differs), or
+    empty.
+    """
     study: Study = pickle.loads(zlib.decompress(packed_study))
     other = [
         name for name, own in program_digests(study).items() if study.identity.get(name) != own

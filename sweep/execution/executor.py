@@ -1,4 +1,4 @@
-"""Executor: what computes the blocks of a study - the protocol, and one in this process."""
+"""Executor: the protocol for computing the blocks of a study, and a serial implementation."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from sweep.store.row import Block, Row
 
 @dataclass(frozen=True)
 class BlockResult:
-    """The rows of a block in the order of their numbers, or its `file` as another process made it.
+    """The rows of a block in the order of their numbers, or the `file` that another process
+    encoded.
 
-    `lost` says why there is neither.
+    `lost_reason` is set if there is neither.
     """
 
     block: Block
@@ -26,19 +27,21 @@ class BlockResult:
 
 
 class Executor(Protocol):
-    """Computes blocks; results do not depend on which executor does, nor on their order."""
+    """Computation of blocks; the results depend neither on the executor nor on the order of blocks.
+    """
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield each block as it is finished; closing the iterator ends the work."""
+        """Yield the blocks in the order of completion; closing the iterator ends the computation.
+        """
 
 
 @dataclass(frozen=True)
 class SerialExecutor:
-    """One block after another in this process."""
+    """Executor that computes the blocks one after another in this process."""
 
     run: BatchRunner
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield each block as it is finished."""
+        """Yield the blocks in their order."""
         for block in blocks:
             yield BlockResult(block, compute_rows(study, block, self.run))

@@ -1,4 +1,4 @@
-"""Fingerprint: what the bits of results depend on beside the study - code, packages, processor."""
+"""Fingerprint: the versions of code, packages and processor that determine the bits of results."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ import language
 import sweep
 
 CODE_PACKAGES = (language, engine, codegen, sweep)
+"""Packages whose files belong to the fingerprint."""
 CODE_SUFFIXES = (".py", ".lark", ".txt", ".jinja", ".h")
+"""Suffixes of the files that belong to the fingerprint."""
 LIBRARIES = ("numpy", "scipy", "filterpy", "pyarrow")
-"""Noise and Sobol points are numpy's and scipy's, gains filterpy's, files pyarrow's."""
+"""Libraries that determine noise and Sobol points (numpy, scipy), gains (filterpy) and files."""
 SHOWN_DIGITS = 12
-"""Hexadecimal digits of a digest that are told."""
+"""Hexadecimal digits of a digest in messages."""
 
 
 @lru_cache(maxsize=1)
 def fingerprint() -> Mapping[str, str]:
-    """Return what this process computes with, by part; equal ones give equal bits."""
+    """Return the versions and digests of this process by part; equal ones give equal bits."""
     found = {"modewright": _code_digest(CODE_PACKAGES)}
     found["Python"] = ".".join(platform.python_version_tuple()[:2])
     found["processor"] = platform.machine()
@@ -38,7 +40,9 @@ def fingerprint() -> Mapping[str, str]:
 
 
 def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str]) -> str:
-    """Return in words which parts are others than those that are wanted; empty: none."""
+    """Return the parts whose actual value differs from the expected one, as text; empty if none
+    does.
+    """
     parts = [
         f"{name} {actual.get(name, 'unknown')[:SHOWN_DIGITS]} instead of {value[:SHOWN_DIGITS]}"
         for name, value in expected.items()
@@ -48,7 +52,10 @@ def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str])
 
 
 def _code_digest(packages: Iterable[ModuleType]) -> str:
-    """Return the digest of the files of packages; in the wheel their names and imports differ."""
+    """Return the SHA-256 digest of the code files of packages, with their names.
+
+    The wheel has another digest than the repository, because names and imports differ.
+    """
     total = hashlib.sha256()
     for package in packages:
         home = Path(str(package.__file__)).parent

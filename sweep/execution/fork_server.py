@@ -1,6 +1,7 @@
-"""Fork server: a process that has loaded what workers here need; they are copies of it.
+"""Fork server: a process with loaded libraries from which worker processes are forked.
 
-Loading takes a worker about a second of a processor; a copy takes none. It ends with its client.
+Loading the libraries takes about a second of processor time in each worker; forking avoids it. The
+fork server ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -10,18 +11,20 @@ import os
 from multiprocessing import forkserver
 
 FORK_SERVER = "forkserver"
+"""The start method of multiprocessing with a fork server."""
 WORKER_ENVIRONMENT = {
-    "PYTHONSAFEPATH": "1",  # what stands in the user's folder is not taken for a library
+    "PYTHONSAFEPATH": "1",  # do not import modules from the user's folder
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
+"""Environment of the fork server: safe imports and one thread for each worker."""
 
 
 def start_fork_server(template: str) -> None:
-    """Start it, to load the module `template` while this process goes on; once in a process.
+    """Start the fork server, which loads the module `template` in the background.
 
-    Nothing is done where a system has no such thing: workers are started by `method()`.
+    It starts at most once in a process. On systems without fork servers this does nothing.
     """
     if start_method() != FORK_SERVER:
         return
@@ -39,5 +42,5 @@ def start_fork_server(template: str) -> None:
 
 
 def start_method() -> str:
-    """Return how processes are started here."""
+    """Return the start method of processes: `forkserver` if available, else `spawn`."""
     return FORK_SERVER if FORK_SERVER in multiprocessing.get_all_start_methods() else "spawn"

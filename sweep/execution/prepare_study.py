@@ -1,4 +1,4 @@
-"""Preparation: a study made ready to run - recordings read, rows chosen, its digest."""
+"""Preparation of a study: read recordings, set the rows to record, compute digests of Programs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from sweep.definition.study_reader import signals_of
 
 
 def prepare_study(study: Study) -> Study:
-    """Return a study that needs its files no longer, with the digest of every Program.
+    """Return a study that needs no files any more, with the digest of each Program in its identity.
 
-    Raises SpecError: for what is wrong with a recording, or a Program that cannot be made.
+    Raises SpecError for an invalid recording or a Program that cannot be built.
     """
     sampling = study.sampling
     identity = dict(study.identity)
@@ -36,7 +36,7 @@ def prepare_study(study: Study) -> Study:
 
 
 def program_digests(study: Study) -> dict[str, str]:
-    """Return the digest of every Program of a prepared study, by what it is of."""
+    """Return the digest of each Program of a prepared study by instance, variant and scenario."""
     found = {}
     for kind in study.system_variants:
         for name, course in kind.scenario_bindings.items():
@@ -47,9 +47,10 @@ def program_digests(study: Study) -> dict[str, str]:
 
 
 def resample_study(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
-    """Return a study with another number of drawn points, or another seed.
+    """Return the study with another number of samples or another seed.
 
-    Raises ValueError for what the file of a study could not say either.
+    For designs `samples` is the number of blocks or paths. Raises ValueError for numbers outside
+    the limits and for studies without random variables.
     """
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:
@@ -68,7 +69,8 @@ def resample_study(study: Study, samples: int | None = None, seed: int | None = 
 
 
 def _with_row_period(study: Study, scenario: Scenario) -> Scenario:
-    """Return the scenario with the rows that the study asks for; two where it reads no signal."""
+    """Return the scenario with the study's distance of rows; two rows if no measure needs a signal.
+    """
     assert scenario.horizon is not None
     every = study.every or scenario.every
     if not signals_of(study.measures):
@@ -77,6 +79,7 @@ def _with_row_period(study: Study, scenario: Scenario) -> Scenario:
 
 
 def _recording_digest(name: str, scenario: Scenario) -> dict[str, str]:
+    """Return the digest of a scenario's inputs if a recording is among them; else an empty dict."""
     if not any(stimulus.column for stimulus in scenario.inputs.values()):
         return {}
     inputs = repr(sorted(scenario.inputs.items())).encode()

@@ -1,7 +1,7 @@
-"""Processes: an executor of several processes on this machine.
+"""Process executor: compute blocks in several processes on this machine.
 
-A worker that dies is replaced and its block given to another one; a block that has ended three
-workers is left out, and said to be.
+If a worker process dies, another one computes its block. A block during which MAX_DEATHS processes
+died is lost and reported.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from sweep.execution.worker import receive_message, send_message
 from sweep.store.row import Block
 
 MAX_DEATHS = 3
-"""Workers that may die of one block."""
+"""Number of workers that may die during one block."""
 
 
 class WorkerError(Exception):
-    """A defect of our code in a worker: the message is its traceback."""
+    """A defect of the code in a worker; the message is its traceback."""
 
 
 @dataclass(frozen=True)
 class ProcessExecutor:
-    """`count` processes that are started by `command`, see sweep/execution/worker.py."""
+    """Executor with `count` processes that `command` starts; they run sweep/execution/worker.py."""
 
     count: int
     command: Sequence[str]
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield each block as it is finished; closing the iterator ends all processes."""
+        """Yield the blocks in the order of completion; closing the iterator kills all processes."""
         pool = _Pool(study, self.command, deque(blocks))
         try:
             yield from pool.results(self.count)
@@ -45,7 +45,7 @@ class ProcessExecutor:
 
 @dataclass
 class _Pool:
-    """What the threads share that look after one process each."""
+    """The shared state of the threads, each of which serves one process."""
 
     study: Study
     command: Sequence[str]
@@ -57,6 +57,10 @@ class _Pool:
     is_stopped: bool = False
 
     def results(self, count: int) -> Iterator[BlockResult]:
+        """Start the threads and yield results in the order of completion.
+
+        Raises WorkerError and other errors of the threads.
+        """
         count = max(1, min(count, len(self.waiting)))
         for _ in range(count):
             threading.Thread(target=self._serve_process, daemon=True).start()
@@ -71,7 +75,7 @@ class _Pool:
                 yield answer
 
     def stop(self) -> None:
-        """End all processes now."""
+        """Kill all processes at once."""
         with self.lock:
             self.is_stopped = True
             running = list(self.running)
@@ -81,7 +85,7 @@ class _Pool:
             process.wait()
 
     def _serve_process(self) -> None:
-        """Give blocks to one process after another of our own until there are none."""
+        """Send blocks to a process until none is left; start a new process if it dies."""
         process: subprocess.Popen[bytes] | None = None
         try:
             while True:
@@ -104,10 +108,12 @@ class _Pool:
             self.answers.put(None)
 
     def _next_block(self) -> Block | None:
+        """Return the next waiting block; None if there is none or the pool is stopped."""
         with self.lock:
             return self.waiting.popleft() if self.waiting and not self.is_stopped else None
 
     def _start_process(self) -> subprocess.Popen[bytes]:
+        """Start a process and send it the study. Raises EOFError if the pool is stopped."""
         with self.lock:
             if self.is_stopped:
                 raise EOFError
@@ -121,6 +127,7 @@ class _Pool:
         return process
 
     def _compute_block(self, process: subprocess.Popen[bytes], block: Block) -> None:
+        """Send a block to a process and queue its file. Raises WorkerError for a traceback."""
         assert process.stdin and process.stdout
         send_message(process.stdin, block)
         answer = receive_message(process.stdout)
@@ -129,7 +136,7 @@ class _Pool:
         self.answers.put(BlockResult(block, file=answer))
 
     def _retry_block(self, block: Block) -> None:
-        """Give the block to another worker, at most three times."""
+        """Queue a block again, or report it as lost after MAX_DEATHS deaths."""
         with self.lock:
             if self.is_stopped:
                 return
@@ -142,7 +149,7 @@ class _Pool:
 
 
 def _close_process(process: subprocess.Popen[bytes]) -> None:
-    """Close the input of a process, which ends it."""
+    """Close the input of a process, kill it and wait for its end."""
     with contextlib.suppress(OSError):
         if process.stdin:
             process.stdin.close()

@@ -1,4 +1,4 @@
-"""Study run: the blocks of a study that are not there yet, computed and kept one by one."""
+"""Study run: compute the missing blocks of a study and store each one when it is finished."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from sweep.store.row import Block
 from sweep.store.store import Store, lock_folder, open_store, require_same_study
 
 Progress = Callable[[int, int, int], None]
-"""Told how many variants are done, how many of these were there before, and how many in all."""
+"""Called with the number of finished variants, of those finished before, and of all variants."""
 Warn = Callable[[str], None]
-"""Told in one line what is not as it should be, and does not end the run."""
+"""Called with a one-line warning that does not end the run."""
 
 
 @dataclass(frozen=True)
 class StudyRun:
-    """The store after a run; `lost` are blocks that could not be computed, with the reason."""
+    """The store after a run, with the number of reused and computed variants.
+
+    `lost_blocks` are the blocks that could not be computed, with reasons.
+    """
 
     store: Store
     reused: int
@@ -37,9 +40,9 @@ def run_study(
     progress: Progress | None = None,
     warn: Warn | None = None,
 ) -> StudyRun:
-    """Run a prepared study into a folder, or go on where another run of it ended.
+    """Run a prepared study into a folder, or continue an earlier run.
 
-    Raises SpecError where the folder is of another study, OSError where it cannot be written.
+    Raises SpecError if the folder belongs to another study, and OSError if it cannot be written.
     """
     return fill_store(
         manifest_of(study, block_size), folder, partial(executor, study), progress, warn
@@ -53,12 +56,11 @@ def fill_store(
     progress: Progress | None = None,
     warn: Warn | None = None,
 ) -> StudyRun:
-    """Fill a store with blocks of any kind of work; what is there is not computed again.
+    """Compute the missing and the damaged blocks of a store with `compute`, and store them.
 
-    What is damaged is. Raises SpecError where the folder is of something else, OSError where it
-    cannot be written.
+    Raises SpecError if the folder contains something else, and OSError if it cannot be written.
     """
-    require_same_study(folder, manifest)  # before anything is made there, a lock too
+    require_same_study(folder, manifest)  # before any file is created, also the lock
     with lock_folder(folder):
         store = open_store(folder, manifest)
         total = manifest.count
@@ -88,7 +90,7 @@ def fill_store(
 
 
 def _complete_starts(store: Store, warn: Warn) -> set[int]:
-    """Return the starts of the blocks that are there; tell which are damaged."""
+    """Return the starts of the complete blocks; warn of damaged ones."""
     found = store.scan()
     for path in found.damaged:
         warn(f"{path} is damaged: its variants are computed again")
@@ -96,4 +98,4 @@ def _complete_starts(store: Store, warn: Warn) -> set[int]:
 
 
 def _ignore(*arguments: object) -> None:
-    """Tell nobody."""
+    """Ignore a report."""

@@ -1,8 +1,8 @@
-"""Worker: a process that computes blocks, told by messages through its standard streams.
+"""Worker process: compute blocks that arrive as messages on standard input.
 
-A message is its length (8 bytes, big-endian) and a pickle: first the study, then blocks; each is
-answered by its file, or by the traceback of a defect (text). Where who started it is gone, it ends
-at once, also inside a block.
+A message is its length (8 bytes, big-endian) and a pickle. The first message is the study, each
+further one a block. The answer is the file of the block, or the traceback of a defect (str). The
+process ends at once when its input closes, also during a block.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from sweep.store.manifest import manifest_of
 from sweep.store.row import Block
 
 LENGTH_PREFIX = struct.Struct(">Q")
+"""The length of a message: 8 bytes, big-endian."""
 
 
 def send_message(stream: IO[bytes], message: object) -> None:
-    """Write a message. Raises OSError where nobody reads it."""
+    """Write a message to a stream and flush it. Raises OSError if the reader is gone."""
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(LENGTH_PREFIX.pack(len(data)) + data)
     stream.flush()
 
 
 def receive_message(stream: IO[bytes]) -> Any:
-    """Read a message. Raises EOFError where there is no other one."""
+    """Return the next message of a stream. Raises EOFError at its end."""
     head = stream.read(LENGTH_PREFIX.size)
     if len(head) < LENGTH_PREFIX.size:
         raise EOFError
@@ -46,8 +47,8 @@ def receive_message(stream: IO[bytes]) -> Any:
 
 
 def serve_blocks(run: BatchRunner) -> None:
-    """Answer blocks until the input ends. What is printed meanwhile goes to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us tells us when to end
+    """Answer blocks until the input ends; output of other code is redirected to stderr."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides about the end
     source = os.fdopen(os.dup(0), "rb")
     target = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
@@ -65,7 +66,7 @@ def serve_blocks(run: BatchRunner) -> None:
 
 
 def _forward_messages(source: IO[bytes], messages: queue.Queue[Any]) -> None:
-    """Put messages into the queue; where they end, end the process."""
+    """Put the messages of a stream into a queue; exit the process at the end of the stream."""
     while True:
         try:
             messages.put(receive_message(source))

@@ -1,1 +1,1 @@
-"""Measures of a run: statistics, waveforms, observed intervals."""
+"""Measurement: evaluate the measures of a study from the events and signals of a run."""

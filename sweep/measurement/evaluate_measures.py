@@ -1,4 +1,7 @@
-"""Measuring: the measures of one observed run. None: there is no such number in this run."""
+"""Measure evaluation: compute the columns of all measures from one observed run.
+
+A value of None means that the run has no such number, e.g. because an event did not happen.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +24,16 @@ from sweep.measurement.observation import Observation
 from sweep.measurement.waveform import evaluate_signal
 
 Cell = float | int | bool | str | list[float] | None
+"""The value of a column for one variant."""
 Window = tuple[float, float] | None
+"""Start and end [s] of a time window; None if an end is an undefined measure."""
 
 
 def evaluate_measures(measures: Sequence[Measure], run: Observation) -> dict[str, Cell]:
-    """Return the value of every column of the measures."""
+    """Return the values of all columns of the measures by name.
+
+    Measures are evaluated in their order, since windows and expressions refer to earlier ones.
+    """
     cells: dict[str, Cell] = {}
     for measure in measures:
         if isinstance(measure, ValueMeasure):
@@ -47,7 +55,10 @@ def evaluate_measures(measures: Sequence[Measure], run: Observation) -> dict[str
 def _resolve_window(
     since: Bound, until: Bound, cells: Mapping[str, Cell], horizon: float
 ) -> Window:
-    """Return from when to when [s]; None where an end is a measure that has no value."""
+    """Return start and end [s] of a window; None if an end is a measure without a value.
+
+    A missing bound means 0 or the horizon.
+    """
     ends = []
     for bound, default in ((since, 0.0), (until, horizon)):
         value = cells[bound] if isinstance(bound, str) else bound
@@ -58,10 +69,12 @@ def _resolve_window(
 
 
 def _times_within(times: Sequence[float], window: Window) -> list[float]:
+    """Return the times in a closed window; empty without a window."""
     return [] if window is None else [t for t in times if window[0] <= t <= window[1]]
 
 
 def _measure_event(measure: EventMeasure, run: Observation, window: Window) -> Cell:
+    """Return the time [s] of the n-th event in the window, or the number of events."""
     times = _times_within(run.times_of(measure.event), window)
     if measure.kind == "count":
         return None if window is None else len(times)
@@ -69,6 +82,11 @@ def _measure_event(measure: EventMeasure, run: Observation, window: Window) -> C
 
 
 def _measure_delay(measure: DelayMeasure, run: Observation, window: Window) -> Cell:
+    """Return the delay [s] of the first event in the allowed interval around the n-th reference
+    event.
+
+    Return None if there is no such event.
+    """
     truths = _times_within(run.times_of(measure.after), window)
     if len(truths) < measure.number:
         return None
@@ -81,7 +99,7 @@ def _measure_delay(measure: DelayMeasure, run: Observation, window: Window) -> C
 
 
 def _measure_match(measure: MatchMeasure, run: Observation, window: Window) -> dict[str, Cell]:
-    """Each truth takes the first detection in its window that no truth before has taken."""
+    """Return the columns of a match: each truth takes the first unused detection in its window."""
     before, within = float(measure.before), measure.within
     longest = math.inf if within is None else float(within)
     intervals = run.dwell_intervals(measure.truth)
@@ -114,6 +132,7 @@ def _measure_match(measure: MatchMeasure, run: Observation, window: Window) -> d
 
 
 def _measure_signal(measure: SignalMeasure, run: Observation, window: Window) -> Cell:
+    """Return the statistic of a signal in the window; None without a window or rows."""
     if window is None:
         return None
     inside = (run.times >= window[0]) & (run.times <= window[1])
@@ -121,7 +140,10 @@ def _measure_signal(measure: SignalMeasure, run: Observation, window: Window) ->
 
 
 def _measure_value(measure: ValueMeasure, cells: Mapping[str, Cell]) -> Cell:
-    """Return an expression of measures; None where it reads one that has no value."""
+    """Return the value of an expression of measures.
+
+    Return None if it refers to an undefined measure or if the result is not finite.
+    """
     read: dict[str, float] = {}
     for name in dict.fromkeys(measure.formula.reads):
         cell = cells[name]

@@ -1,4 +1,4 @@
-"""Observation: what measures look at - the events of a run by mode, and its recorded signals."""
+"""Observation: the mode changes and the recorded signals of one run, the input of measures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModeChange:
-    """A transition at a time [s] between two modes."""
+    """A transition at a time [s] from one mode to another."""
 
     time: float
     source: str
@@ -25,9 +25,10 @@ class ModeChange:
 
 @dataclass(frozen=True)
 class Observation:
-    """One run: transitions by (instance, region) in the order of time, signals (rows,) over times.
+    """One run: mode changes by (instance, region) in order of time, and signals (n_rows,) over
+    `times`.
 
-    `times` [s] and signals end where the run stopped; `horizon` [s] is where it should have.
+    `times` [s] and signals end where the run stopped; `horizon` [s] is its planned end.
     """
 
     mode_changes: Mapping[tuple[str, str], Sequence[ModeChange]]
@@ -36,7 +37,7 @@ class Observation:
     horizon: float
 
     def times_of(self, event: ModeEntryEvent) -> list[float]:
-        """Return when an event happened [s]."""
+        """Return the times [s] of an event in ascending order."""
         return [
             happening.time
             for happening in self.mode_changes.get((event.instance, event.region), ())
@@ -44,7 +45,10 @@ class Observation:
         ]
 
     def dwell_intervals(self, event: ModeEntryEvent) -> list[tuple[float, float]]:
-        """Return from when to when [s] the mode of an event was active, for each event."""
+        """Return start and end [s] of the active interval of the event's mode, one for each event.
+
+        A mode that is active at the end has the horizon as end.
+        """
         intervals = []
         changes = self.mode_changes.get((event.instance, event.region), ())
         for place, happening in enumerate(changes):
@@ -57,7 +61,7 @@ class Observation:
 
 
 def observe_variant(result: BatchResult, variant: int, horizon: float) -> Observation:
-    """Return one variant of a batch."""
+    """Return the observation of one variant of a batch, by its place in the batch."""
     mode_changes: dict[tuple[str, str], list[ModeChange]] = {}
     for place, time in zip(result.event_kinds[variant], result.event_times[variant], strict=True):
         if place == NO_EVENT:

@@ -1,6 +1,6 @@
-"""Waveform: one number of a sampled signal over a window - peak, RMS, settling, frequency.
+"""Waveform statistics: peak, mean, RMS, settling time and frequency of a sampled signal.
 
-Sums are exactly rounded (math.fsum): the same bits on every machine.
+Sums are correctly rounded (math.fsum), so that the bits are the same on all machines.
 """
 
 from __future__ import annotations
@@ -15,13 +15,17 @@ from sweep.measurement.exact_moments import mean_of, root_mean_square, scale_to_
 
 Reals = NDArray[np.float64]
 MIN_SPECTRUM_ROWS = 8
-"""Rows of the shortest spectrum."""
+"""Smallest number of samples of a spectrum."""
 FLATNESS_TOLERANCE = 1.0e-12
-"""A signal that is as near to a line as this share of its peak is one: thousands of roundings."""
+"""A signal is a straight line if its deviation, relative to its peak, is smaller: rounding errors.
+"""
 
 
 def evaluate_signal(measure: SignalMeasure, times: Reals, values: Reals) -> float | None:
-    """Return the number of a signal [its unit] (n,) over times [s] (n,); None if there is none."""
+    """Return the statistic of a signal (n,) over times [s] (n,), in the unit of the measure.
+
+    Return None for an empty window, a value that is not finite, or no frequency.
+    """
     if not len(values) or not np.all(np.isfinite(values)):
         return None
     match measure.kind:
@@ -45,15 +49,20 @@ def evaluate_signal(measure: SignalMeasure, times: Reals, values: Reals) -> floa
 
 
 def settling_time(times: Reals, values: Reals, band: float) -> float:
-    """Return the time [s] from the start until the signal stays in a band around its last value."""
-    with np.errstate(over="ignore"):  # of a difference of the largest: it is outside
+    """Return the time [s] from the start until the signal stays within a band around its last
+    value.
+    """
+    with np.errstate(over="ignore"):  # an infinite difference is outside the band
         outside = np.flatnonzero(np.abs(values - values[-1]) > band)
     first = int(outside[-1]) + 1 if len(outside) else 0
     return float(times[first] - times[0])
 
 
 def frequency_by_crossings(times: Reals, values: Reals) -> float | None:
-    """Return the frequency [1/s] from upward crossings of the straight line through the signal."""
+    """Return the frequency [1/s] from the upward crossings of the detrended signal.
+
+    Crossing times are interpolated linearly. Return None for fewer than two crossings.
+    """
     level = _detrend(times, values)
     if not len(level):
         return None
@@ -66,9 +75,10 @@ def frequency_by_crossings(times: Reals, values: Reals) -> float | None:
 
 
 def frequency_by_spectrum(times: Reals, values: Reals) -> float | None:
-    """Return the dominant frequency [1/s]: the peak of the spectrum under a Hann window.
+    """Return the frequency [1/s] of the peak of the spectrum with a Hann window.
 
-    Between bins by the parabola through the logarithms (Smith and Serra, PARSHL, 1987).
+    A parabola through the logarithms interpolates between bins (Smith and Serra, PARSHL, 1987).
+    Return None for fewer than MIN_SPECTRUM_ROWS samples or a constant signal.
     """
     count = len(values)
     level = _detrend(times, values)
@@ -86,10 +96,7 @@ def frequency_by_spectrum(times: Reals, values: Reals) -> float | None:
 
 
 def _detrend(times: Reals, values: Reals) -> Reals:
-    """Return a signal (n,) without the line that fits it best (least squares).
-
-    Empty where nothing but rounding is left.
-    """
+    """Return a signal (n,) minus its least-squares line; empty if only rounding errors remain."""
     count = len(values)
     middle, mean = math.fsum(times) / count, math.fsum(values) / count
     away = times - middle

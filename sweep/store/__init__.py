@@ -1,1 +1,1 @@
-"""Storage of results: manifest, blocks as files, tables."""
+"""Store of results: manifest, Parquet files of blocks, and access to columns."""

@@ -1,4 +1,4 @@
-"""Rows file: rows of a block as the bytes of a Parquet file, which carries a digest of itself."""
+"""Block file: encode the rows of a block as a Parquet file that contains its own digest."""
 
 from __future__ import annotations
 
@@ -13,26 +13,27 @@ from sweep.store.manifest import ARROW_TYPES, Manifest
 from sweep.store.row import Block, Row
 
 FileFault = Literal["", "damaged", "another"]
-"""What is wrong with a file: nothing; its bytes are not those written; it is of another study."""
+"""The fault of a file: none, changed bytes, or rows of another study."""
 DIGEST_TAG = b"sha256:"
+"""The text before the digest in the metadata of a file."""
 DIGEST_PLACEHOLDER = b"0" * hashlib.sha256().digest_size * 2
-"""What stands for the digest of a file, in its metadata, while that is made."""
+"""The text in place of the digest while the digest is computed."""
 
 
 def encode_block(manifest: Manifest, block: Block, rows: Sequence[Row]) -> bytes:
-    """Return the rows of a block as the file that the store keeps of it."""
+    """Return the rows of a block as the bytes of its file in the store."""
     return encode_parquet(manifest, rows, mark_of(manifest, block))
 
 
 def mark_of(manifest: Manifest, block: Block) -> bytes:
-    """Return what the file of a block carries: of what study it is, and which block."""
+    """Return the mark of a block's file: the digest of the study and the range of variants."""
     return f"{manifest.digest} {block.start}-{block.stop}".encode()
 
 
 def fault_of(manifest: Manifest, block: Block, data: bytes) -> FileFault:
-    """Return what is wrong with the file of a block.
+    """Return the fault of the file of a block.
 
-    The digest is looked at before pyarrow sees the file; one without it was not written here.
+    The digest is checked before pyarrow parses the bytes. A file without a digest is damaged.
     """
     arrow = import_arrow()
     body, digest = _split_digest(data)
@@ -51,7 +52,7 @@ def fault_of(manifest: Manifest, block: Block, data: bytes) -> FileFault:
 
 
 def encode_parquet(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
-    """Return rows as a Parquet file that carries a mark: of what study and block it is."""
+    """Return rows as a Parquet file with a mark, the units of the columns and a digest."""
     arrow = import_arrow()
     columns: dict[str, list[Any]] = {
         name: [getattr(row, name) for row in rows] for name in (*LEADING_COLUMNS, *STATUS_COLUMNS)
@@ -78,12 +79,13 @@ LEADING_COLUMNS = {
     "number": "whole", "variant": "text", "scenario": "text", "sample": "whole",
     "replicate": "whole", "seed": "whole",
 }  # fmt: skip
+"""The columns before the variables in each store, with types."""
 STATUS_COLUMNS = {"status": "text", "message": "text"}
-"""The columns of every store, before and after what varies."""
+"""The columns between variables and measures in each store, with types."""
 
 
 def _arrow_schema(manifest: Manifest) -> Any:
-    """Return the columns of a store in their order, with the types that pyarrow has for them."""
+    """Return the schema of a store: leading columns, variables, status, measures."""
     arrow = import_arrow()
     kinds = {
         **LEADING_COLUMNS, **{column.name: column.type for column in manifest.varied},
@@ -97,7 +99,9 @@ def _arrow_schema(manifest: Manifest) -> Any:
 
 
 def _split_digest(data: bytes) -> tuple[bytes, bytes]:
-    """Return a file as it was when its digest was made, and that; empty: it has none."""
+    """Return the file with the placeholder instead of its digest, and the digest; empty without
+    one.
+    """
     place = data.rfind(DIGEST_TAG)
     first = place + len(DIGEST_TAG)
     last = first + len(DIGEST_PLACEHOLDER)
@@ -107,5 +111,5 @@ def _split_digest(data: bytes) -> tuple[bytes, bytes]:
 
 
 def import_arrow() -> ModuleType:
-    """Return pyarrow with its Parquet. Raises ToolMissing."""
+    """Return pyarrow with its Parquet module. Raises MissingToolError."""
     return import_pyarrow("a study")

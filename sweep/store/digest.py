@@ -1,4 +1,4 @@
-"""The digest of everything that the results of a study depend on."""
+"""Study digest: the hash of everything on which the results of a study depend."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import json
 from collections.abc import Mapping
 
 STORE_FORMAT = 2
-"""Form of the results: those of another one are not continued."""
+"""Schema version of a store. Results of another version are not continued."""
 
 
 def digest_of(identity: Mapping[str, str]) -> str:
-    """Return the SHA-256 of all that results depend on."""
+    """Return the SHA-256 digest of the identity (digests by part) and of the schema version."""
     return hashlib.sha256(
         json.dumps([STORE_FORMAT, dict(sorted(identity.items()))]).encode()
     ).hexdigest()

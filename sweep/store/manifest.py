@@ -1,4 +1,4 @@
-"""Manifest: what the results in a folder are of, as `study.json` there."""
+"""Manifest of a store: the file `study.json`, which describes the study of the results."""
 
 from __future__ import annotations
 
@@ -17,10 +17,15 @@ from sweep.store.digest import STORE_FORMAT, digest_of
 from sweep.store.row import Block
 
 MANIFEST_NAME = "study.json"
+"""The name of the manifest file."""
 MAX_BLOCKS = 100
+"""Approximate largest number of blocks of a store."""
 MIN_BLOCKS = 8
+"""Number of blocks that are kept for the workers when blocks are enlarged for batches."""
 MAX_BLOCK_SIZE = 5000
+"""Largest number of variants of a block."""
 MIN_BATCH_SIZE = 200
+"""Smallest size of a block whose variants form one batch."""
 ARROW_TYPES = {
     "real": "float64",
     "whole": "int64",
@@ -28,14 +33,14 @@ ARROW_TYPES = {
     "truth": "bool_",
     "list": "list_",
 }
-"""What a column may hold, and the type that pyarrow has for it; a list is one of reals."""
+"""The types of columns with the names of the pyarrow types; a list is a list of reals."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """How points are drawn: `names` are what is drawn, in its order; nothing: `count` is 0.
+    """The sampling of a study: method, names of random variables, number of points, seed.
 
-    Each point comes `replicates` times, with other noise.
+    `count` is 0 without random variables. Each point has `replicates` runs with different noise.
     """
 
     method: str = "random"
@@ -46,25 +51,25 @@ class Design:
 
     @property
     def group_size(self) -> int:
-        """How many points belong together: those of a block or a path; else each is alone."""
+        """The number of points of a block or path; 1 for other methods."""
         return design_group_size(self.method, len(self.names))
 
     @property
     def group_count(self) -> int:
-        """How many blocks or paths there will be; else points."""
+        """The number of blocks or paths; the number of points for other methods."""
         return self.count // self.group_size
 
     @property
     def has_indices(self) -> bool:
-        """Tell whether indices of sensitivity are made of its points."""
+        """Return whether sensitivity indices can be computed from the points."""
         return self.group_size > 1
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a store is of. `identity` are the digests of all that results depend on, by part.
+    """The description of a store. `identity` holds digests of the inputs of the results by part.
 
-    `description` are the sections of the study, as they are written.
+    `description` holds the sections of the study as text.
     """
 
     study: str
@@ -81,18 +86,18 @@ class Manifest:
 
     @property
     def blocks(self) -> list[Block]:
-        """All blocks in their order."""
+        """All blocks in their order; the last one may be smaller."""
         starts = range(0, self.count, self.block_size)
         return [Block(start, min(start + self.block_size, self.count)) for start in starts]
 
     def has(self, block: Block) -> bool:
-        """Tell whether this is one of the blocks."""
+        """Return whether a block is one of the blocks of this manifest."""
         is_inside = 0 <= block.start < self.count and block.start % self.block_size == 0
         return is_inside and block.stop == min(block.start + self.block_size, self.count)
 
 
 def manifest_of(study: Study, block_size: int | None = None) -> Manifest:
-    """Return the manifest of a prepared study, in blocks of a size that suits it or is given."""
+    """Return the manifest of a prepared study, with the given or a suitable size of blocks."""
     return Manifest(
         study=study.name,
         digest=digest_of(study.identity),
@@ -109,21 +114,23 @@ def manifest_of(study: Study, block_size: int | None = None) -> Manifest:
 
 
 def _column_of(varied: SweepVariable) -> StoreColumn:
+    """Return the column of a variable with its display unit."""
     unit = varied.unit
     factor, offset = float(unit.factor), float(unit.offset)
     return StoreColumn(varied.name, "real", str(unit.dimension), unit.text, factor, offset)
 
 
 def _design_of(study: Study) -> Design:
+    """Return the sampling design of a study."""
     names, sampling = tuple(varied.name for varied in study.random_variables), study.sampling
     return Design(sampling.method, names, sampling.count, sampling.seed, study.replicates)
 
 
 def choose_block_size(study: Study) -> int:
-    """Return how many variants are computed and kept at once: about a hundred blocks.
+    """Return the number of variants of a block, so that there are at most about MAX_BLOCKS blocks.
 
-    What goes through one batch is prepared once a block: such blocks are larger, if there are some
-    for every worker.
+    If all variants fit into one batch, blocks are larger, because each block prepares its batch
+    once; MIN_BLOCKS blocks remain for the workers.
     """
     places = [target for varied in study.variables for target in varied.targets]
     places += [target for setting in study.settings for target in setting.targets]
@@ -133,7 +140,7 @@ def choose_block_size(study: Study) -> int:
 
 
 def encode_manifest(manifest: Manifest) -> bytes:
-    """Return a manifest as the bytes of its file."""
+    """Return the bytes of the manifest file (JSON); the key `modewright` is the schema version."""
     shown = manifest.presentation
     data: dict[str, Any] = {
         "modewright": STORE_FORMAT,
@@ -156,18 +163,18 @@ def encode_manifest(manifest: Manifest) -> bytes:
 
 
 def seal_of(data: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of all that a manifest says, but its own seal: a change is seen."""
+    """Return the SHA-256 digest of all entries of a manifest except `seal`, to detect changes."""
     plain = {key: value for key, value in data.items() if key != "seal"}
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def store_error(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
-    """Return a problem of a folder, to be raised."""
+    """Return a SpecError about a folder, for the caller to raise."""
     problems = Problems()
     problems.error(kind, file_span(folder), label, help)
     return SpecError(problems.reported)
 
 
 def file_span(path: Path) -> Span:
-    """Return the place of a folder or file as a whole."""
+    """Return the span that stands for a whole file or folder."""
     return Span(Source(str(path)), 1, 1)

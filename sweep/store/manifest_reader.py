@@ -1,4 +1,4 @@
-"""Manifest reader: `study.json` of a store, checked as a whole: nothing in it is trusted."""
+"""Manifest reader: read `study.json` of a store and validate each entry."""
 
 from __future__ import annotations
 
@@ -21,11 +21,16 @@ from sweep.store.digest import STORE_FORMAT
 from sweep.store.manifest import ARROW_TYPES, MANIFEST_NAME, Design, Manifest, seal_of, store_error
 
 COLUMN_PATTERN = re.compile(r"[A-Za-z]\w*(\.\w+)*", re.ASCII)
+"""The form of a column name."""
 GROUP_COLUMNS = ("variant", "scenario")
+"""Columns of text by which results can be grouped."""
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return what the store in a folder is of. Raises SpecError."""
+    """Return the manifest of the store in a folder.
+
+    Raises SpecError if it is missing, damaged, changed, or of another schema version.
+    """
     try:
         data = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
         if isinstance(data, dict) and data.get("modewright", STORE_FORMAT) != STORE_FORMAT:
@@ -42,7 +47,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def _manifest(data: Any) -> Manifest:
-    """Return plain data as a manifest. Raises ValueError with the place of what is wrong."""
+    """Return the manifest of JSON data. Raises ValueError with the place of a fault."""
     table = _table(data, MANIFEST_NAME)
     _get(table, "modewright")
     _require(_get(table, "seal") == seal_of(table), "it is not as it was written")
@@ -69,6 +74,7 @@ def _manifest(data: Any) -> Manifest:
 def _presentation(
     data: Any, varied: Sequence[StoreColumn], measures: Sequence[StoreColumn]
 ) -> Presentation:
+    """Return the presentation of JSON data. Raises ValueError."""
     table = _table(data, "presentation")
     groups = (*GROUP_COLUMNS, *(column.name for column in varied))
     confidence = _real(_get(table, "confidence"), "confidence")
@@ -90,7 +96,10 @@ def _plot(
     varied: Sequence[StoreColumn],
     measures: Sequence[StoreColumn],
 ) -> dict[str, Any]:
-    """Return the options of a picture, as sweep/definition/presentation_reader.py makes them of a study."""
+    """Return the options of a plot, in the form of sweep/definition/presentation_reader.py.
+
+    Raises ValueError for unknown columns or options.
+    """
     kind = _choice(_get(table, "kind"), f"{where}.kind", tuple(PLOT_OPTIONS))
     types = ("real", "whole", "truth", *(("list",) if kind == "histogram" else ()))
     of = _choices(
@@ -108,6 +117,7 @@ def _plot(
 
 
 def _design(data: Any, varied: Sequence[StoreColumn]) -> Design:
+    """Return the sampling design of JSON data. Raises ValueError."""
     table = _table(data, "design")
     known = [column.name for column in varied]
     made = Design(
@@ -125,6 +135,7 @@ def _design(data: Any, varied: Sequence[StoreColumn]) -> Design:
 
 
 def _description(data: Any) -> Description:
+    """Return the description of JSON data. Raises ValueError."""
     found: dict[str, str | dict[str, str]] = {}
     for key, said in _table(data, "description").items():
         read = _named_texts if isinstance(said, dict) else _text
@@ -133,6 +144,7 @@ def _description(data: Any) -> Description:
 
 
 def _columns(data: Any, where: str) -> tuple[StoreColumn, ...]:
+    """Return the columns of JSON data. Raises ValueError for invalid names, types and factors."""
     found = []
     for place, item in enumerate(_list(data, where)):
         here = f"{where}.{place}"
@@ -148,6 +160,7 @@ def _columns(data: Any, where: str) -> tuple[StoreColumn, ...]:
 
 
 def _words(data: Any, varied: Sequence[StoreColumn]) -> dict[str, tuple[str, ...]]:
+    """Return the enumeration values by variable. Raises ValueError."""
     table = _table(data, "words")
     known = [column.name for column in varied]
     return {
@@ -158,41 +171,47 @@ def _words(data: Any, varied: Sequence[StoreColumn]) -> dict[str, tuple[str, ...
     }
 
 
-# What a value may be.
-
-
+# Checks of JSON values; each raises ValueError with the place.
 def _require(condition: bool, label: str) -> None:
+    """Raise ValueError with a label unless a condition holds."""
     if not condition:
         raise ValueError(label)
 
 
 def _get(table: Mapping[str, Any], key: str) -> Any:
+    """Return the value of a required key."""
     _require(key in table, f"`{key}` is missing")
     return table[key]
 
 
 def _table(value: Any, where: str) -> dict[str, Any]:
+    """Return a value that must be a JSON object."""
     _require(isinstance(value, dict), f"`{where}` is no table")
     return dict(value)
 
 
 def _list(value: Any, where: str) -> list[Any]:
+    """Return a value that must be a JSON array."""
     _require(isinstance(value, list), f"`{where}` is no list")
     return list(value)
 
 
 def _text(value: Any, where: str) -> str:
+    """Return a value that must be a string without invisible characters."""
     is_text = isinstance(value, str) and escape_invisible(value) == value
     _require(is_text, f"`{where}` is {_quote(value)}, no text")
     return str(value)
 
 
 def _named_texts(value: Any, where: str) -> dict[str, str]:
+    """Return a value that must be an object with string values."""
     table = _table(value, where)
     return {_text(name, where): _text(text, f"{where}.{name}") for name, text in table.items()}
 
 
 def _whole(value: Any, where: str, low: int, high: int | None) -> int:
+    """Return a value that must be an integer from `low` to `high`; None as `high` means no limit.
+    """
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     is_fine = is_whole and low <= value and (high is None or value <= high)
     limits = f"from {low} on" if high is None else f"from {low} to {high}"
@@ -201,20 +220,24 @@ def _whole(value: Any, where: str, low: int, high: int | None) -> int:
 
 
 def _real(value: Any, where: str) -> float:
+    """Return a value that must be a finite float."""
     is_real = isinstance(value, float) and math.isfinite(value)
     _require(is_real, f"`{where}` is {_quote(value)}, no real number")
     return float(value)
 
 
 def _choice(value: Any, where: str, known: Sequence[str]) -> str:
+    """Return a value that must be one of the known strings."""
     is_known = isinstance(value, str) and value in known
     _require(is_known, f"`{where}` is {_quote(value)}, not one of {', '.join(known) or 'nothing'}")
     return str(value)
 
 
 def _choices(value: Any, where: str, known: Sequence[str]) -> tuple[str, ...]:
+    """Return an array whose items must be among the known strings."""
     return tuple(_choice(item, where, known) for item in _list(value, where))
 
 
 def _quote(value: Any) -> str:
+    """Return a value as short text with invisible characters escaped."""
     return escape_invisible(truncate(str(value), 40))

@@ -1,4 +1,4 @@
-"""One row of results: the outcome and the measures of a variant."""
+"""Rows of results: the status and the measures of a variant."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from sweep.measurement.evaluate_measures import Cell
 
 DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
-"""What became of a variant: fine; a fault bit is set; the run stopped; it cannot be simulated."""
+"""Status of a variant: finished; a fault bit is set; the run stopped; it cannot be simulated."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One variant: its place in the study, what varies, what became of it, its measures."""
+    """The results of one variant: indices in the study, values [SI], status, message and measures.
+    """
 
     number: int
     variant: str
@@ -29,7 +30,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Block:
-    """The variants from `start` to before `stop`."""
+    """The variants with numbers from `start` to `stop` (exclusive)."""
 
     start: int
     stop: int

@@ -1,8 +1,8 @@
-"""Store: results in a folder of Parquet files, one a block, each written whole or not at all.
+"""Store: write the results of a study into a folder with one Parquet file for each block.
 
-`study.json` says of what study they are; `blocks/<start>-<stop>.parquet` holds the variants from
-`start` to before `stop`. A file is written beside its name, flushed to the disk, then renamed: what
-has its name is finished, whatever happens to the process.
+`study.json` is the manifest; `blocks/<start>-<stop>.parquet` holds the variants from `start` to
+`stop` (exclusive). Each file is written under a temporary name, flushed to the disk and renamed.
+Hence a file with a final name is complete, also after a crash.
 """
 
 from __future__ import annotations
@@ -22,16 +22,20 @@ from sweep.store.manifest_reader import read_manifest
 from sweep.store.row import Block, Row
 
 BLOCKS_FOLDER = "blocks"
+"""The folder of block files in a store."""
 LOCK_NAME = ".lock"
+"""The name of the lock file."""
 BLOCK_NAME = re.compile(r"(\d{10})-(\d{10})\.parquet", re.ASCII)
+"""The form of the names of block files."""
 RERUN_HINT = "the sweep that made these results computes them again: the same command"
+"""Hint for missing or damaged blocks."""
 
 
 @dataclass(frozen=True)
 class StoreContents:
-    """The blocks of a store that are there, and files of blocks that are not as they were written.
+    """The complete blocks of a store, and the files of damaged ones.
 
-    What is damaged counts as missing: it is computed again, and replaced.
+    A damaged block counts as missing: the next run computes and replaces it.
     """
 
     complete: tuple[Block, ...]
@@ -46,9 +50,10 @@ class Store:
     manifest: Manifest
 
     def scan(self) -> StoreContents:
-        """Return which blocks are there, as their digests tell.
+        """Return the complete and the damaged blocks according to their digests.
 
-        Raises SpecError for what is no block of these results; it is left where it is.
+        Raises SpecError for unreadable files and for blocks of other studies, which are not
+        changed.
         """
         whole, damaged, problems = [], [], Problems()
         for path, block in self._files():
@@ -68,10 +73,15 @@ class Store:
         return StoreContents(tuple(whole), tuple(damaged))
 
     def finished_starts(self) -> set[int]:
-        """Return the starts of the blocks that are there and not damaged. Raises SpecError."""
+        """Return the starts of the complete blocks. Raises SpecError as `scan` does."""
         return {block.start for block in self.scan().complete}
 
     def _files(self) -> Iterator[tuple[Path, Block]]:
+        """Yield the paths of the block files in ascending order, with the blocks that their names
+        denote.
+
+        Raises SpecError if the folder of blocks is missing.
+        """
         try:
             names = sorted(path.name for path in (self.folder / BLOCKS_FOLDER).iterdir())
         except (FileNotFoundError, NotADirectoryError):
@@ -83,27 +93,30 @@ class Store:
                 yield self.folder / BLOCKS_FOLDER / name, Block(int(match[1]), int(match[2]))
 
     def paths(self) -> list[Path]:
-        """Return the files of the finished blocks in their order."""
+        """Return the paths of the block files in ascending order."""
         return [path for path, _ in self._files()]
 
     def write_rows(self, block: Block, rows: Sequence[Row]) -> None:
-        """Keep the rows of a block, whole or not at all. Raises OSError."""
+        """Write the rows of a block atomically. Raises OSError."""
         self.write_block_file(block, encode_block(self.manifest, block, rows))
 
     def write_block_file(self, block: Block, data: bytes) -> None:
-        """Keep the file of a block, whole or not at all. Raises OSError."""
+        """Write an encoded block atomically. Raises OSError."""
         path = self.folder / BLOCKS_FOLDER / f"{block.start:010d}-{block.stop:010d}.parquet"
         write_atomically(path, data)
 
     def remove_partial_files(self) -> None:
-        """Remove what an interrupted process has left beside the finished files."""
+        """Remove temporary files that an interrupted process left."""
         for folder in (self.folder, self.folder / BLOCKS_FOLDER):
             for path in folder.glob(".*.part"):
                 path.unlink(missing_ok=True)
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file beside its name, flush it to the disk, rename it. Raises OSError."""
+    """Write a file under a temporary name, flush it to the disk and rename it. Raises OSError.
+
+    The temporary file is removed after an error.
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with part.open("wb") as file:
@@ -119,7 +132,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _flush_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk, where the system knows that."""
+    """Flush a folder's directory entries to the disk if the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -129,9 +142,10 @@ def _flush_folder(folder: Path) -> None:
 
 
 def open_store(folder: Path, manifest: Manifest) -> Store:
-    """Make a store, or open the one that is there to go on with it.
+    """Create a store in a folder, or open an existing one of the same study.
 
-    Raises SpecError where the folder holds results of something else, OSError, ToolMissing.
+    An existing store keeps its block size. Raises SpecError if the folder contains something else,
+    OSError, and MissingToolError without pyarrow.
     """
     import_arrow()
     there = require_same_study(folder, manifest)
@@ -145,9 +159,9 @@ def open_store(folder: Path, manifest: Manifest) -> Store:
 
 
 def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
-    """Return what is in a folder of the same results; None: it is empty, or not there.
+    """Return the manifest of a folder; None if the folder is empty or missing.
 
-    Raises SpecError where it holds something else.
+    Raises SpecError if it belongs to another study or contains something else.
     """
     if (folder / MANIFEST_NAME).exists():
         there = read_manifest(folder)
@@ -163,7 +177,8 @@ def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
 
 
 def read_store(folder: Path) -> Store:
-    """Open a store to read from it. Raises SpecError: also for a damaged block; ToolMissing."""
+    """Open a store for reading. Raises SpecError, also for a damaged block, and MissingToolError.
+    """
     import_arrow()
     store = Store(folder, read_manifest(folder))
     problems = Problems()
@@ -176,9 +191,9 @@ def read_store(folder: Path) -> Store:
 
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
-    """Keep other processes from writing into the folder; the lock ends with the process.
+    """Lock a folder against writing by other processes; the lock ends with the context or process.
 
-    Raises SpecError where another one has it.
+    Raises SpecError if another process has the lock. Systems without fcntl have no lock.
     """
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -196,12 +211,12 @@ def lock_folder(folder: Path) -> Iterator[None]:
             ) from None
         try:
             yield
-        finally:  # by hand: a process that is just being started may still share the file
+        finally:  # explicit: a child process may still share the file
             fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def _changed_study_error(folder: Path, found: Manifest, expected: Manifest) -> SpecError:
-    """Say which parts of the study are not those that the results are of."""
+    """Return the error that names the parts of the study that changed since the stored results."""
     names = dict.fromkeys([*found.identity, *expected.identity])
     other = [n for n in names if found.identity.get(n) != expected.identity.get(n)]
     parts = f"{', '.join(other[:3])}{' ...' if len(other) > 3 else ''}"

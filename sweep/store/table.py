@@ -1,4 +1,4 @@
-"""Table: columns of a store, read one at a time: a million variants fit into little memory."""
+"""Study table: read single columns of a store, so that a million variants fit into memory."""
 
 from __future__ import annotations
 
@@ -20,26 +20,29 @@ Values = TypeVar("Values", float, Reals)
 
 @dataclass(frozen=True)
 class PooledColumn:
-    """Numbers of a column: one of each variant, or several from a list; `rows` says of which."""
+    """The numbers of a column, several for each variant if it is a list.
+
+    `rows` (n,) holds the row of the variant of each value (n,).
+    """
 
     values: Reals
     rows: NDArray[np.int64]
 
 
 def to_display_unit(values: Values, column: StoreColumn) -> Values:
-    """Return values [SI] in the unit in which their column is shown."""
+    """Return values [SI] in the display unit of their column."""
     with np.errstate(over="ignore"):
         return (values - column.offset) / column.factor
 
 
 @dataclass(frozen=True)
 class StudyTable:
-    """The finished variants of a store, in the order of their numbers."""
+    """The stored variants of a study in the order of their numbers."""
 
     store: Store
 
     def read_reals(self, name: str) -> Reals:
-        """Return a column (n_variants,) as reals; NaN where a variant has no such number."""
+        """Return a column (n_variants,) as floats; NaN for missing and infinite values."""
         parts = [
             np.asarray(part.cast("float64").to_numpy(zero_copy_only=False), dtype=np.float64)
             for part in self._read_parts(name)
@@ -48,7 +51,7 @@ class StudyTable:
         return np.where(np.isfinite(found), found, np.nan)
 
     def read_pooled(self, name: str) -> PooledColumn:
-        """Return the numbers of a column of reals, whole numbers or lists; none are left out."""
+        """Return all finite numbers of a column of reals, integers or lists."""
         if next((c.type for c in self.store.manifest.measures if c.name == name), "") != "list":
             values = self.read_reals(name)
             rows = np.flatnonzero(~np.isnan(values))
@@ -64,7 +67,10 @@ class StudyTable:
         return PooledColumn(np.concatenate(found), np.concatenate(places))
 
     def read_categories(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
-        """Return a column of texts as places (n_variants,) in a list of the different ones."""
+        """Return a column of texts as indices (n_variants,) into the list of different texts.
+
+        The list is in the order of first occurrence.
+        """
         known: dict[str, int] = {}
         parts = []
         for part in self._read_parts(name):
@@ -76,22 +82,22 @@ class StudyTable:
 
     @cached_property
     def counts(self) -> dict[str, int]:
-        """How many variants ended how."""
+        """The number of variants by status."""
         places, names = self.read_categories("status")
         return {name: int(np.sum(places == k)) for k, name in enumerate(names)}
 
     @cached_property
     def is_done(self) -> NDArray[np.bool_]:
-        """Tell of which variants (n_variants,) the measures count."""
+        """Mask (n_variants,) of the finished variants, whose measures count."""
         places, names = self.read_categories("status")
         return places == names.index(DONE) if DONE in names else np.zeros(len(places), dtype=bool)
 
     @cached_property
     def draws(self) -> NDArray[np.int64]:
-        """Of which independent draw each variant (n_variants,) is.
+        """The index of the independent draw of each variant (n_variants,).
 
-        A draw is a sample, or a whole block or path; where nothing is drawn, it is the noise of a
-        replicate. All points of the grid, scenarios and variants see the same draws.
+        A draw is a sample, a block or a path; without random variables it is a replicate. All grid
+        points, scenarios and system variants share the same draws.
         """
         design = self.store.manifest.design
         if not design.count:
@@ -99,6 +105,7 @@ class StudyTable:
         return self.read_reals("sample").astype(np.int64) // design.group_size
 
     def _read_parts(self, name: str) -> list[Any]:
+        """Return a column of each block file as a pyarrow array."""
         parquet = import_arrow().parquet
         paths = self.store.paths()
         return [

@@ -1,4 +1,4 @@
-"""Command a2l: the description of generated C for a measurement and calibration tool."""
+"""Command a2l: write the A2L description of generated C."""
 
 from __future__ import annotations
 
@@ -16,18 +16,21 @@ def a2l(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write .a2l")],
     elf: Annotated[
-        Path | None, typer.Option("--elf", help="the linked program, with -g: gives addresses")
+        Path | None, typer.Option("--elf", help="linked program with debug information (-g), for addresses")
     ] = None,
     page: Annotated[
-        str | None, typer.Option(help="the calibration page; default X_default_cal")
+        str | None, typer.Option(help="the structure of the calibration page; default X_default_cal")
     ] = None,
     instance: Annotated[
-        str | None, typer.Option(help="the instance where the program has several: 'app.left'")
+        str | None, typer.Option(help="the instance if the program has several: 'app.left'")
     ] = None,
     sets: Sets = None,
     calibrations: Calibrations = None,
 ) -> None:
-    """Write what a tool may measure and calibrate in generated C (ASAM A2L 1.7.1).
+    """Write the A2L file (ASAM MCD-2 MC 1.7.1) of the C of an automaton.
+
+    It lists measurements and tunable parameters for a measurement and calibration tool. Addresses
+    come from the linked program.
 
     \b
     modewright a2l estimator --out estimator.a2l --elf ecu.elf
@@ -49,9 +52,9 @@ def a2l(
 
 
 def _missing_addresses(text: str, elf: Path | None) -> str:
-    """Return what an A2L has no addresses of, and why."""
+    """Return a note about missing addresses in an A2L text; empty if there are none."""
     if elf is None:
-        return "it has no addresses: link the C with -g and name the program by --elf"
+        return "it has no addresses: link the C with -g and give the program by --elf"
     if "/begin MEASUREMENT" in text and "ECU_ADDRESS" not in text:
         return f"its measurements have no addresses: {elf} has no instance of the automaton"
     return ""

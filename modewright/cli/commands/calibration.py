@@ -1,4 +1,4 @@
-"""Command calibration: pages for calibration tools, and what comes back from them."""
+"""Command calibration: export, import and recompute calibration pages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from modewright.runtime.output_files import OutputError, require_writable, write
 Automaton = Annotated[str, typer.Argument(help="an automaton: name or file")]
 PageOut = Annotated[Path, typer.Option("--out", "-o", help="write the page: .dcm, .cdfx or .csv")]
 Format = Annotated[
-    str | None, typer.Option("--format", help="dcm, cdfx or csv; that of the ending if absent")
+    str | None, typer.Option("--format", help="dcm, cdfx or csv; by default from the file name")
 ]
 
 calibration = typer.Typer(
@@ -44,7 +44,7 @@ def export_page(
     sets: Sets = None,
     as_json: Json = False,
 ) -> None:
-    """Write all tunable parameters and the numbers that were solved for them.
+    """Write the tunable parameters and the numbers that are computed from them.
 
     \b
     modewright calibration export estimator --out page.dcm
@@ -67,26 +67,26 @@ def export_page(
 @calibration.command(name="import", epilog=EXIT_CODES)
 def import_page(
     page: Annotated[Path, typer.Argument(help="a file of calibration data: .dcm, .cdfx, .csv")],
-    of: Annotated[str, typer.Option("--of", help="the automaton that it is for: name or file")],
+    of: Annotated[str, typer.Option("--of", help="the automaton of the page: name or file")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write a calibration: .yaml")],
     form: Format = None,
     name: Annotated[
-        str | None, typer.Option("--name", help="of the calibration; that of its file if absent")
+        str | None, typer.Option("--name", help="name of the calibration; by default that of its file")
     ] = None,
-    date: Annotated[str, typer.Option("--date", help="of the page: '2026-11-21'")] = "",
+    date: Annotated[str, typer.Option("--date", help="date of the page: '2026-11-21'")] = "",
     own_only: Annotated[
-        bool, typer.Option("--own-only", help="pass over names of other functions of the ECU")
+        bool, typer.Option("--own-only", help="ignore names of other functions of the ECU")
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Make a calibration of the language from a page of a calibration tool.
+    """Convert the page of a calibration tool to a calibration file (YAML).
+
+    Unknown names and values out of range are problems; no file is written then. Solved numbers are
+    compared with the computed ones, but not imported.
 
     \b
     modewright calibration import page.dcm --of estimator --out spec/rig_7.yaml
     modewright calibration import ecu.dcm --of estimator --own-only --out spec/rig_7.yaml
-
-    A name that is not known and a value outside of its range are problems: nothing is written.
-    Solved numbers are compared and never taken.
     """
     from modewright.api.calibrations import import_calibration
     from modewright.render import calibration as show_calibration, run as show
@@ -115,7 +115,7 @@ def resolve(
     sets: Sets = None,
     as_json: Json = False,
 ) -> None:
-    """Solve matrix exponentials and gains anew for other tunable parameters.
+    """Recompute matrix exponentials and gains for changed tunable parameters.
 
     \b
     modewright calibration resolve estimator --page page.dcm --out resolved.dcm
@@ -125,7 +125,7 @@ def resolve(
     from modewright.render import calibration as show_calibration, run as show
 
     if not (page or calibrations or sets):
-        raise typer.BadParameter("say for what: --page, --calibration or --set")
+        raise typer.BadParameter("name the new values with --page, --calibration or --set")
     name = _output_format(out, form)
     values = values_of(sets)
     with progress_spinner(f"solving {automaton}"), _report_problems_as_json(as_json):
@@ -140,7 +140,7 @@ def resolve(
 
 @contextmanager
 def _report_problems_as_json(as_json: bool) -> Iterator[None]:
-    """Print problems as JSON too, where that is asked for; they still end the command."""
+    """Print the problems of a SpecError as JSON if requested, and raise it again."""
     from modewright.api.checking import problem_json
     from modewright.render import run as show
 
@@ -154,6 +154,7 @@ def _report_problems_as_json(as_json: bool) -> Iterator[None]:
 
 
 def _require_format(form: str | None) -> None:
+    """Raise BadParameter if the format of a page is unknown."""
     from codegen.exchange.calibration.formats import FORMATS
 
     if form is not None and form not in FORMATS:
@@ -161,7 +162,10 @@ def _require_format(form: str | None) -> None:
 
 
 def _output_format(out: Path, form: str | None) -> str:
-    """Return the format that a page is written in. Raises OutputError before any work is done."""
+    """Return the format of a page by option or suffix. Raises OutputError if it is unknown.
+
+    The file must be writable; this is checked before any computation.
+    """
     from codegen.exchange.calibration.formats import FORMATS, format_name
 
     _require_format(form)

@@ -1,4 +1,4 @@
-"""Command check: all problems of specs."""
+"""Command check: report all problems of specs."""
 
 from __future__ import annotations
 
@@ -23,17 +23,19 @@ if TYPE_CHECKING:
 
 def check(
     specs: Annotated[list[str] | None, typer.Argument(help="specs: names or files")] = None,
-    every: Annotated[bool, typer.Option("--all", help="every spec below spec/")] = False,
+    every: Annotated[bool, typer.Option("--all", help="check all specs below spec/")] = False,
     as_json: Json = False,
     as_annotations: Annotated[
-        bool, typer.Option("--github", help="print problems as annotations of GitHub Actions")
+        bool, typer.Option("--github", help="print problems as GitHub Actions annotations")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write the problems as SARIF 2.1.0")] = None,
     watch: Annotated[
-        bool, typer.Option("--watch", help="check again whenever a spec changes; Ctrl-C ends it")
+        bool, typer.Option("--watch", help="check again when a spec changes, until Ctrl-C")
     ] = False,
 ) -> None:
     """Report all problems of specs, with places, codes (docs/problems.md) and help.
+
+    Exit code 1 if there are errors; warnings do not change it.
 
     \b
     modewright check estimator spec/ev_driveline/plant.yaml
@@ -62,7 +64,10 @@ def check(
 def _check_specs(
     names: list[str], named: int, as_json: bool, as_annotations: bool, sarif: Path | None
 ) -> bool:
-    """Check specs and tell what was found, of those that are named their steps; is all fine?"""
+    """Check specs, report their problems and return whether there are no errors.
+
+    Without errors the step limits of the first `named` specs are printed, too.
+    """
     from modewright.api import checking
 
     found = [checking.check_spec(name) for name in names]
@@ -79,14 +84,14 @@ def _check_specs(
 def _report_problems(
     problems: Sequence[Problem], specs: int, as_json: bool, as_annotations: bool = False
 ) -> None:
-    """Print the problems of some specs: as JSON, as annotations, or for a person."""
+    """Print problems as JSON, as GitHub annotations, or as text with the number of specs."""
     from language.text.diagnostic import render_all
     from modewright.api.checking import problem_json
     from modewright.render.github_annotations import annotation_lines
 
     if as_json:
-        told = [problem_json(problem) for problem in problems]
-        print(json.dumps({"problems": told}, indent=2, allow_nan=False))
+        entries = [problem_json(problem) for problem in problems]
+        print(json.dumps({"problems": entries}, indent=2, allow_nan=False))
         return
     if as_annotations:
         print(annotation_lines(problems), end="")
@@ -99,12 +104,14 @@ def _report_problems(
 
 
 def _report_limits(found: Sequence[CheckResult]) -> None:
+    """Print the step limits of checked automata."""
     for each in found:
         for line in each.limits:
             console().print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 def _write_sarif(path: Path, problems: Sequence[Problem], silent: bool) -> None:
+    """Write problems as SARIF; report the file unless silent."""
     from modewright.render.sarif import to_sarif
 
     text = json.dumps(to_sarif(problems), indent=2, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Command compare: two runs, signal by signal."""
+"""Command compare: compare two runs signal by signal."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def compare(
     a: Annotated[str, RunArgument],
     b: Annotated[str, RunArgument],
     relative: Annotated[
-        float, typer.Option(min=0.0, help="a signal may differ by this share of its peak in A")
+        float, typer.Option(min=0.0, help="tolerance of signals, relative to their peak in A")
     ] = 0.0,
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(help="a signal may differ by this, in its unit: '*.T_hs=0.5' (repeatable)"),
+        typer.Option(help="tolerance of signals in their unit: '*.T_hs=0.5' (repeatable)"),
     ] = None,
-    slack: Annotated[float, typer.Option(min=0.0, help="modes may disagree for so long [s]")] = 0.0,
+    slack: Annotated[float, typer.Option(min=0.0, help="time for which modes may differ [s]")] = 0.0,
     signals: Signals = None,
     start: From = None,
     end: To = None,
@@ -41,11 +41,12 @@ def compare(
 ) -> None:
     """Compare two runs: signals, modes, transitions.
 
-    Exit code 0: within tolerance; 1: not, or a signal or a part of the time is in one run only.
+    A run is a .csv or .parquet file, or system:scenario. Exit code 0: the runs agree within
+    tolerance; 1: they do not, or a signal or a time span exists in one run only.
 
     \b
     modewright compare run.csv ev_driveline:tip_out
-    modewright compare a.csv b.parquet --relative 1e-6 --tolerance '*.T_hs=0.5' --plot apart.png
+    modewright compare a.csv b.parquet --relative 1e-6 --tolerance '*.T_hs=0.5' --plot diff.png
     """
     from modewright.api import runs
     from modewright.render import run as show
@@ -73,6 +74,7 @@ def compare(
 
 
 def _parse_tolerances(texts: list[str] | None) -> dict[str, float]:
+    """Return tolerances by signal pattern from texts `signal=number`. Raises BadParameter."""
     found = {}
     for text in texts or []:
         name, _, value = text.partition("=")

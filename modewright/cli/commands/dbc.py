@@ -1,4 +1,4 @@
-"""Command dbc: inputs and outputs of an automaton as messages of a CAN bus."""
+"""Command dbc: write inputs and outputs of an automaton as CAN messages."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from modewright.runtime.output_files import require_writable, write_files
 def dbc(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write .dbc")],
-    first: Annotated[str, typer.Option(help="identifier of the first message")] = "0x100",
-    is_fd: Annotated[bool, typer.Option("--fd", help="frames of CAN FD, up to 64 bytes")] = False,
+    first: Annotated[str, typer.Option(help="identifier of the first CAN message")] = "0x100",
+    is_fd: Annotated[bool, typer.Option("--fd", help="use CAN FD frames of up to 64 bytes")] = False,
     sets: Sets = None,
     calibrations: Calibrations = None,
 ) -> None:
-    """Write what an automaton receives and sends as a CAN database: each value with its C bits.
+    """Write a CAN database (DBC) of the inputs and outputs of an automaton.
+
+    Each signal has the bits of its C type.
 
     \b
     modewright dbc supervisor --out supervisor.dbc

@@ -1,4 +1,4 @@
-"""Command demo: the product at work."""
+"""Command demo: simulate the example, compare it with its C and draw it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def demo(
         "build"
     ),
 ) -> None:
-    """Show the product: a tip-out, engine against C, a picture.
+    """Run the example: a tip-out of an EV driveline, engine against C, with a figure.
 
     \b
     modewright demo --out build

@@ -1,4 +1,4 @@
-"""Command diagnose: which physics a spec lacks to show what was recorded."""
+"""Command diagnose: find the effects that a spec lacks to reproduce recordings."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ if TYPE_CHECKING:
     from diagnosis.report.diagnosis_report import DiagnosisReport
 
 DURATION_PATTERN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
+"""The form of a duration."""
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 Train = Annotated[
-    list[Path], typer.Option("--train", help="a recording to learn from (repeatable)")
+    list[Path], typer.Option("--train", help="recording for the diagnosis (repeatable)")
 ]
 Map = Annotated[
-    str | None, typer.Option("--map", "-m", help="a map of columns, if not that of the spec")
+    str | None, typer.Option("--map", "-m", help="map of columns; by default that of the spec")
 ]
 
 
 def folder_of(text: str) -> Path:
-    """Return the folder that a text names: none is named by an empty one."""
+    """Return the path of a folder. Raises BadParameter for an empty text."""
     if not text.strip():
         raise typer.BadParameter("name a folder")
     return Path(text)
@@ -38,29 +39,29 @@ def folder_of(text: str) -> Path:
 Out = Annotated[
     Path,
     typer.Option(
-        "--out", "-o", help="the folder of the results", parser=folder_of, metavar="<path>"
+        "--out", "-o", help="folder for the results", parser=folder_of, metavar="<path>"
     ),
 ]
 HeldOut = Annotated[
     list[Path] | None,
-    typer.Option("--held-out", help="a recording opened after the verdict (repeatable)"),
+    typer.Option("--held-out", help="recording for validation after the verdict (repeatable)"),
 ]
 Effects = Annotated[
-    Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
+    Path | None, typer.Option("--effects", help="folder of effects instead of the library")
 ]
 Thresholds = Annotated[
     str,
     typer.Option(
         "--thresholds",
-        help="what effects must gain: kept (by an earlier bootstrap), bootstrap, usual, a file",
+        help="acceptance thresholds: kept (of an earlier bootstrap), bootstrap, usual, or a file",
     ),
 ]
 Budget = Annotated[
-    str, typer.Option("--budget", help="the longest time it may take: '90 s', '10min'")
+    str, typer.Option("--budget", help="time limit: '90 s', '10min'")
 ]
-Anyway = Annotated[bool, typer.Option("--anyway", help="conclude from recordings with errors too")]
+Anyway = Annotated[bool, typer.Option("--anyway", help="also use recordings with errors")]
 FailOn = Annotated[
-    str | None, typer.Option("--fail-on", help="a verdict that gives exit code 1: effect")
+    str | None, typer.Option("--fail-on", help="exit with code 1 for this verdict, e.g. effect")
 ]
 VERDICTS = ("effect", "nothing_missing", "unknown", "ambiguous")
 
@@ -78,10 +79,10 @@ def diagnose(
     fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
-    """Say which physics a model lacks to show what was recorded, and write a model that has it.
+    """Find the effects that a model lacks to reproduce recordings; write the extended model.
 
-    Into the folder go report.html, verdict.json, variant.yaml and figures. Exit code 0 whenever
-    a verdict was written.
+    The folder gets report.html, verdict.json, variant.yaml and figures. Exit code 0 if a verdict
+    was written.
 
     \b
     modewright diagnose blind_driveline --train runs/*.csv --held-out c.csv --out found
@@ -89,7 +90,7 @@ def diagnose(
     modewright diagnose plant.yaml --train a.csv --train b.csv --thresholds bootstrap --out found
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
     """
-    from modewright.api.diagnosis import diagnose as diagnosed
+    from modewright.api.diagnosis import diagnose as run_diagnosis
 
     if fail_on is not None and fail_on not in VERDICTS:
         raise typer.BadParameter(f"one of {', '.join(VERDICTS)}", param_hint="--fail-on")
@@ -97,41 +98,42 @@ def diagnose(
     make_folder(out)
     try:
         with usage_errors():
-            found = diagnosed(
+            report = run_diagnosis(
                 spec, train, held_out or (), mapping, effects,
                 thresholds=thresholds, out=out, budget=seconds, anyway=anyway, tell=report_progress,
             )  # fmt: skip
     except KeyboardInterrupt:
-        print(f"what was found is kept in {out}; the same command goes on from there",
+        print(f"intermediate results are in {out}; the same command goes on from there",
               file=sys.stderr)  # fmt: skip
         raise
-    _report_dossier(found, out, as_json)
-    if found.verdict.verdict == fail_on:
+    _print_report(report, out, as_json)
+    if report.verdict.verdict == fail_on:
         raise typer.Exit(PROBLEMS)
 
 
-def _report_dossier(found: DiagnosisReport, out: Path, as_json: bool) -> None:
+def _print_report(report: DiagnosisReport, out: Path, as_json: bool) -> None:
+    """Print the report of a diagnosis as JSON or as text."""
     from diagnosis.report.diagnosis_report import verdict_to_json
     from diagnosis.report.variant_file import missing_effect_notes
     from modewright.render import diagnosis as show_diagnosis, run as show
 
-    for text in missing_effect_notes(found):
+    for text in missing_effect_notes(report):
         print(f"note: {text}", file=sys.stderr)
     if as_json:
-        show.print_json(verdict_to_json(found.verdict))
+        show.print_json(verdict_to_json(report.verdict))
     else:
-        show_diagnosis.print_dossier(console(), found)
+        show_diagnosis.print_dossier(console(), report)
         report_written_files([out / "report.html"])
 
 
 def report_progress(text: str) -> None:
-    """Tell on stderr what a stage has found."""
+    """Print a line of progress to stderr unless the console is quiet."""
     if not console().quiet:
         print(text, file=sys.stderr, flush=True)
 
 
 def seconds_of(text: str) -> float:
-    """Return a time [s] written as `90 s` or `10min`."""
+    """Return the duration [s] of a text such as `90 s` or `10min`. Raises BadParameter."""
     match = DURATION_PATTERN.fullmatch(text.strip())
     if not match:
         raise typer.BadParameter(f"`{text}` is not a time like `90 s`", param_hint="--budget")

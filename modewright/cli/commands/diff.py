@@ -1,4 +1,4 @@
-"""Command diff: what distinguishes two specs, in their own terms."""
+"""Command diff: print the differences of two specs in terms of the language."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from modewright.runtime.output_files import require_writable, write_files
 
 def diff(
     before: Annotated[str, typer.Argument(help="a spec: name or file; also REVISION:name or file")],
-    after: Annotated[str, typer.Argument(help="another one of its kind")],
-    html: Annotated[Path | None, typer.Option(help="write a page")] = None,
+    after: Annotated[str, typer.Argument(help="another spec of the same kind")],
+    html: Annotated[Path | None, typer.Option(help="write an HTML page")] = None,
     as_json: Json = False,
     exit_code: Annotated[
-        bool, typer.Option("--exit-code", help="exit code 1 if something differs")
+        bool, typer.Option("--exit-code", help="exit with code 1 if the specs differ")
     ] = False,
 ) -> None:
-    """Tell what differs between two specs: values, guards, waits, modes, equations.
+    """Print the differences of two specs: values, guards, waits, modes, equations.
+
+    A spec may be of a Git revision.
 
     \b
     modewright diff driveline driveline_load

@@ -1,4 +1,4 @@
-"""Command doctor: whether everything needed is there and works."""
+"""Command doctor: check the installation."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from modewright.cli.common.options import Json
 
 
 def doctor(as_json: Json = False) -> None:
-    """Look at Python, packages, compiler and cache, and run a self-test.
+    """Check Python, packages, compiler and cache, and run a self-test.
 
-    Exit code 3: the compiler or a package is missing; 1: something else is wrong.
+    Exit code 3: the compiler or a package is missing; 1: another check failed.
 
     \b
     modewright doctor
