@@ -1,6 +1,6 @@
-"""Compare: the interpreter and the compiled C of one automaton, tick by tick, bit by bit.
+"""Comparison: the interpreter against the compiled C of one automaton, tick by tick, bit by bit.
 
-The process that interprets loads no compiled code of ours: the C runs as a program of its own.
+The C runs as a separate executable; the process of the interpreter loads no compiled code.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from language.ir.program import Program, unqualified_name
 from lockstep.tick_log import TickLog
 
 MAX_COUNTED_STEPS = 5000
-"""Steps whose instructions are counted: each of them is repeated forty times."""
+"""Maximum number of steps whose instructions are counted; each of them is repeated forty times."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The first value that differs: where, and both bit patterns."""
+    """The first value that differs: tick, time [s], mode and signal, and the value with its bits
+    in both.
+    """
 
     tick: int
     time: float
@@ -34,17 +36,18 @@ class Difference:
     compiled: str
 
     def __str__(self) -> str:
-        """Return one line."""
+        """Return the difference as one line of text."""
         where = f"t = {self.time:.9g} s (tick {self.tick}), mode `{self.mode}`"
         return f"{where}: `{self.signal}` is {self.engine} in the engine, {self.compiled} in C"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How many ticks and values were compared, how many differ, and the first that does.
+    """The result of a comparison: number of ticks, compared values and differing values.
 
-    Of a continuous automaton a tick is a major step; `note` says what was not compared, and why.
-    `instructions` of the first steps are counted on a target.
+    A tick of a continuous automaton is a major step. `first` is the first difference. `note` tells
+    what was not compared, and why. `instructions` holds the counts of the first steps on a target,
+    if they were requested.
     """
 
     name: str
@@ -59,7 +62,7 @@ class Verdict:
 
     @property
     def is_equal(self) -> bool:
-        """Tell whether no bit differs."""
+        """Tell whether no value differs."""
         return self.differing == 0
 
 
@@ -69,34 +72,40 @@ def compare(
     compiler: str | None = None,
     machine: Machine = HOST,
 ) -> Verdict:
-    """Compile the tape's program, run it on the tape's inputs and compare every value.
+    """Compile the Program of a tick log, run it on the inputs of the log, and compare all values.
 
-    Raises ToolMissing, BuildError.
+    Raises MissingToolError, BuildError.
     """
     with build_executable(log.program, flags, compiler, machine) as target:
         return compare_output(log, machine.run(target, b"".join(log.inputs)))
 
 
 def add_instruction_counts(verdict: Verdict, log: TickLog, flags: Sequence[str] = FLAGS) -> Verdict:
-    """Return a verdict with the instructions of its first steps on a Cortex-M4F."""
+    """Return a verdict with the instruction counts of the first steps on a Cortex-M4F.
+
+    Raises MissingToolError, BuildError.
+    """
     records = b"".join(log.inputs[:MAX_COUNTED_STEPS])
     return replace(verdict, instructions=count_instructions(log.program, records, flags))
 
 
 def compare_output(log: TickLog, output: bytes) -> Verdict:
-    """Return the verdict on what the C of the tape's program wrote for the tape's inputs."""
+    """Return the verdict on the output that the C wrote for the inputs of a tick log.
+
+    Raises ValueError if the output has another length than the values of the log.
+    """
     size, ticks = log.record_size, len(log.values)
     differing, first = 0, None
     if len(output) != size * ticks:
         raise ValueError(f"C wrote {len(output)} bytes, {size * ticks} were expected")
     for tick in range(ticks):
-        ours, theirs = log.values[tick], output[tick * size : (tick + 1) * size]
-        if ours == theirs:
+        engine, compiled = log.values[tick], output[tick * size : (tick + 1) * size]
+        if engine == compiled:
             continue
-        different = _differing_positions(log, ours, theirs)
-        differing += len(different)
-        if different and first is None:
-            first = _describe_difference(log, tick, different[0], theirs)
+        positions = _differing_positions(log, engine, compiled)
+        differing += len(positions)
+        if positions and first is None:
+            first = _describe_difference(log, tick, positions[0], compiled)
     return Verdict(
         log.name,
         log.program.name,
@@ -109,24 +118,27 @@ def compare_output(log: TickLog, output: bytes) -> Verdict:
 
 
 def skipped_verdict(name: str, program: Program, reason: str) -> Verdict:
-    """Return the verdict on an instance of which nothing can be compared."""
+    """Return the verdict on an instance that was not compared; `reason` is its note."""
     return Verdict(name, program.name, 0, 0, 0, 0, None, reason)
 
 
-def _differing_positions(log: TickLog, ours: bytes, theirs: bytes) -> list[int]:
-    """Return the positions that differ; all NaNs are one (rule 17c)."""
-    pairs = zip(log.unpack(ours), log.unpack(theirs), strict=True)
+def _differing_positions(log: TickLog, engine: bytes, compiled: bytes) -> list[int]:
+    """Return the positions of the values that differ in two records; all NaN are equal (rule
+    17c).
+    """
+    pairs = zip(log.unpack(engine), log.unpack(compiled), strict=True)
     return [
         position
         for position, (a, b) in enumerate(pairs)
-        if log.value_bytes(ours, position) != log.value_bytes(theirs, position)
+        if log.value_bytes(engine, position) != log.value_bytes(compiled, position)
         and (a == a or b == b)
     ]
 
 
-def _describe_difference(log: TickLog, tick: int, position: int, theirs: bytes) -> Difference:
-    ours = log.values[tick]
-    values, other = log.unpack(ours), log.unpack(theirs)
+def _describe_difference(log: TickLog, tick: int, position: int, compiled: bytes) -> Difference:
+    """Return the difference at a position of a tick; `compiled` is the record of the C."""
+    engine = log.values[tick]
+    values, other = log.unpack(engine), log.unpack(compiled)
     mode = values[log.names.index("memory.mode")]
     period = float(log.program.period or log.program.major_step)
     return Difference(
@@ -134,12 +146,15 @@ def _describe_difference(log: TickLog, tick: int, position: int, theirs: bytes) 
         time=log.start + tick * period,
         mode=log.program.mode_name(int(mode)),
         signal=unqualified_name(log.names[position]),
-        engine=_format_value(log, values[position], ours, position),
-        compiled=_format_value(log, other[position], theirs, position),
+        engine=_format_value(log, values[position], engine, position),
+        compiled=_format_value(log, other[position], compiled, position),
     )
 
 
 def _format_value(log: TickLog, value: float | int, record: bytes, position: int) -> str:
+    """Return a value of a record as text, with its bits in hexadecimal, most significant byte
+    first.
+    """
     bits = log.value_bytes(record, position)[::-1].hex()
     text = (
         shortest_decimal(value, log.program.number_type)

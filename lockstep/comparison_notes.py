@@ -1,4 +1,4 @@
-"""Coverage: what of a simulation was compared with C, and why the rest was not."""
+"""Comparison notes: which parts of a simulation were compared with C, and why others were not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from lockstep.comparison import Verdict, skipped_verdict
 def add_notes(
     verdicts: Sequence[Verdict], system: System, scenario: Scenario, trajectory: Trajectory
 ) -> list[Verdict]:
-    """Return the verdicts with notes, and one on each instance that has none."""
+    """Return the verdicts with notes, and one for each instance of the system that has none.
+
+    A note on a continuous instance is added if it was compared up to a part of the horizon, unless
+    the simulation stopped.
+    """
     scenario = resolve_recording(system, scenario)
     verdict_by_instance = {verdict.name: verdict for verdict in verdicts}
     for name, program in programs_of(system, scenario).items():
@@ -28,6 +32,7 @@ def add_notes(
 
 
 def _skip_reason(program: Program) -> str:
+    """Return the reason why an instance was not compared."""
     if "step" not in program.blocks:
         reason = "not compared: an input varies inside its major steps, which C cannot be given"
         return f"{reason}; `steps` and tables with `hold: previous` can be"
@@ -35,7 +40,11 @@ def _skip_reason(program: Program) -> str:
 
 
 def _add_end_note(verdict: Verdict, program: Program, scenario: Scenario) -> Verdict:
-    """A continuous instance is compared until something outside happens inside a major step."""
+    """Return the verdict on a continuous instance with a note if it was compared to a part of the
+    horizon.
+
+    The comparison ends at the first outside event inside a major step.
+    """
     assert scenario.horizon is not None
     steps = scenario.horizon // program.major_step + 1
     if verdict.ticks >= steps:

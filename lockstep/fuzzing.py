@@ -1,4 +1,4 @@
-"""Fuzzing: every sequence that libFuzzer tried on generated C, done again by the engine."""
+"""Fuzzing: replays every sequence that libFuzzer tried on generated C in the interpreter."""
 
 from __future__ import annotations
 
@@ -16,15 +16,19 @@ from lockstep.comparison import Difference, compare
 from lockstep.tick_log import TickLog
 
 RUNS, TICKS, SEED = 20_000, 24, 1
+"""Default number of executions of libFuzzer, of ticks of a sequence, and the default seed."""
 MAX_COMPARED = 20
-"""Sequences with another sum of which values are compared one by one."""
+"""Maximum number of sequences with a different checksum that are compared value by value."""
 
 
 @dataclass(frozen=True)
 class FuzzReport:
-    """What came of fuzzing: sequences that `runs` tried, how many differ from each other, their
-    ticks and transitions, `edges` of the C that they came along, the `modes` that they were in,
-    what sanitizers found, and `differing` sequences with the `first` value that is another one.
+    """The result of fuzzing.
+
+    `runs` executions gave `distinct` sequences with `ticks` and `transitions` in total, which
+    covered `edges` of the C and reached `modes`. `findings` are the errors that sanitizers
+    reported. `differing` is the number of sequences whose values differ, `first` the first
+    difference.
     """
 
     program: str
@@ -40,7 +44,7 @@ class FuzzReport:
 
     @property
     def is_clean(self) -> bool:
-        """Tell whether something was tried, and nothing was found."""
+        """Tell whether at least one tick was executed, without a finding or difference."""
         return self.ticks > 0 and not self.findings and not self.differing
 
 
@@ -51,19 +55,22 @@ def fuzz(
     ticks: int = TICKS,
     seed: int = SEED,
 ) -> FuzzReport:
-    """Let libFuzzer look for ways through the C of a sampled Program, and compare each with the
-    engine's; `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    """Run libFuzzer on the C of a sampled Program and compare every sequence with the interpreter.
+
+    Checksums are compared first, then single values. `ranges` gives ranges of inputs by name.
+    Raises MissingToolError, BuildError.
     """
     run = run_fuzzer(program, ranges, runs, ticks, seed)
     table = word_table(program, ranges)
     empty_log = TickLog(program, program.name)
-    done = transitions = differing = 0
+    tick_count = transitions = differing = 0
     modes: set[int] = set()
     first: Difference | None = None
     known = dict(run.sequences)
     for sequence, checksum in known.items():
         log = _replay_sequence(empty_log, table, sequence, modes)
-        done, transitions = done + len(log.values), transitions + log.transitions
+        tick_count += len(log.values)
+        transitions += log.transitions
         if zlib.crc32(b"".join(log.values)) == checksum:
             continue
         verdict = compare(log) if differing < MAX_COMPARED else None
@@ -75,7 +82,7 @@ def fuzz(
         program.name,
         len(run.sequences),
         len(known),
-        done,
+        tick_count,
         transitions,
         run.edges,
         names,
@@ -88,7 +95,9 @@ def fuzz(
 def _replay_sequence(
     empty_log: TickLog, table: list[WordValues], sequence: bytes, modes: set[int]
 ) -> TickLog:
-    """Return what the engine does with a sequence; the modes that it is in are noted."""
+    """Return the tick log of a sequence in the interpreter; modes that it reaches are added to
+    `modes`.
+    """
     program, log = empty_log.program, copy(empty_log)
     log.inputs, log.values, engine = [], [], Interpreter(program)
     inputs = [(v.name, CONVERTER_OF_TYPE[v.type]) for v in tick_inputs(program)]

@@ -1,4 +1,4 @@
-"""Taping: a system is simulated, and what each of its instances read and carried is kept."""
+"""Tick log: simulates a system and records the inputs and retained variables of each instance."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ from language.ir.program import Program
 from language.model.system import Scenario, System
 
 REAL_FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
-"""How a record keeps a real; whole numbers and truth values take 8 bytes."""
+"""The format of a real in a record by its number type; all other values take 8 bytes."""
 
 
 @dataclass
 class TickLog:
-    """What one instance read and carried in each tick of the interpreter."""
+    """The inputs and retained variables of one instance in each tick of the interpreter.
+
+    `start` is the time [s] of tick 0. `inputs` and `values` hold one record for each tick.
+    """
 
     program: Program
     name: str
@@ -52,7 +55,7 @@ class TickLog:
         self._slices = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
 
     def record_tick(self, stepper: Stepper) -> None:
-        """Keep the inputs, a new calibration and the values of the tick that was just done."""
+        """Append the inputs, a changed calibration page, and the values after a tick."""
         inputs = [float(stepper.get(name)) for name in self._input_names]
         page = [stepper.get(name) for name in self._tunable_names]
         record = self._input.pack(*inputs, float(page != self._page))
@@ -64,7 +67,10 @@ class TickLog:
         self.transitions += self._count_transitions(stepper)
 
     def _count_transitions(self, stepper: Stepper) -> int:
-        """Return how many transitions fired in a tick; of a step whether a mode is another."""
+        """Return the number of transitions that fired in a tick.
+
+        For a continuous automaton it is 1 if a mode changed in the major step, else 0.
+        """
         if self.program.period is not None:
             return len(fired_transitions(self.program, stepper))
         before = self._modes
@@ -86,12 +92,15 @@ class TickLog:
 
     @property
     def record_size(self) -> int:
-        """The bytes of a record of values."""
+        """The size of a record of values [bytes]."""
         return self._value.size
 
 
 def record_ticks(system: System, scenario: Scenario) -> tuple[Trajectory, dict[str, TickLog]]:
-    """Simulate; return the trajectory and a tape of each instance by name."""
+    """Simulate a scenario; return the trajectory and the tick log of each instance by name.
+
+    An instance that executed no tick has no log.
+    """
     logs: dict[str, TickLog] = {}
 
     def ticked(name: str, used: Program, stepper: Stepper) -> None:

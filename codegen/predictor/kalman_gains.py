@@ -1,4 +1,6 @@
-"""Kalman gains of a linear model, sample by sample, in C that is compiled for its size."""
+"""Kalman gains of a linear model, sample by sample, in C that is compiled for the size of the
+model.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,14 @@ from codegen.toolchain.templates import render
 
 Reals = NDArray[np.float64]
 MAX_SAMPLES = 5000
-"""Samples after which a gain that still changes is taken for the steady one."""
+"""Maximum number of samples; a gain that still changes then is taken as the steady-state gain."""
 STEADY_TOLERANCE = 1e-6
-"""A gain that changes by less from sample to sample, of its largest entry, is steady."""
+"""Relative change of a gain from sample to sample, in terms of its largest entry, below which it is
+
+steady.
+"""
 FLAGS = (*flags_at_level("Og"), "-shared", "-fPIC", "-w")
+"""Compiler flags of the recursion."""
 
 
 def compute_kalman_gains(
@@ -37,12 +43,15 @@ def compute_kalman_gains(
     transient_samples: int,
     max_samples: int = MAX_SAMPLES,
 ) -> tuple[Reals, Reals, Reals] | None:
-    """Return the gains of the `transient_samples` samples (first, states, seen), the one that stays, and the
-    covariance then.
+    """Return transient gains, the steady-state gain, and the covariance after the last computed
+    sample.
 
-    Of x(k+1) = phi x(k) + w, y = c x + v with covariance `q` of w, variances `r` (seen,) of v,
-    from a covariance `initial_covariance`. One that still changes after `max_samples` samples is taken as it is then.
-    None where they grow beyond all bounds. Raises ToolMissing, BuildError.
+    The model is x(k+1) = phi x(k) + w, y = c x + v. `q` (states, states) is the covariance of w,
+    `r` (outputs,) holds the variances of v, `initial_covariance` (states, states) is the covariance
+    before the first sample. The transient gains (transient_samples, states, outputs) are those of
+    the first samples. The recursion goes on until the gain changes by less than STEADY_TOLERANCE,
+    or up to `max_samples`; the last gain (states, outputs) is the steady one. Returns None if a
+    gain exceeds all bounds. Raises MissingToolError, BuildError.
     """
     outputs, states = c.shape
     transient, steady = np.empty((transient_samples, states, outputs)), np.empty((states, outputs))
@@ -59,7 +68,9 @@ def compute_kalman_gains(
 
 @cache
 def _compile_recursion(states: int, outputs: int) -> Any:
-    """Return the compiled recursion for a size, kept from an earlier run if there was one."""
+    """Return the compiled C function of the recursion for a size, from the cache if it was built
+    before.
+    """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         source = Path(name) / "kalman_gains.c"
         source.write_text(

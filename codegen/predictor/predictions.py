@@ -1,4 +1,4 @@
-"""Runs: what a predictor is given of recordings, and what it foresees of them."""
+"""Predictions: the arrays that a predictor reads of recordings, and the arrays that it returns."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a run gave: `innovations` and what the model showed, `seen` (samples, seen); `states`
-    (samples, states), `modes` (samples,); `done` samples before a value left all bounds.
+    """The result of a predictor on one recording.
+
+    `innovations` and `outputs` of the model have the shape (samples, outputs), `states` (samples,
+    states), `modes` (samples,). `completed` is the number of samples before a state diverged;
+    entries after that are not valid.
     """
 
     innovations: Reals
@@ -27,11 +30,12 @@ class Prediction:
 
 @dataclass(frozen=True)
 class StackedRecordings:
-    """Recordings one after the other in C-contiguous arrays: `inputs` (samples, inputs), and
-    `measured` (samples, seen) with NaN where nothing is known.
+    """Several recordings, stacked along the samples in C-contiguous arrays.
 
-    Recording r has the samples from `starts[r]` to `starts[r + 1]`, of which the first `skips[r]`
-    do not count; its inputs are held, or run straight in between where `linear[r]`.
+    `inputs` has the shape (samples, inputs) and `measured` (samples, outputs), with NaN where
+    nothing was measured. Recording r has the samples from `starts[r]` up to `starts[r + 1]`. Its
+    first `burn_in[r]` samples do not count in sums. Its inputs are linear between samples if
+    `is_first_order_hold[r]`, else constant.
     """
 
     inputs: Reals
@@ -43,9 +47,11 @@ class StackedRecordings:
 
 @dataclass(frozen=True)
 class StackedPrediction:
-    """What the runs of several recordings gave, one after the other as in a Prediction.
+    """The results of a predictor on several recordings, stacked along the samples.
 
-    `squares` and `counts` (recordings, seen) are the sums of the squares that count, and how many.
+    `completed` (recordings,) gives the number of samples of each recording before a state diverged.
+    `squared_sums` and `counts` (recordings, outputs) are the sums of squared innovations, and the
+    number of innovations in them.
     """
 
     stacked: Prediction
@@ -55,7 +61,7 @@ class StackedPrediction:
     counts: Reals
 
     def split(self) -> tuple[Prediction, ...]:
-        """Return the run of each recording, views of what is here."""
+        """Return the result of each recording, with views of the stacked arrays."""
         stacked, edges = self.stacked, pairwise(self.starts.tolist())
         return tuple(
             Prediction(

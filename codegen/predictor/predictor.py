@@ -1,4 +1,8 @@
-"""Predictor: a continuous automaton in C that follows recorded signals, corrected by a gain."""
+"""Predictor: compiled one-step prediction of recordings by a continuous automaton, with gains.
+
+At each sample the state is corrected: x += K (y - h(x)). `build_predictor` compiles the library of
+a Program, `Predictor` loads it.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +37,13 @@ from codegen.toolchain.templates import render
 from language.ir.program import Program, unqualified_name
 
 REMOVABLE_GROUPS = ("equation.", "work.")
-"""What is set for those who look at an instance or at a step: beyond that nothing happens."""
+"""Prefixes of variables that may be removed if nothing reads them; they have no other effect."""
 
 
 def slice_to_outputs(program: Program) -> Program:
-    """Return what C runs of a Program, less the equations that neither it nor an output reads.
+    """Return the Program that C executes, without equations that neither it nor an output reads.
 
-    Its tunable parameters and inputs stay the same, or the Program does.
+    If the removal would change the tunable parameters or inputs, they are kept.
     """
     step_program = restrict_to_step(program)
     sliced = remove_dead_stores(step_program, REMOVABLE_GROUPS)
@@ -52,15 +56,15 @@ def slice_to_outputs(program: Program) -> Program:
 
 
 def _external_interface(program: Program, step_program: Program) -> tuple[object, ...]:
-    """What a caller sets from outside: tunable parameters, and inputs as they are held in what is
-    `step_program` of it.
+    """Return what a caller sets: the tunable parameters, and the inputs that `step_program`
+    retains.
     """
     held_inputs = (v.name for v in step_program.variables if v.name.startswith("before."))
     return *tunable_constants(program), *held_inputs
 
 
 def load_predictor_library(path: Path) -> Any:
-    """Return the library of a predictor (codegen/templates/predictor/predictor.c.jinja)."""
+    """Load the shared library of a predictor (codegen/templates/predictor/predictor.c.jinja)."""
     library = ctypes.CDLL(str(path))
     pointer, whole = ctypes.c_void_p, ctypes.c_long
     library.modewright_differences.argtypes = [
@@ -93,21 +97,29 @@ LIBRARY_FLAGS = (
     *flags_at_level("O1"),
     *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
 )
-"""One file, so that all is inlined. Recordings are followed as soon as with -O2, which compiles for
-a tenth longer. No calibration tool writes into the page of a predictor: not volatile, a step takes
-0.7 of the time."""
+"""Compiler flags of a predictor. All code is in one file, so that it can be inlined. -O1 gives the
+
+same speed as -O2 and compiles 10 % faster. No calibration tool writes to the page of a predictor,
+so `volatile` is removed: a step then takes 70 % of the time.
+"""
 
 STEADY_GAIN_DIMENSIONS = 3
-"""Dimensions of steady gains that all points have in common: (modes, states, seen)."""
+"""Number of dimensions of steady-state gains that all points share: (modes, states, outputs)."""
 
 MATH_SOURCE = re.compile(r"ha_mathf?\.c")
+"""The source file of ha_math."""
 
 FUNCTION_START = re.compile(r"^(?=\w+ ha_\w+\()", re.MULTILINE)
+"""The begin of a function of ha_math."""
 
 
 @dataclass(frozen=True)
 class PredictorColumns:
-    """What the arrays of a predictor hold, in their order: names, and `page` with its defaults."""
+    """The names of the columns of a predictor's arrays in their order.
+
+    `input_types` are the C types of the inputs, `modes` the numbers of the modes. `page` gives the
+    tunable parameters with their defaults.
+    """
 
     name: str
     states: tuple[str, ...]
@@ -119,7 +131,7 @@ class PredictorColumns:
 
 
 def columns_of(program: Program, outputs: Sequence[str]) -> PredictorColumns:
-    """Return the columns of a Program whose outputs `outputs` are compared with recordings."""
+    """Return the columns of a Program; `outputs` are those that are compared with recordings."""
     return PredictorColumns(
         program.name,
         tuple(unqualified_name(v.name) for v in program.variables if v.name.startswith("state.")),
@@ -132,10 +144,10 @@ def columns_of(program: Program, outputs: Sequence[str]) -> PredictorColumns:
 
 
 class Predictor:
-    """A loaded library with the names of its arrays' columns."""
+    """A loaded predictor library with the names of the columns of its arrays."""
 
     def __init__(self, columns: PredictorColumns, library: Path) -> None:
-        """Load a library that `built` made."""
+        """Load a library of `build_predictor`."""
         self.columns = columns
         self.states = columns.states
         self.outputs = columns.outputs
@@ -154,9 +166,12 @@ class Predictor:
         state_steps: Reals,
         input_steps: Reals,
     ) -> tuple[Reals, Reals, Reals]:
-        """Return how the states `substeps` major steps later (states, states) and what is then
-        seen (seen, states) change with the states, and these states with the inputs held until
-        then (states, inputs): by central differences of `state_steps` (states,) and `input_steps` (inputs,).
+        """Return the Jacobians of a prediction over `substeps` major steps, by central differences.
+
+        They are d states / d states (states, states), d outputs / d states (outputs, states), and d
+        states / d inputs (states, inputs), at `states` (states,) in a mode, with `inputs` (inputs,)
+        held constant and the parameters `page` (tunables,). `state_steps` (states,) and
+        `input_steps` (inputs,) are the step sizes of the differences.
         """
         count = len(self.states)
         next_states, outputs = np.empty((count, count)), np.empty((count, len(self.outputs)))
@@ -180,7 +195,7 @@ class Predictor:
         transient_samples: int,
         max_samples: int = MAX_SAMPLES,
     ) -> tuple[Reals, Reals, Reals] | None:
-        """Return the gains of a linear model of its states and signals (see `kalman_gains`)."""
+        """Return the Kalman gains of a linear model; see `compute_kalman_gains`."""
         return compute_kalman_gains(
             phi, c, q, r, initial_covariance, transient_samples, max_samples
         )
@@ -196,11 +211,14 @@ class Predictor:
         is_first_order_hold: bool,
         state_increments: Reals | None = None,
     ) -> Prediction:
-        """Follow a recording; arrays are C-contiguous; inputs are held, or `is_first_order_hold` in between.
+        """Return the prediction of one recording; all arrays are C-contiguous float64.
 
-        `page` (tunables,), `inputs` (samples, inputs), `measured` (samples, seen) with NaN where
-        nothing is known, `first_gains` (first, states, seen), `gains` (modes, states, seen).
-        `state_increments` (samples, states) are added to the states once they are corrected.
+        `page` (tunables,), `inputs` (samples, inputs), `measured` (samples, outputs) with NaN where
+        nothing was measured, which corrects nothing. `first_gains` (first, states, outputs) apply
+        to the first samples, `gains` (modes, states, outputs) to all others. `substeps` is the
+        number of major steps from sample to sample. With `is_first_order_hold` inputs are linear
+        between samples, else constant. `state_increments` (samples, states) are added to the
+        corrected states.
         """
         samples = len(inputs)
         innovations = np.full((samples, len(self.outputs)), np.nan)
@@ -234,10 +252,11 @@ class Predictor:
         substeps: int,
         limits: Reals,
     ) -> StackedPrediction:
-        """Follow several recordings, each with its row of `pages` (recordings, tunables).
+        """Return the predictions of several recordings, each with its row of `pages` (recordings,
+        tunables).
 
-        Innovations beyond `limits` (seen,) count in proportion. The other arrays are those of
-        `predict`.
+        Innovations beyond `limits` (outputs,) count linearly in the sums of squares, as in
+        `sum_squares`. The other arguments are those of `predict`.
         """
         samples = len(recordings.inputs)
         stacked = Prediction(
@@ -263,10 +282,12 @@ class Predictor:
         gains: Reals,
         substeps: int,
     ) -> tuple[Reals, NDArray[np.int64]]:
-        """Follow several recordings at several points, with `pages` (points, recordings, tunables).
+        """Return the innovations of several recordings at several parameter points.
 
-        Return the innovations (points, samples, seen), and how many samples were done (points,
-        recordings). The other arrays are those of `predict`; gains may be by points as well.
+        `pages` has the shape (points, recordings, tunables). Returns innovations (points, samples,
+        outputs), with NaN after a divergence, and the number of completed samples (points,
+        recordings). The gains may have points as an additional first axis; the other arguments are
+        those of `predict`.
         """
         points = len(pages)
         innovations = np.empty((points, len(recordings.inputs), len(self.outputs)))
@@ -281,8 +302,12 @@ class Predictor:
     def sum_squares(
         self, innovations: Reals, recordings: StackedRecordings, limits: Reals
     ) -> tuple[Reals, Reals]:
-        """Return the sums of the squares of innovations (samples, seen) that count, and how many
-        they are (recordings, seen); those beyond `limits` (seen,) count in proportion.
+        """Return the sums of squared innovations and the numbers of finite ones, (recordings,
+        outputs) each.
+
+        `innovations` has the shape (samples, outputs). An innovation e beyond its limit L in
+        `limits` (outputs,) counts as L (2 |e| - L) (Huber 1964). Samples of the burn-in and NaN are
+        left out.
         """
         shape = (len(recordings.is_first_order_hold), len(self.outputs))
         squares, counts = np.empty(shape), np.empty(shape)
@@ -306,6 +331,11 @@ class Predictor:
         substeps: int,
         results: Sequence[NDArray[Any] | None],
     ) -> None:
+        """Run the library on all recordings at all points; the arrays in `results` are filled.
+
+        `results` holds innovations, outputs, states, modes and completed samples; None for an array
+        that is not wanted.
+        """
         first, steady = gains
         starts, linear = recordings.starts, recordings.is_first_order_hold
         is_per_point = int(steady.ndim > STEADY_GAIN_DIMENSIONS)
@@ -320,20 +350,21 @@ class Predictor:
 def _samples_after_divergence(
     starts: NDArray[np.int64], completed: NDArray[np.int64]
 ) -> list[slice]:
-    """Return the samples behind the one in which each run that was not done left all bounds."""
+    """Return for each recording that diverged the samples after the one in which it did."""
     ends = zip(starts[:-1].tolist(), starts[1:].tolist(), completed.tolist(), strict=True)
     return [slice(low + count + 1, high) for low, high, count in ends if low + count < high]
 
 
 def _address(values: NDArray[Any]) -> int:
+    """Return the address of an array."""
     return int(values.ctypes.data)
 
 
 @contextmanager
 def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Path]:
-    """Give the library of a Program, kept from an earlier run if there was one.
+    """Yield the path of the compiled library of a Program, from the cache if it was built before.
 
-    Raises ToolMissing, BuildError.
+    Raises MissingToolError, BuildError.
     """
     program = slice_to_outputs(program)
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
@@ -365,6 +396,7 @@ def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Pat
 
 
 def _template_context(columns: PredictorColumns) -> dict[str, object]:
+    """Return the context of the template of a predictor."""
     return {
         "name": columns.name,
         "states": columns.states,

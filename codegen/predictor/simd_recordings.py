@@ -1,8 +1,9 @@
-"""Tracks: recordings that a predictor follows side by side, in the vectors of the processor.
+"""SIMD recordings: a predictor that follows several recordings at once, one in each SIMD lane.
 
-A step in which nothing happens is one block of C in each mode (codegen/passes/fast_path.py): it is printed once
-more, over vectors. Each lane has the bits of the step of one; a lane in which something happens, or
-whose mode has no such block, takes that.
+An event-free step is one straight block of C in each mode configuration
+(codegen/passes/fast_path.py). The module prints this block again over vectors. Each lane has the
+bits of the scalar step. A lane in which an event occurs, or whose configuration has no such block,
+executes the scalar step.
 """
 
 from __future__ import annotations
@@ -39,21 +40,25 @@ from language.ir.traversal import block_writes, subexpressions
 from language.numerics.function_table import FUNCTIONS
 
 PAGE_PREFIXES = ("derived.", "calibration.")
-"""What stays in all steps."""
+"""Prefixes of names that are constant during a run."""
 REAL_PREFIX = "real_of "
-"""Before the name of a whole number: that as a real."""
+"""Prefix of the name of a whole number that is read as a real."""
 LINE_WIDTH = 96
+"""Maximum length of a line."""
 TEMPLATE_FUNCTIONS = ("abs", "min", "max", "clip", "floor", "sign", "pow2")
-"""Operations that the template has for all lanes at once."""
+"""Functions that the template implements over vectors."""
 VECTOR_TYPE: Mapping[LaneKind, str] = {"real": "Reals", "truth": "Truths"}
+"""The C type of a vector by the kind of its lanes."""
 
 
 def simd_recordings_context(
     program: Program, states: tuple[str, ...], outputs: tuple[str, ...]
 ) -> Any:
-    """Return what the template of a predictor's tracks reads; None where none go side by side.
+    """Return the context of the template of vectorised recordings; None if no step can be
+    vectorised.
 
-    `states` are the states, `outputs` the outputs that are compared.
+    `states` are the names of the states, `outputs` those of the compared outputs. Only float64
+    Programs are vectorised.
     """
     if program.number_type != "float64":
         return None
@@ -73,9 +78,9 @@ def simd_recordings_context(
     emitter = VectorEmitter(fast, kinds, fixed)
     steps = _merge_steps(
         [
-            leap
-            for stay in mode_configurations(fast, FAST_PATH)
-            for leap in _lane_steps(emitter, stay)
+            step
+            for configuration in mode_configurations(fast, FAST_PATH)
+            for step in _lane_steps(emitter, configuration)
         ]
     )
     try:
@@ -85,8 +90,10 @@ def simd_recordings_context(
 
 
 def _delay_record_context(program: Program) -> dict[str, Any] | None:
-    """Return how a lane records by itself what a delay reads, and goes through events behind that;
-    None where the values of a step are not in the instance.
+    """Return the calls by which one lane records delayed values, and then executes a step with
+    events.
+
+    Returns None if the work variables of a step are not in the instance.
     """
     context = module_context(run_c_passes(program, fast_path="anew"), MODULE_PAGE)
     calls, scratch = context["calls"], context["scratch"]
@@ -105,6 +112,11 @@ def _template_context(
     state_names: tuple[str, ...],
     outputs: tuple[str, ...],
 ) -> dict[str, Any]:
+    """Return the template context of the vectorised steps: members of the lanes, functions and
+    steps.
+
+    Raises NotVectorisable if a compared output is not a real that outlives the step.
+    """
     emitter.named_values.clear()
     wires = {wire.name: wire.source for wire in emitter.program.outputs}
     states = [emitter.vector_member(f"state.{name}") for name in state_names]
@@ -150,7 +162,10 @@ def _template_context(
 
 
 def _output_members(emitter: VectorEmitter, names: list[str]) -> list[str]:
-    """Return the members of what is compared. Raises NotAbreast unless these are lasting reals."""
+    """Return the vector members of the compared outputs.
+
+    Raises NotVectorisable unless all are reals, and no work variable is accessed.
+    """
     members = [emitter.vector_member(name) for name in names]
     are_real = all(emitter.kind_of(Ref(name)) == "real" for name in names)
     if not are_real or any(name.startswith("work.") for name in emitter.accessed):
@@ -159,17 +174,18 @@ def _output_members(emitter: VectorEmitter, names: list[str]) -> list[str]:
 
 
 def _region_mode_members(program: Program) -> list[tuple[str, str, str]]:
-    """Return the members that hold the modes of regions, as `_places` does."""
+    """Return the members that hold the modes of regions: name, kind and place in an instance."""
     held = [name for name in program.mode_variables().values() if name != MODE_VARIABLE]
     return [(unqualified_name(name), "whole", CNames(program)(name)) for name in held]
 
 
 def _input_kind(emitter: VectorEmitter, name: str) -> LaneKind:
+    """Return the kind of an input."""
     return emitter.kind_of(Ref(f"input.{name}"))
 
 
 def _instance_members(emitter: VectorEmitter, names: list[str]) -> list[tuple[str, LaneKind, str]]:
-    """Return members with what they are and where a single instance has them."""
+    """Return vector members with their kinds and their places in a scalar instance."""
     c_names = CNames(emitter.program)
     return [
         (flatten_name(name), emitter.accessed[name], c_names(name.removeprefix(REAL_PREFIX)))
@@ -179,8 +195,11 @@ def _instance_members(emitter: VectorEmitter, names: list[str]) -> list[tuple[st
 
 @dataclass
 class _LaneStep:
-    """The step of modes, by where lanes are in them and what they are called, in `values`: name,
-    kind and text of each. The lanes of which `quiet` is true end at `ends`.
+    """A vectorised event-free step of one or more mode configurations.
+
+    `modes` maps the condition that a lane is in a configuration to the name of that configuration.
+    `values` are constants in order: name, kind and text. `quiet` names the conditions that no guard
+    changed, `ends` maps each variable to its value at the end of the step.
     """
 
     modes: dict[str, str]
@@ -190,37 +209,44 @@ class _LaneStep:
 
     @property
     def lines(self) -> list[str]:
-        """The values as they are printed."""
+        """The C lines of the values."""
         return [line for value in self.values for line in _emit_constant(*value)]
 
     @property
     def commits(self) -> list[tuple[str, str, str]]:
-        """What is written where nothing happened: member, its value, and how one is chosen."""
+        """The members that are written after an event-free step: member, value, and macro that
+        selects it.
+        """
         return [(flatten_name(name), *end.split(" ")) for name, end in self.ends.items()]  # type: ignore[misc]
 
 
 def _merge_steps(steps: list[_LaneStep]) -> list[_LaneStep]:
-    """Return steps, those of modes that flow alike as one: lanes in either take it at once."""
+    """Return the steps with those merged that differ only in truth values.
+
+    Lanes in either configuration then take the step together.
+    """
     merged: list[_LaneStep] = []
     for step in steps:
-        same = next((k for k, one in enumerate(merged) if _is_mergeable(one, step)), None)
-        if same is None:
+        index = next((k for k, one in enumerate(merged) if _is_mergeable(one, step)), None)
+        if index is None:
             merged.append(step)
         else:
-            merged[same] = _merge_pair(merged[same], step)
+            merged[index] = _merge_pair(merged[index], step)
     return merged
 
 
 def _is_mergeable(first: _LaneStep, second: _LaneStep) -> bool:
-    """Tell whether steps differ in truths alone, as the guards at both ends of a gap do."""
-    reals = [[value for value in leap.values if value[1] == "real"] for leap in (first, second)]
-    names = [[name for name, _, _ in leap.values] for leap in (first, second)]
-    kept = [(leap.quiet, leap.ends) for leap in (first, second)]
-    return all(one == other for one, other in (reals, names, kept))
+    """Tell whether two steps differ in truth values only, as do the guards at both ends of a
+    backlash.
+    """
+    reals = [[value for value in step.values if value[1] == "real"] for step in (first, second)]
+    names = [[name for name, _, _ in step.values] for step in (first, second)]
+    results = [(step.quiet, step.ends) for step in (first, second)]
+    return all(one == other for one, other in (reals, names, results))
 
 
 def _merge_pair(first: _LaneStep, second: _LaneStep) -> _LaneStep:
-    """Return the step of the modes of two, each lane with the truths of its own mode."""
+    """Return the merged step of two; each lane has the truth values of its own configuration."""
     there = " | ".join(second.modes)
     values = [
         (name, kind, text if text == other else f"CHOSEN_TRUTH({there}, {other}, {text})")
@@ -230,11 +256,12 @@ def _merge_pair(first: _LaneStep, second: _LaneStep) -> _LaneStep:
 
 
 def _select_macro(kind: LaneKind) -> str:
+    """Return the macro that selects between two vectors of a kind."""
     return "CHOSEN" if kind == "real" else "CHOSEN_TRUTH"
 
 
 def _lane_steps(emitter: VectorEmitter, configuration: ModeConfiguration) -> Iterator[_LaneStep]:
-    """Yield the step of a stay over vectors, if it has one that is arithmetic of reals."""
+    """Yield the vectorised step of a mode configuration; nothing if it has none."""
     block = emitter.program.blocks.get(configuration.block_name)
     if block is None:
         return
@@ -258,7 +285,9 @@ def _lane_steps(emitter: VectorEmitter, configuration: ModeConfiguration) -> Ite
 
 
 def _integers_as_reals(expr: Expr) -> Expr:
-    """Return an expression that reads whole numbers as the reals that they are."""
+    """Return an expression in which conversions of whole numbers to reals are names with
+    REAL_PREFIX.
+    """
     match expr:
         case Call("real", (Ref(name),)):
             return Ref(REAL_PREFIX + name)
@@ -266,7 +295,10 @@ def _integers_as_reals(expr: Expr) -> Expr:
 
 
 def _emit_event_free_arm(emitter: VectorEmitter, step: _LaneStep, ops: Block) -> None:
-    """Print the operations of a step; where one branches, the arm in which nothing happens."""
+    """Add the operations of a block to a step; of a branch, only the arm without an event.
+
+    That arm consists of assignments. Raises NotVectorisable for any other operation.
+    """
     for op in ops:
         match op:
             case Assign(target) if target == FAST_PATH_TAKEN:
@@ -299,16 +331,19 @@ def _emit_event_free_arm(emitter: VectorEmitter, step: _LaneStep, ops: Block) ->
 
 
 def _is_assignments_only(ops: Block) -> bool:
+    """Tell whether a block has only assignments, and branches with such an arm."""
     return all(_is_assignment_like(op) for op in ops)
 
 
 def _is_assignment_like(op: Op) -> bool:
+    """Tell whether an operation is an assignment, or a branch with an arm of assignments."""
     if isinstance(op, Branch):
         return _is_assignments_only(op.then) or _is_assignments_only(op.other)
     return isinstance(op, Assign)
 
 
 def _emit_constant(name: str, kind: LaneKind, text: str) -> list[str]:
+    """Return the lines that define a constant vector."""
     return [
         f"    {line}"
         for line in emit_wrapped_statement(
@@ -320,7 +355,10 @@ def _emit_constant(name: str, kind: LaneKind, text: str) -> list[str]:
 def _emit_functions(
     emitter: VectorEmitter,
 ) -> Iterator[tuple[str, tuple[tuple[str, ...], list[str]]]]:
-    """Yield the elementary functions that are called, over vectors, before those that call them."""
+    """Yield the called elementary functions over vectors: name, parameters and lines.
+
+    A function comes before those that it calls. Functions that cannot be vectorised are left out.
+    """
     for name in reversed(list(FUNCTIONS)):
         if name not in emitter.called_functions:
             continue
@@ -339,7 +377,10 @@ def _emit_functions(
 
 
 def _emit_value(emitter: VectorEmitter, name: str, kind: LaneKind, value: Expr) -> list[str]:
-    """Print a value; of two that take a division, each only where a lane asks for it."""
+    """Return the lines that define a value.
+
+    If both arms of a choice divide, each arm is computed only if a lane selects it.
+    """
     if not (isinstance(value, Select) and _has_division(value.then) and _has_division(value.other)):
         return _emit_constant(name, kind, emitter.emit_expression(value))
     then, other, chosen = f"{name}_then", f"{name}_other", f"is_{name}_then"
@@ -362,4 +403,5 @@ def _emit_value(emitter: VectorEmitter, name: str, kind: LaneKind, value: Expr) 
 
 
 def _has_division(expr: Expr) -> bool:
+    """Tell whether an expression contains a division."""
     return any(isinstance(part, Binary) and part.operator == "/" for part in subexpressions(expr))

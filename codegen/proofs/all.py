@@ -1,4 +1,4 @@
-"""All: every check of the C of a Program, one after the other."""
+"""All checks of the C of a Program, one after the other."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ from language.ir.program import Program
 from language.model.automaton import Automaton
 
 CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
+"""The names of all checks in their order."""
 
 
 def run_checks(
     automaton: Automaton, program: Program, checks: Sequence[str] = CHECKS
 ) -> Iterator[ToolVerdict]:
-    """Yield what each check says. Raises ToolMissing, BuildError."""
+    """Yield the verdicts of the named checks in their order.
+
+    Raises MissingToolError, BuildError.
+    """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         for inner in ("sanitizers", "values", "contract"):
@@ -32,7 +36,7 @@ def run_checks(
         for file, text in files.items():
             (folder / file).write_text(text)
         sources = [file for file in files if file.endswith(".c")]
-        made: dict[str, Callable[[], list[ToolVerdict]]] = {
+        check_functions: dict[str, Callable[[], list[ToolVerdict]]] = {
             "warnings": lambda: check_compiler_warnings(folder, sources),
             "misra": lambda: [check_misra(folder, sources)],
             "stack": lambda: [check_stack(folder, sources, f"{program.name}_Step")],
@@ -41,4 +45,4 @@ def run_checks(
             "contract": lambda: [check_contracts(automaton, program, folder / "contract")],
         }
         for check in checks:
-            yield from made[check]()
+            yield from check_functions[check]()

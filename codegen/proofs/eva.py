@@ -1,6 +1,7 @@
-"""Values: no infinity, no NaN, no division by zero, nothing out of bounds, in any number of steps.
+"""Value analysis: checks for infinities, NaN, division by zero, overflow and invalid accesses.
 
-By the value analysis of Frama-C (EVA): intervals of all values, over all inputs and calibrations.
+The value analysis of Frama-C (EVA) computes intervals of all values over all inputs and
+calibrations, for any number of steps (abstract interpretation).
 """
 
 from __future__ import annotations
@@ -27,18 +28,29 @@ KERNEL = (
     *("-warn-special-float", "non-finite", "-warn-signed-overflow", "-warn-unsigned-overflow"),
     *("-warn-signed-downcast", "-warn-unsigned-downcast"),
 )
-"""The page is not `volatile` here: it changes between steps only."""
+"""Options of Frama-C. The page is not `volatile` here, because it changes only between steps."""
 ANALYSIS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
+"""Options of the value analysis."""
 MERGED = ("-eva-slevel-function", "main:0")
-"""Steps are not followed one by one: all of them are one state, which begins with any counts."""
+"""Options by which steps are not followed one by one: all states are merged, and counters begin
+with
+
+any value.
+"""
 ALARM = re.compile(
     r"\[eva:alarm\] (?P<file>[^:]+):(?P<line>\d+): Warning: *(?P<what>[^\n]*)\n? *(?P<more>[^\n]*)"
 )
+"""An alarm in the output: file, line and text."""
 REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
+"""The number of analysed statements in the output."""
 
 
 def check_values(program: Program, folder: Path) -> ToolVerdict:
-    """Follow the values of a Program. Raises ToolMissing, BuildError."""
+    """Run the value analysis on the C of a Program and return its verdict; files are written to
+    `folder`.
+
+    Raises MissingToolError, BuildError.
+    """
     files = {**emit_c_files(program, by_magnitude=False), "main.c": _main(program)}
     for name, text in files.items():
         (folder / name).write_text(text)
@@ -59,8 +71,11 @@ def check_values(program: Program, folder: Path) -> ToolVerdict:
 
 
 def _turns(program: Program) -> int:
-    """Return how often loops are followed turn by turn: as often as one of a run turns at most, for
-    what it computes grows from turn to turn, and has no bound that the analysis finds.
+    """Return the number of loop iterations that are followed one by one.
+
+    It is the largest number of iterations of a loop that runs blocks, if the Program runs a model,
+    because its values grow from iteration to iteration and the analysis finds no bound. Otherwise
+    it is 0.
     """
     if not program.run_modes:
         return 0
@@ -74,9 +89,11 @@ def _turns(program: Program) -> int:
 
 
 def counter_limits(program: Program) -> dict[str, int]:
-    """Return the most of what counts from step to step: timers, and places in what is kept.
+    """Return the largest value of each counter that is retained between steps: timers and array
+    indices.
 
-    A count that begins with any of its values needs no step to be followed until it is full.
+    With these bounds a counter may begin with any value, and no steps need to be followed until it
+    is full. A Program that runs no model has none.
     """
     if not program.run_modes:
         return {}
@@ -92,7 +109,7 @@ def counter_limits(program: Program) -> dict[str, int]:
 
 
 def _places(op: Op) -> Iterator[tuple[str, Expr]]:
-    """Yield the arrays that an operation writes or reads, and where."""
+    """Yield the arrays that an operation reads or writes, with their indices."""
     if isinstance(op, Store):
         yield op.array, op.index
     for whole in direct_expressions(op):
@@ -100,6 +117,7 @@ def _places(op: Op) -> Iterator[tuple[str, Expr]]:
 
 
 def _main(program: Program) -> str:
+    """Return the C of the main that calls steps with any inputs and calibrations."""
     place = CNames(program)
     inputs = [
         (place(v.name).replace("in->", "in."), _any(program, v)) for v in tick_inputs(program)
@@ -120,7 +138,7 @@ def _main(program: Program) -> str:
 
 
 def _any(program: Program, variable: Variable) -> str:
-    """Return any value of an input: of its range or not."""
+    """Return the C text of any value of an input, inside or outside of its range."""
     if variable.type == "real":
         return _between(program, -MAX_FINITE[program.number_type], MAX_FINITE[program.number_type])
     if variable.type == "truth":
@@ -132,11 +150,13 @@ def _any(program: Program, variable: Variable) -> str:
 
 
 def _within(program: Program, constant: Constant) -> str:
+    """Return the C text of any value in the range of a constant."""
     assert constant.range
     return _between(program, *(float(end) for end in constant.range))
 
 
 def _between(program: Program, low: float, high: float) -> str:
+    """Return the C text of any real between two ends."""
     ends = (
         f"{format_literal(low, program.number_type)}, {format_literal(high, program.number_type)}"
     )

@@ -1,4 +1,4 @@
-"""MISRA: the rules of MISRA C:2012 that cppcheck knows, less the deviations that we state."""
+"""MISRA: checks generated C against MISRA C:2012 with cppcheck, except for stated deviations."""
 
 from __future__ import annotations
 
@@ -17,37 +17,44 @@ DEVIATIONS = {
     "reads them",
     "21.15": "the bits of a power of two are set by memcpy, which every compiler turns into a move",
 }
-"""Rules that generated C breaks on purpose, and why (rule C24; docs/c_code.md)."""
+"""Rules from which generated C deviates, with reasons (rule C24; docs/c_code.md)."""
 KNOWN = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
-"""What headers of the compiler define, which cppcheck does not read."""
+"""Macros of compiler headers, which cppcheck does not read."""
 READING = ("--quiet", "--std=c99", "--error-exitcode=1")
+"""Options of cppcheck."""
 ADDONS = ("usr/lib/*", "usr/share", "usr/local/share")
+"""Folders in which the rules of cppcheck may be installed."""
 VIOLATION = re.compile(r"\[(?P<file>[^:\]]+):(?P<line>\d+)\].*\[misra-c2012-(?P<rule>[\d.]+)\]")
+"""A violation in the output: file, line and rule."""
 
 
 def check_misra(folder: Path, sources: Sequence[str]) -> ToolVerdict:
-    """Check the sources of a folder. Raises ToolMissing, BuildError."""
+    """Check C files of a folder against MISRA C:2012 and return the verdict.
+
+    Deviations are counted in `about`. Raises MissingToolError, BuildError.
+    """
     tool = f"cppcheck {tool_version('cppcheck', folder)}"
     read = run_tool(["cppcheck", "--dump", *READING, *KNOWN, *sources], folder)
-    heard = run_tool([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
-    unread = [one for one in sources if f"Checking {one}.dump, config" not in heard.stdout]
+    rules = run_tool([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
+    unread = [one for one in sources if f"Checking {one}.dump, config" not in rules.stdout]
     if read.returncode or unread:
-        said = (read.stderr + heard.stderr).strip().splitlines()[-1:]
-        return ToolVerdict("misra", tool, "no result", (f"not read: {' '.join([*unread, *said])}",))
-    lines = {match.group(0): match for match in VIOLATION.finditer(heard.stderr)}
+        last = (read.stderr + rules.stderr).strip().splitlines()[-1:]
+        return ToolVerdict("misra", tool, "no result", (f"not read: {' '.join([*unread, *last])}",))
+    lines = {match.group(0): match for match in VIOLATION.finditer(rules.stderr)}
     deviating = Counter(m["rule"] for m in lines.values() if m["rule"] in DEVIATIONS)
-    found = sorted(
+    findings = sorted(
         f"{Path(m['file']).name}:{m['line']}: rule {m['rule']}"
         for m in lines.values()
         if m["rule"] not in DEVIATIONS
     )
     listed = ", ".join(f"{rule} ({n} times)" for rule, n in sorted(deviating.items()))
     about = f"{len(sources)} files; deviations: {listed or 'none'}"
-    return ToolVerdict("misra", tool, about, tuple(found))
+    return ToolVerdict("misra", tool, about, tuple(findings))
 
 
 def _addon() -> str:
+    """Return the path of the MISRA rules of cppcheck. Raises MissingToolError."""
     for pattern in ADDONS:
-        for found in Path("/").glob(f"{pattern}/cppcheck/addons/misra.py"):
-            return str(found)
+        for path in Path("/").glob(f"{pattern}/cppcheck/addons/misra.py"):
+            return str(path)
     raise MissingToolError("the rules of cppcheck (misra.py) are missing: apt-get install cppcheck")

@@ -1,4 +1,4 @@
-"""Sanitised: generated C on hostile inputs, under the sanitizers of gcc for addresses and for C."""
+"""Sanitizer run: executes generated C on random and extreme inputs under the sanitizers of gcc."""
 
 from __future__ import annotations
 
@@ -17,12 +17,18 @@ from language.ir.number_type import MAX_FINITE
 from language.ir.program import Program, Variable
 
 STEPS, SEED = 20_000, 1
+"""Number of steps, and the seed of the inputs."""
 SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, MAX_FINITE["float32"])
+"""Special real inputs: signed zeros, NaN, infinities, subnormals and the largest float32."""
 SCALES = (1.0, 100.0, 1e4, 1e30)
+"""Magnitudes of random real inputs."""
 
 
 def check_sanitizers(program: Program, folder: Path) -> ToolVerdict:
-    """Run the C of a Program for many steps. Raises ToolMissing, BuildError."""
+    """Run the C of a Program for STEPS steps and return the verdict; files are written to `folder`.
+
+    Raises MissingToolError, BuildError.
+    """
     app = build_sanitised("gcc", write_harness(program, folder), folder)
     tool, about = f"gcc {tool_version('gcc', folder)}", f"{STEPS} steps on random inputs"
     return ToolVerdict(
@@ -34,7 +40,11 @@ def check_sanitizers(program: Program, folder: Path) -> ToolVerdict:
 
 
 def _records(program: Program) -> bytes:
-    """Return inputs of steps: of any size, held for a while, with numbers that are none between."""
+    """Return the input records of all steps.
+
+    Each input changes with probability 0.05 in a step, to a value of any magnitude or a special
+    value.
+    """
     generator, inputs = random.Random(SEED), tick_inputs(program)
     values = [0.0 for _ in inputs]
     records = []
@@ -47,12 +57,12 @@ def _records(program: Program) -> bytes:
 
 
 def _record(values: Sequence[float]) -> bytes:
-    """Return the inputs of a step, the calibration unchanged."""
+    """Return the input record of a step without a change of the calibration."""
     return struct.pack(f"<{len(values) + 1}d", *values, 0.0)
 
 
 def _any(variable: Variable, program: Program, generator: random.Random) -> float:
-    """Return any value of an input: of its range or not."""
+    """Return a random value of an input, inside or outside of its range."""
     if variable.type == "truth":
         return float(generator.random() < 0.5)
     if variable.type == "whole":

@@ -1,4 +1,6 @@
-"""Strict: the C of a Program under all warnings that we ask a compiler for, from two compilers."""
+"""Compiler warnings: compiles the C of a Program with all warnings of gcc and clang enabled
+(rule C24).
+"""
 
 from __future__ import annotations
 
@@ -10,20 +12,23 @@ from codegen.toolchain.external_tools import run_tool
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 
 COMPILERS = ("gcc", "clang-19")
+"""The compilers."""
 
 
 def check_compiler_warnings(folder: Path, sources: Sequence[str]) -> list[ToolVerdict]:
-    """Compile the sources of a folder. Raises ToolMissing."""
-    found = []
+    """Compile C files of a folder with each compiler and return one verdict for each.
+
+    Findings are the lines with warnings and errors. Raises MissingToolError, BuildError.
+    """
+    verdicts = []
     for compiler in COMPILERS:
         command = [compiler, *FLAGS, *WARNINGS, "-c", *sources]
         done = run_tool(command, folder)
         lines = done.stderr.splitlines()
-        heard = tuple(line for line in lines if "warning:" in line or "error:" in line)
-        if done.returncode and not heard:
-            heard = (f"{compiler} ended with {done.returncode}",)
+        findings = tuple(line for line in lines if "warning:" in line or "error:" in line)
+        if done.returncode and not findings:
+            findings = (f"{compiler} ended with {done.returncode}",)
         about = f"{len(WARNINGS)} kinds of warnings"
-        found.append(
-            ToolVerdict("warnings", f"{compiler} {tool_version(compiler, folder)}", about, heard)
-        )
-    return found
+        tool = f"{compiler} {tool_version(compiler, folder)}"
+        verdicts.append(ToolVerdict("warnings", tool, about, findings))
+    return verdicts

@@ -1,7 +1,7 @@
-"""Stepper: a Program compiled for this machine, run block by block through ctypes.
+"""Compiled stepper: a Program compiled for this machine whose blocks are run through ctypes.
 
-It has the methods that the engine asks of what runs a Program (engine/interpreter/interpreter.py), and its
-bits. For whole runs in one call see codegen/simulator/simulator_library.py.
+It has the interface and the bits of the interpreter (engine/interpreter/interpreter.py). For whole
+runs in one call see codegen/simulator/simulator_library.py.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from language.ir.printer import digest
 from language.ir.program import Program
 
 MODULE_NAME = "stepper"
+"""The name of the module in C."""
 CTYPES: Mapping[str, Any] = {
     "double": ctypes.c_double,
     "float": ctypes.c_float,
@@ -41,15 +42,20 @@ CTYPES: Mapping[str, Any] = {
     "int32_t": ctypes.c_int32,
     "uint32_t": ctypes.c_uint32,
 }
+"""The ctypes type of a C type."""
 INLINED_ENTRIES = ("init", "step")
-"""Blocks that are no functions of their own where C is printed."""
+"""Blocks that are not functions of their own in generated C."""
 
 
 class CompiledStepper:
-    """A Program in compiled C with its values. Variables start at 0 or false, `init` has run."""
+    """A compiled Program with its values.
+
+    All variables begin at 0 or false; then the blocks for the default page, `derive` and `init`
+    run.
+    """
 
     def __init__(self, program: Program, flags: Sequence[str] = FLAGS) -> None:
-        """Compile, or take what was compiled before. Raises ToolMissing, BuildError."""
+        """Compile the Program, or load it from the cache. Raises MissingToolError, BuildError."""
         self.program = program
         marked = marked_program(program)
         library, self._blocks, places = _load_stepper(
@@ -79,16 +85,18 @@ class CompiledStepper:
             self.run(entry)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant, `group.name`; of an array all of them."""
+        """Return the value of a variable or constant by name (`group.name`); all elements of an
+        array.
+        """
         value = self._values.get(name)
         return self._arrays_and_constants[name] if value is None else value.value
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable; a real is rounded to the number type, once."""
+        """Set a scalar variable; a real is rounded to the number type."""
         self._values[name].value = value
 
     def has(self, name: str) -> bool:
-        """Tell whether the Program has a variable or constant."""
+        """Tell whether the Program has a variable or constant with a name."""
         return name in self._values or name in self._arrays_and_constants
 
     def run(self, block: str) -> None:
@@ -96,20 +104,20 @@ class CompiledStepper:
         self._run(self._address, self._blocks[block])
 
     def snapshot(self) -> bytes:
-        """Return all values as they are now, for `restore`."""
+        """Return all values as bytes for `restore`."""
         return self._buffer.raw
 
     def restore(self, values: bytes) -> None:
-        """Make all values what they were at a `snapshot`."""
+        """Set all values to those of a `snapshot`."""
         ctypes.memmove(self._address, values, len(values))
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables."""
+        """Return a function that returns the current values of the named variables."""
         values = [self._values[name] for name in names]
         return lambda: tuple([value.value for value in values])
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return the signals that left their range since this was asked last."""
+        """Return the signals that left their range since the last call, and clear their flags."""
         violated = tuple(
             signal for signal, name in self._range_marks.items() if self._values[name].value
         )
@@ -120,16 +128,19 @@ class CompiledStepper:
 
 @dataclasses.dataclass(frozen=True)
 class _StepperKey:
+    """The key of a compiled stepper: Programs with the same digest are equal."""
+
     digest: str
     program: Program = dataclasses.field(compare=False)
 
 
 LoadedStepper = tuple[ctypes.CDLL, dict[str, int], dict[str, tuple[str, int]]]
+"""A library, the numbers of its blocks, and C type and offset of its variables."""
 
 
 @lru_cache(maxsize=64)
 def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedStepper:
-    """Return a library, the numbers of its blocks, and kind and offset of its variables."""
+    """Return the loaded library of a Program, compiled if it is not in the cache."""
     program = dataclasses.replace(stepper_key.program, name=MODULE_NAME)
     files, blocks, names = _emit_files(program)
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
@@ -149,7 +160,9 @@ def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedSte
 
 
 def _emit_files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, str]]:
-    """Return the C of a Program, the numbers of its blocks, and the C types of its variables."""
+    """Return the C files of a Program, the numbers of its blocks, and the C types of its
+    variables.
+    """
     context = module_context(program)
     local = locals_of(program)
     usage_by_block, c_names = block_usages(program, local), CNames(program)

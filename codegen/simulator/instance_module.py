@@ -1,4 +1,4 @@
-"""Run module: what the C of one instance of a run is made of."""
+"""Instance module: the template context of the C of one instance in a compiled simulation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ def simulator_module_context(
     signal_names: SignalNameMap,
     flow: int,
 ) -> dict[str, Any]:
-    """Return what the template of an instance's C reads."""
+    """Return the context of the template of an instance's C.
+
+    `flow` is the index of the instance among all instances.
+    """
     usage_by_block = block_usages(program, locals_of(program))
     c_names = CNames(program)
     is_flow = program.period is None
@@ -78,7 +81,11 @@ def simulator_module_context(
 def simd_batch_of(
     assembly: SimulationAssembly, name: str, program: Program, signal_names: SignalNameMap
 ) -> dict[str, Any] | None:
-    """Return how steps of several variants are taken side by side, where nothing else looks in."""
+    """Return the template context of SIMD steps over several variants of an instance.
+
+    Returns None for a sampled automaton, for inputs that vary inside a step, for a sensor with a
+    lag, and for a Program that cannot be vectorised.
+    """
     if (
         program.period is not None
         or varying_inputs(assembly, name, program, signal_names)
@@ -89,14 +96,16 @@ def simd_batch_of(
 
 
 def _row_slots(assembly: SimulationAssembly, name: str, program: Program) -> list[tuple[int, str]]:
-    """Return the places of an instance's signals in a row, with the variables they are."""
+    """Return pairs of a slot in a row and the variable of an instance that fills it."""
     wires = output_variables(program)
     own = [(k, slot) for k, slot in enumerate(assembly.row_signals) if slot.startswith(f"{name}.")]
     return [(k, wires[slot.partition(".")[2]]) for k, slot in own]
 
 
 def _invariant_contexts(program: Program, c_names: CNames, number: int) -> list[dict[str, Any]]:
-    """Return the assertions, whose events come after transitions and ranges."""
+    """Return the contexts of invariants; their event numbers follow those of transitions and
+    ranges.
+    """
     first = number + len(program.transitions) + len(range_event_variables(program))
     return [
         {
@@ -110,22 +119,24 @@ def _invariant_contexts(program: Program, c_names: CNames, number: int) -> list[
 
 
 def _lagging_sensors(assembly: SimulationAssembly, name: str) -> list[str]:
-    """Return the filters of sensors that look at an instance."""
+    """Return the C names of the sensors with a lag that measure an instance."""
     sensors = assembly.sensors.values()
     looking = [s for s in sensors if s.lag and s.source.partition(".")[0] == name]
     return [INSTANCE_NAME.format(sensor.name) for sensor in looking]
 
 
 def _range_mark_members(program: Program, c_names: CNames) -> list[str]:
+    """Return the C text of the flags for range violations."""
     return [c_names(RANGE_MARK.format(k)) for k, _ in enumerate(ranged_signals(program))]
 
 
 def _is_retained(variable: str) -> bool:
-    """Tell whether a variable is as it is without its equation."""
+    """Tell whether a variable has its value without an evaluation of equations."""
     return variable.startswith(("state.", "discrete.", "memory."))
 
 
 def _default_assignments(program: Program) -> list[str]:
+    """Return the C assignments of default inputs, and of flags for new values."""
     assignments = [
         f"{c_member(f'input.{key}')} = {format_literal(value, program.number_type)}"
         for key, value in program.defaults.items()
@@ -135,6 +146,9 @@ def _default_assignments(program: Program) -> list[str]:
 
 
 def _range_contexts(program: Program, number: int) -> list[dict[str, object]]:
+    """Return the contexts of states and discrete variables whose range is monitored in a
+    simulation.
+    """
     contexts = []
     for k, variable in enumerate(range_event_variables(program)):
         assert variable.range is not None
@@ -154,7 +168,7 @@ def _range_contexts(program: Program, number: int) -> list[dict[str, object]]:
 def varying_inputs(
     assembly: SimulationAssembly, name: str, program: Program, signal_names: SignalNameMap
 ) -> list[dict[str, str]]:
-    """Return the inputs of an instance that change inside its steps, and what they are then."""
+    """Return the inputs of an instance that vary inside its steps, with their C text at a time."""
     timed = dataclasses.replace(signal_names, is_timed=True)
     known = {variable.name for variable in program.variables}
     inputs = []

@@ -1,4 +1,4 @@
-"""Run places: where the signals of a system are in the C of its runs."""
+"""Signal names: the C text of the signals of a system in a compiled simulation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from language.ir.program import Program, unqualified_name
 from language.programs.simulation_assembly import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"
-"""What an instance is called in C: its name may be any that the language takes."""
+"""The C name of an instance or sensor, whose own name may be a keyword of C."""
 
 
 @dataclass(frozen=True)
 class SignalNameMap:
-    """Where signals are in the driver."""
+    """The C text of signals in the driver of a simulation.
+
+    With `is_row` signals are read from the current row. With `is_timed` inputs that vary are
+    evaluated at the variable `time`.
+    """
 
     assembly: SimulationAssembly
     programs: Mapping[str, Program]
@@ -27,22 +31,22 @@ class SignalNameMap:
     number: NumberType = "float64"
 
     def __call__(self, name: str) -> str:
-        """Return the C text of `signal.<name>`."""
+        """Return the C text of the signal `signal.<name>`."""
         signal = unqualified_name(name)
         if self.is_row:
             return f"out[{self.assembly.row_signals.index(signal)}]"
         return self.emit_signal(signal)
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number beside a signal."""
+        """Return a whole number that stands beside a signal, as a decimal."""
         return repr(number)
 
     def is_unsigned(self, name: str) -> bool:
-        """Signals are reals."""
+        """Return False: signals are reals."""
         return False
 
     def emit_signal(self, name: str) -> str:
-        """Return the C text of a signal."""
+        """Return the C text of an input, a sensor value or an output of an instance."""
         courses = [course.name for course in self.assembly.input_trajectories]
         if self.is_timed and name in courses:
             return f"course_{courses.index(name)}(run, time)"
@@ -56,12 +60,14 @@ class SignalNameMap:
         return place.replace("self->", f"(double)run->{program.name}.self.")
 
     def emit_formula(self, block: str) -> str:
-        """Return the C text of a block of the wires."""
+        """Return the C text of the formula of a connection."""
         return emit_wire_formula(self.assembly, block, self)
 
 
 def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMap) -> str:
-    """Return the C text of a block of the wires, whose signals are at a place."""
+    """Return the C text of the formula of a connection, a block of `assembly.wires`, as a
+    double.
+    """
     (op,) = assembly.wires.blocks[block]
     assert isinstance(op, Assign)
     return f"(double)({emit_expression(op.value, c_names)})"
@@ -69,7 +75,7 @@ def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMa
 
 @dataclass(frozen=True)
 class TimeNameMap:
-    """Where a formula of time reads it, whatever it is called there."""
+    """The C text of names in a formula of time: every name is the variable `now`."""
 
     number: NumberType = "float64"
 
@@ -78,16 +84,18 @@ class TimeNameMap:
         return "now"
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number beside it."""
+        """Return a whole number that stands beside the time, as a decimal."""
         return repr(number)
 
     def is_unsigned(self, name: str) -> bool:
-        """Time is a real."""
+        """Return False: the time is a real."""
         return False
 
 
 def column_positions(assembly: SimulationAssembly) -> list[int]:
-    """Return where each recorded column stands among the numbers of a row."""
+    """Return the position of each recorded column in a row; columns with a formula follow the
+    signals.
+    """
     positions, formulas = [], len(assembly.row_signals)
     for column in assembly.columns:
         if column.block:
@@ -99,5 +107,5 @@ def column_positions(assembly: SimulationAssembly) -> list[int]:
 
 
 def row_width(assembly: SimulationAssembly) -> int:
-    """Return how many numbers a row has."""
+    """Return the number of values in a row, at least 1."""
     return max(1, len(assembly.row_signals) + sum(1 for c in assembly.columns if c.block))

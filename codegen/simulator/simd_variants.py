@@ -1,8 +1,8 @@
-"""Abreast: steps of several variants side by side, in the vectors of the processor.
+"""SIMD variants: steps of several variants at once, one in each SIMD lane.
 
-Where nothing happens in a step of a continuous automaton, it is arithmetic of reals alone, the same
-for all variants in one mode: that part of the Program's blocks is printed once more, over vectors.
-Each lane has the bits of the step of one variant; a lane in which something happens takes that.
+An event-free step of a continuous automaton is arithmetic of reals, which is the same for all
+variants in one mode. The module prints these blocks of a Program again over vectors. Each lane has
+the bits of the scalar step. A lane in which an event occurs executes the scalar step.
 """
 
 from __future__ import annotations
@@ -34,23 +34,31 @@ from language.ir.program import MODE_VARIABLE, Program
 from language.programs.simulation_assembly import range_event_variables
 
 LANES = 4
-"""Variants side by side: reals in a vector of 32 bytes."""
+"""Number of SIMD lanes: float64 values in a vector of 32 bytes."""
 LaneKind = Literal["real", "truth"]
+"""The kind of the values in the lanes of a vector."""
 FULL_STEP_LIMIT = {"work.h": Ref("work.left"), "work.is_wait": Value(False)}
-"""What the limit of a step is where no wait ends inside it."""
+"""Assignments of the block `limit` in a step in which no wait ends."""
 PAGE_PREFIXES = ("derived.", "calibration.")
+"""Prefixes of names that are the same for all variants and constant during a run."""
 READ_PREFIXES = ("state.", "discrete.", "before.", "memory.armed", "memory.time")
+"""Prefixes of names that a step without an event may read from an instance."""
 WRITTEN_PREFIXES = ("state.", "memory.time")
-"""What a step without an event may read of an instance, and write; the page is the same for all."""
+"""Prefixes of names that a step without an event may write to an instance."""
 
 
 class NotVectorisable(Exception):
-    """A block that is not arithmetic of reals."""
+    """A block that is not arithmetic of reals and truth values."""
 
 
 @dataclass
 class VectorEmitter:
-    """The blocks of a Program over vectors; `touched` are the names that they read and write."""
+    """Prints blocks of a Program over vectors.
+
+    `kinds` are the kinds of all reals and truth values, `fixed` the names that are equal in all
+    lanes. `blocks` collects the printed lines, `accessed` the names that are read or written, and
+    `called_functions` the functions with their number of arguments.
+    """
 
     program: Program
     kinds: Mapping[str, LaneKind]
@@ -59,14 +67,19 @@ class VectorEmitter:
     accessed: dict[str, LaneKind] = field(default_factory=dict)
     called_functions: dict[str, int] = field(default_factory=dict)
     named_values: dict[str, tuple[str, LaneKind]] = field(default_factory=dict)
-    """What stands for values that have been made, with their kinds."""
+    """C names and kinds of local values, which replace names of the Program."""
 
     def emit_block(self, name: str, ops: Block) -> None:
-        """Print a block, after those that it runs."""
+        """Print a block into `blocks`, and first those that it runs, unless it is printed
+        already.
+        """
         if name not in self.blocks:
             self.blocks[name] = [f"    {line}" for op in ops for line in self._emit_op(op)]
 
     def _emit_op(self, op: Op) -> Iterator[str]:
+        """Yield the lines of an assignment or a call of a block. Raises NotVectorisable for
+        others.
+        """
         match op:
             case Assign(target, value, _) if self.kind_of(Ref(target)) == self.kind_of(value):
                 yield from emit_wrapped_statement(
@@ -79,12 +92,12 @@ class VectorEmitter:
                 raise NotVectorisable
 
     def vector_member(self, name: str) -> str:
-        """Return where a vector of a name is."""
+        """Return the C text of the vector of a name, and record the access."""
         self.accessed.setdefault(name, self.kind_of(Ref(name)))
         return f"all->{flatten_name(name)}"
 
     def kind_of(self, expr: Expr) -> LaneKind:
-        """Return what an expression is. Raises NotAbreast for whole numbers and tables."""
+        """Return the kind of an expression. Raises NotVectorisable for whole numbers and tables."""
         match expr:
             case Value(value) if isinstance(value, bool):
                 return "truth"
@@ -104,7 +117,9 @@ class VectorEmitter:
         raise NotVectorisable
 
     def emit_expression(self, expr: Expr) -> str:
-        """Return the C text of an expression over vectors."""
+        """Return the C text of an expression over vectors. Raises NotVectorisable if there is
+        none.
+        """
         match expr:
             case Value(value) if isinstance(value, bool):
                 return "EVERY_LANE" if value else "NO_LANE"
@@ -133,6 +148,9 @@ class VectorEmitter:
         raise NotVectorisable
 
     def _emit_comparison(self, operator: str, left: Expr, right: Expr) -> str:
+        """Return the C text of a comparison of two reals, or of `==` and `!=` of two truth
+        values.
+        """
         kinds = self.kind_of(left), self.kind_of(right)
         if kinds == ("real", "real"):
             return (
@@ -145,14 +163,14 @@ class VectorEmitter:
 
 
 def flatten_name(name: str) -> str:
-    """Return the member of a name: its group and itself."""
+    """Return the member name of a variable: its full name with underscores for dots and blanks."""
     return name.replace(".", "_").replace(" ", "_")
 
 
 def simd_batch_context(program: Program, row_slots: list[tuple[int, str]]) -> dict[str, Any] | None:
-    """Return what the template of steps side by side reads; None where a step is not arithmetic.
+    """Return the template context of SIMD steps; None if a step cannot be vectorised.
 
-    `row_slots` are the slots of a row with the variables that they show.
+    `row_slots` are pairs of a slot in a row and the variable that fills it.
     """
     try:
         return _BatchBuilder(program, row_slots).context()
@@ -161,7 +179,11 @@ def simd_batch_context(program: Program, row_slots: list[tuple[int, str]]) -> di
 
 
 class _BatchBuilder:
-    """Steps side by side of one Program."""
+    """Builds the template context of the SIMD steps of one Program.
+
+    Raises NotVectorisable for float32, invariants, regions, delays, waits that are loaded, and
+    ranges of other variables than states and discrete ones.
+    """
 
     def __init__(self, program: Program, row_slots: list[tuple[int, str]]) -> None:
         if (
@@ -189,6 +211,7 @@ class _BatchBuilder:
         self.emitter = VectorEmitter(program, kinds, fixed)
 
     def context(self) -> dict[str, Any]:
+        """Return the template context. Raises NotVectorisable."""
         self._require_full_step()
         modes = [self._mode_context(number, block) for number, block in self._mode_blocks("flow")]
         equations = dict(self._mode_blocks("equations"))
@@ -221,7 +244,7 @@ class _BatchBuilder:
     def _select_members(
         self, accessed: Mapping[str, LaneKind], groups: tuple[str, ...]
     ) -> list[tuple[str, LaneKind, str]]:
-        """Return the members of some groups, with what they are and their places in an instance."""
+        """Return the accessed members of some groups: name, kind and place in an instance."""
         c_names = CNames(self.program)
         return [
             (flatten_name(name), kind, c_names(name).replace("->", "."))
@@ -230,7 +253,7 @@ class _BatchBuilder:
         ]
 
     def _require_full_step(self) -> None:
-        """A step goes to its end: no wait ends inside it, and nothing counts its time."""
+        """Raise NotVectorisable unless every step has its full length: no wait ends inside it."""
         values = {
             op.target: op.value for op in self.program.blocks["limit"] if isinstance(op, Assign)
         }
@@ -241,6 +264,9 @@ class _BatchBuilder:
             raise NotVectorisable
 
     def _mode_blocks(self, name: str) -> Iterator[tuple[int, str]]:
+        """Yield the number of each mode and the block that the switch in block `name` runs for
+        it.
+        """
         (chosen,) = self.program.blocks[name]
         if not isinstance(chosen, Switch) or chosen.selector != MODE_VARIABLE:
             raise NotVectorisable
@@ -250,7 +276,11 @@ class _BatchBuilder:
             yield number, run.block
 
     def _mode_context(self, number: int, name: str) -> dict[str, Any]:
-        """Return a step of a mode up to where something may happen, and what it then commits."""
+        """Return the context of a step in a mode: the block up to the event branch, and the states
+        after it.
+
+        Raises NotVectorisable if anything but assignments of states follows the branch.
+        """
         ops = self.program.blocks[name]
         (place,) = [k for k, op in enumerate(ops) if isinstance(op, Branch)]
         event_branch, rest = ops[place], ops[place + 1 :]
@@ -266,7 +296,7 @@ class _BatchBuilder:
         return {"number": number, "block": name, "commits": commits}
 
     def _row_value(self, name: str) -> str:
-        """Return what is written to a row of a lane."""
+        """Return the C text of the value that a lane writes to a row."""
         if name == MODE_VARIABLE:
             return "(double)all->mode[lane]"
         member = self.emitter.vector_member(name)

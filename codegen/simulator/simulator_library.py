@@ -1,6 +1,6 @@
-"""Library: the C of a system's runs, compiled for this machine, loaded, and called.
+"""Simulator library: compiles the C of a system's simulation, loads it and runs variants.
 
-`run_variants` holds no lock of Python: several threads may each carry out a part of the variants.
+The call of C releases Python's global lock, so several threads may each run a part of the variants.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from language.programs.simulation_assembly import SimulationAssembly
 Pointer = ctypes.c_void_p
 Int64 = ctypes.c_int64
 SHARED_LIBRARY_FLAGS = ("-fPIC", "-shared")
+"""Compiler flags of a shared library."""
 
 
 class FlowStruct(ctypes.Structure):
-    """`FlowPlan` of templates/run.h.jinja."""
+    """The structure `FlowPlan` of templates/simulator/run.h.jinja."""
 
     _fields_ = [
         (name, Pointer)
@@ -47,7 +48,7 @@ class FlowStruct(ctypes.Structure):
 
 
 class PlanStruct(ctypes.Structure):
-    """`Plan` of templates/run.h.jinja."""
+    """The structure `Plan` of templates/simulator/run.h.jinja."""
 
     _fields_ = [
         ("instants", Int64),
@@ -74,7 +75,7 @@ class PlanStruct(ctypes.Structure):
 
 
 class VariantsStruct(ctypes.Structure):
-    """`Variants` of templates/run_driver.c.jinja."""
+    """The structure `Variants` of templates/simulator/run_driver.c.jinja."""
 
     _fields_ = [
         ("values", Pointer),
@@ -104,13 +105,14 @@ class VariantsStruct(ctypes.Structure):
 
 
 class SimulatorLibrary:
-    """The compiled runs of one assembly; `columns` are the places of its columns in a row.
+    """The compiled simulation of an assembly.
 
-    `lanes` is how many variants may be carried out side by side: of so many there is room for rows.
+    `columns` are the positions of the recorded columns in a row of `width` values. `lanes` is the
+    number of variants that may run at once; the caller provides rows for as many.
     """
 
     def __init__(self, assembly: SimulationAssembly, path: Path) -> None:
-        """Load what was built."""
+        """Load a compiled library."""
         self.assembly = assembly
         self.columns = tuple(column_positions(assembly))
         self.width = row_width(assembly)
@@ -120,24 +122,27 @@ class SimulatorLibrary:
         self._run.restype = None
 
     def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
-        """Return what carries variants out, from a first to one behind the last.
+        """Return a function that runs the variants from a first index up to, but not including, a
+        second.
 
-        `plan` is an engine's (engine/batch/run_plan.py), `variants` are the members of `Variants` in C: whole
-        numbers, arrays, lists of arrays; all arrays contiguous.
+        `plan` is a plan of the engine (engine/batch/run_plan.py). `variants` gives the members of
+        the C structure `Variants`: whole numbers, contiguous arrays, or lists of arrays. Results
+        are written into these arrays.
         """
-        struct, kept = self._pack_plan(plan)
+        struct, keep_alive = self._pack_plan(plan)
         members = VariantsStruct()
         for name, value in variants.items():
-            setattr(members, name, _struct_member(value, kept))
-        run, places = self._run, (ctypes.addressof(struct), ctypes.addressof(members))
-        kept += [struct, members]
+            setattr(members, name, _struct_member(value, keep_alive))
+        run, addresses = self._run, (ctypes.addressof(struct), ctypes.addressof(members))
+        keep_alive += [struct, members]
 
-        def carry_out(first: int, behind: int, kept: list[Any] = kept) -> None:
-            run(*places, first, behind)
+        def run_part(first: int, end: int, keep_alive: list[Any] = keep_alive) -> None:
+            run(*addresses, first, end)
 
-        return carry_out
+        return run_part
 
     def _pack_plan(self, plan: Any) -> tuple[PlanStruct, list[Any]]:
+        """Return a plan as a C structure, and the objects that must stay alive while it is used."""
         keep_alive: list[Any] = []
         flows = (FlowStruct * max(1, len(plan.flows)))()
         for struct, name in zip(flows, self.assembly.continuous_instances, strict=False):
@@ -181,7 +186,7 @@ class SimulatorLibrary:
 
 @dataclass(frozen=True)
 class _LibraryKey:
-    """What a library is of: those of one process are loaded once."""
+    """The key of a loaded library; libraries with equal keys are loaded once in a process."""
 
     digest: str
     command: tuple[str, ...]
@@ -196,10 +201,10 @@ def load_library(
     compiler_name: str | None = None,
     simd_batch: bool = True,
 ) -> SimulatorLibrary:
-    """Return the compiled runs of an assembly, kept from an earlier time if there was one.
+    """Return the loaded simulation of an assembly, compiled if it is not in the cache.
 
-    A single run needs none `simd_batch`, and is compiled sooner without. Raises ToolMissing,
-    BuildError.
+    Without `simd_batch` it has no SIMD steps over variants and compiles faster; a single run needs
+    none. Raises MissingToolError, BuildError.
     """
     parts = (*find_compiler(compiler_name), *flags)
     library_key = _LibraryKey(assembly.digest(), parts, cache_folder(), simd_batch, assembly)
@@ -210,6 +215,7 @@ def load_library(
 def _load_cached(
     library_key: _LibraryKey, flags: tuple[str, ...], compiler_name: str | None
 ) -> SimulatorLibrary:
+    """Return the library of a key, from the cache of compiled programs if it was built before."""
     assembly = library_key.assembly
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -227,7 +233,7 @@ def _load_cached(
 def build_library(
     sources: Sequence[Path], target: Path, flags: Sequence[str], compiler_name: str | None
 ) -> None:
-    """Compile the sources side by side, and link them."""
+    """Compile the sources in parallel and link them to a shared library. Raises BuildError."""
     command = find_compiler(compiler_name)
     compile_command = [*command, *flags, "-fPIC"]
     version, room = compiler_version(compiler_name), sources[0].parent / "objects"
@@ -252,7 +258,11 @@ def build_library(
 
 
 def _struct_member(value: Any, keep_alive: list[Any]) -> Any:
-    """Return a member of a struct: a number, the address of an array, or of a list of addresses."""
+    """Return the value of a member of a C structure: a number, an address, or an array of
+    addresses.
+
+    Objects whose memory it refers to are appended to `keep_alive`.
+    """
     if value is None or isinstance(value, int):
         return value
     if isinstance(value, list):

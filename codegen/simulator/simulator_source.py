@@ -1,7 +1,7 @@
-"""Run source: a whole system as C that carries out a planned run in one call, for this machine.
+"""Simulator source: prints a whole system as C that executes a planned run in one call.
 
-The blocks are those of the Programs, printed as everywhere; around them stands what the engine does
-between them (engine/simulation/simulate.py, engine/execution/event_loop.py), so that both have the same bits.
+The blocks are those of the Programs. The code around them does what the engine does between blocks
+(engine/simulation/simulate.py, engine/execution/event_loop.py), so both have the same bits.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from language.programs.simulation_assembly import (
 
 
 def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) -> dict[str, str]:
-    """Return the files of a system's runs by name; `simd_batch` ones are for many variants."""
+    """Return the C files of a system's simulation by name; with `simd_batch` also SIMD steps."""
     programs = {
         name: _instance_program(name, program) for name, program in assembly.programs.items()
     }
@@ -77,7 +77,11 @@ def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) 
 
 
 def _instance_program(name: str, program: Program) -> Program:
-    """Return the Program of an instance as it is printed: its parts, or its tick."""
+    """Return the Program of an instance for printing.
+
+    A sampled one has flags for range violations; a continuous one has the blocks that an engine
+    runs.
+    """
     own = dataclasses.replace(program, name=INSTANCE_NAME.format(name))
     if program.period is not None:
         return add_range_marks(own)
@@ -92,6 +96,7 @@ def _driver_context(
     signal_names: SignalNameMap,
     modules: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
+    """Return the template context of the driver."""
     instances = [
         {
             **_instance_context(assembly, name, program, signal_names),
@@ -134,7 +139,7 @@ def _driver_context(
 def _formula_columns(
     assembly: SimulationAssembly, row_names: SignalNameMap
 ) -> list[tuple[int, str]]:
-    """Return the place in a row of each column that is a formula, behind the slots, and its C."""
+    """Return the position in a row and the C text of each recorded column with a formula."""
     blocks = [column.block for column in assembly.columns if column.block]
     return [
         (len(assembly.row_signals) + k, row_names.emit_formula(block))
@@ -143,7 +148,9 @@ def _formula_columns(
 
 
 def _capture_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
-    """Return, for each sensor with a delay, the happening at which it captures, and the call."""
+    """Return, for each sensor with a delay, the index of its capture among the actions, and its
+    call.
+    """
     return [
         (
             assembly.instant_actions.index(f"capture {n}"),
@@ -157,7 +164,9 @@ def _capture_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
 def _slot_context(
     assembly: SimulationAssembly, signal: str, signal_names: SignalNameMap
 ) -> dict[str, object]:
-    """Return what fills a slot of a row; an input may change between the instants."""
+    """Return the context of a slot of a row; an input with a trajectory is evaluated between
+    instants.
+    """
     courses = [course.name for course in assembly.input_trajectories]
     value = signal_names.emit_signal(signal)
     if signal in courses:
@@ -166,6 +175,9 @@ def _slot_context(
 
 
 def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> dict[str, object]:
+    """Return the context of an input trajectory: its delay as a sum of two doubles, and its
+    formulas.
+    """
     high = float(course.delay)
     return {
         "delay": course.delay,
@@ -180,6 +192,7 @@ def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> di
 
 
 def _happening_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
+    """Return the index and the call of each action at an instant: samples of sensors and ticks."""
     calls = []
     for name in assembly.order:
         own = INSTANCE_NAME.format(name)
@@ -194,6 +207,7 @@ def _happening_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
 def _instance_context(
     assembly: SimulationAssembly, name: str, program: Program, signal_names: SignalNameMap
 ) -> dict[str, Any]:
+    """Return the context of an instance in the driver: inputs, flags, page and monitors."""
     is_flow = program.period is None
     varied = {c_member(c.name) for owner, c in assembly.tunables() if owner == name}
     flags = [
@@ -226,6 +240,7 @@ def _instance_context(
 def _feed_context(
     feed: InputSource, program: Program, signal_names: SignalNameMap
 ) -> dict[str, object]:
+    """Return the context of an input of an instance: its C type and the value that it is fed."""
     kind = c_type(feed.variable, program.number_type)
     if feed.block:
         value = signal_names.emit_formula(feed.block)
@@ -242,6 +257,9 @@ def _feed_context(
 
 
 def _sensor_context(sensor: Sensor, signal_names: SignalNameMap) -> dict[str, object]:
+    """Return the context of a sensor: source, lag, noise, resolution and length of the delay
+    buffer.
+    """
     name, lag = INSTANCE_NAME.format(sensor.name), float(sensor.lag)
     look = f"lag_look(&me->lag, {lag!r}, now, measured)" if sensor.lag else "measured"
     room = math.ceil(sensor.delay / sensor.period) + 2 if sensor.period and sensor.delay else 0

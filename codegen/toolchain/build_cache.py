@@ -1,7 +1,7 @@
-"""Cache: compiled programs, kept per user, so that the same C is compiled once.
+"""Build cache: compiled programs of a user, so that the same C is compiled once.
 
-A key is the digest of sources, compiler and flags. The folder is the user's own and closed to
-others (0700); one that is not is left alone, and programs are compiled anew each time.
+A key is the digest of the sources, the compiler and its flags. The folder belongs to the user and
+is closed to others (mode 0700). Any other folder is not used, and programs are compiled each time.
 """
 
 from __future__ import annotations
@@ -17,21 +17,36 @@ from contextlib import suppress
 from pathlib import Path
 
 CACHE_VARIABLE = "MODEWRIGHT_CACHE"
+"""The environment variable with the folder of the cache."""
 KEY_LENGTH = 64
+"""Number of characters of a key."""
 MAX_PROGRAMS = 200
-"""Programs kept; beyond, those not used for a day go, the oldest first (100 kB each)."""
+"""Number of programs that are always kept (100 kB each). Of more, those not used for a day are
+
+removed, the oldest first.
+"""
 PROGRAM_SUFFIXES = ("", ".so")
-"""Of programs: what else has a key, such as thresholds of a bootstrap, is small and stays."""
+"""Suffixes of programs. Other entries with a key, such as thresholds of a bootstrap, are small and
+are
+
+never removed.
+"""
 DAY = 86400.0
+"""A day [s]."""
 HOUR = 3600.0
+"""An hour [s]."""
 CLEANUP_STAMP = "tidied"
-"""A file whose age tells when its folder was looked through: not with each program, a look at
-thousands of them takes as long as a small program to compile."""
+"""A file whose modification time is that of the last clean-up. A clean-up lists thousands of files,
+
+which takes as long as the compilation of a small program, so it is not done for each program.
+"""
 log = logging.getLogger("modewright.cache")
 
 
 def cache_folder() -> Path:
-    """Return where programs are kept: $MODEWRIGHT_CACHE, else below the user's cache folder."""
+    """Return the folder of the cache: $MODEWRIGHT_CACHE, else `modewright` in the user's cache
+    folder.
+    """
     if given := os.environ.get(CACHE_VARIABLE):
         return Path(given)
     base = os.environ.get("XDG_CACHE_HOME", "")
@@ -39,7 +54,10 @@ def cache_folder() -> Path:
 
 
 def cache_fault(folder: Path) -> str:
-    """Return why a folder must not be used as a cache; an empty text if it may be."""
+    """Return the reason why a folder must not be used as a cache; an empty text if it may.
+
+    The folder is created if it does not exist.
+    """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.lstat()
@@ -57,13 +75,17 @@ def cache_fault(folder: Path) -> str:
 
 
 def cache_subfolder(subfolder: str) -> Path | None:
-    """Return the folder inside the cache where others than programs are kept; None without one."""
+    """Return a folder inside the cache for other contents than programs; None if it cannot be
+    used.
+    """
     folder, fault = _locate_folder(subfolder)
     return None if fault else folder
 
 
 def _locate_folder(subfolder: str) -> tuple[Path, str]:
-    """Return the cache or a `subfolder` inside it, and why it must not be used, if it must not."""
+    """Return the cache, or a `subfolder` of it, with the reason why it must not be used, else
+    "".
+    """
     try:
         folder = cache_folder()
         fault = cache_fault(folder)
@@ -81,16 +103,16 @@ def key_of(
     version: str,
     dependencies: Iterable[Path] | None = None,
 ) -> str:
-    """Return the key of a program: what is compiled, all in one folder, by what, and how.
+    """Return the key of a program: the digest of its sources, its compiler command and version.
 
-    `dependencies` are the files of that folder that it follows from, if not all of them.
+    The digest covers all files below the folder of the first source, or only `dependencies`.
     """
     digest = hashlib.sha256()
     for text in (*command, version, *(path.name for path in sources)):
         digest.update(text.encode() + b"\0")
     folder = sources[0].parent
-    found = folder.rglob("*") if dependencies is None else dependencies
-    for path in sorted(path for path in found if path.is_file()):
+    files = folder.rglob("*") if dependencies is None else dependencies
+    for path in sorted(path for path in files if path.is_file()):
         name = path.relative_to(folder).as_posix()
         digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
@@ -99,9 +121,10 @@ def key_of(
 def get_or_build(
     key: str, build: Callable[[Path], None], fallback_folder: Path, subfolder: str = ""
 ) -> Path:
-    """Return the program of a key, made by `build` if it is not kept; in `fallback_folder` without a cache.
+    """Return the path of the program with a key, built by `build` if it is not in the cache.
 
-    `subfolder` is the folder inside the cache where others than programs are kept.
+    `build` writes to the path that it is given. If the cache cannot be used, the program is in
+    `fallback_folder`, and a warning is logged. `subfolder` is a folder inside the cache.
     """
     folder, fault = _locate_folder(subfolder)
     if fault:
@@ -126,7 +149,9 @@ def get_or_build(
 
 
 def _is_valid(target: Path) -> bool:
-    """Tell whether a kept program is the user's own, whole, and may be run."""
+    """Tell whether a cached program belongs to the user, is executable, and has the stored
+    digest.
+    """
     try:
         status = target.lstat()
         expected_digest = _digest_file(target).read_text()
@@ -140,7 +165,7 @@ def _is_valid(target: Path) -> bool:
 
 
 def _store(built: Path, target: Path) -> None:
-    """Copy a program and the digest of its bytes beside it, each whole or not at all."""
+    """Copy a program and its digest into the cache; each file is replaced atomically."""
     data = built.read_bytes()
     digest = hashlib.sha256(data).hexdigest().encode()
     for path, content, mode in ((target, data, 0o700), (_digest_file(target), digest, 0o600)):
@@ -156,14 +181,16 @@ def _store(built: Path, target: Path) -> None:
 
 
 def _digest_file(target: Path) -> Path:
+    """Return the path of the file with the digest of a program."""
     return target.with_name(target.name + ".sha256")
 
 
 def remove_old_programs(folder: Path) -> None:
-    """Remove the oldest programs that are kept in a folder, and in each inside it; look for them
-    once an hour at most.
+    """Remove the oldest programs of a folder and of its subfolders, at most once an hour.
 
-    What belongs to a program begins with its key. Reading counts as use where the system tells it.
+    The MAX_PROGRAMS programs that were used last stay, as do those used within a day. A program is
+    removed together with all files whose names begin with its key. The time of use is the later of
+    the access and modification times.
     """
     stamp = folder / CLEANUP_STAMP
     with suppress(OSError):
@@ -178,8 +205,8 @@ def remove_old_programs(folder: Path) -> None:
             remove_old_programs(path)
         elif len(key) == KEY_LENGTH:
             with suppress(OSError):  # another process may have removed it
-                found = path.stat()
-                used[key] = max(used.get(key, 0.0), found.st_mtime, found.st_atime)
+                status = path.stat()
+                used[key] = max(used.get(key, 0.0), status.st_mtime, status.st_atime)
                 files.setdefault(key, []).append(path)
     programs = [key for key in used if any(path.suffix in PROGRAM_SUFFIXES for path in files[key])]
     newest_first = sorted(programs, key=lambda key: -used[key])

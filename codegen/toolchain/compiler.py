@@ -1,4 +1,6 @@
-"""Build: generated C compiled with the flags under which its bits are defined (rule C3)."""
+"""Compiler: compiles generated C with the flags under which its bits are defined (rules C3 and
+C24).
+"""
 
 from __future__ import annotations
 
@@ -13,6 +15,7 @@ from pathlib import Path
 from language.text.diagnostic import MissingToolError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
+"""The flags that define the bits of results."""
 
 WARNINGS = [
     "-Wall",
@@ -30,17 +33,24 @@ WARNINGS = [
     "-Wswitch-enum",
     "-Wvla",
 ]
+"""The warnings under which generated C compiles without a message."""
 
 TIMEOUT = 120
-"""Longest compilation or run before it is given up."""
+"""Time limit of a compilation or a run [s]."""
 
 
 class BuildError(Exception):
-    """Generated code does not compile or run: a defect of ours; the message is the compiler's."""
+    """Generated code does not compile or run, which is a defect of the product.
+
+    The message is that of the compiler or of the program.
+    """
 
 
 def find_compiler(name: str | None = None) -> list[str]:
-    """Return the C compiler: the one named, else `CC`, else cc, gcc, clang. Raises ToolMissing."""
+    """Return the command of the C compiler: `name`, else $CC, else the first of cc, gcc and clang.
+
+    Raises MissingToolError if it is not installed.
+    """
     requested = shlex.split(name or os.environ.get("CC", ""))
     for candidate in [requested] if requested else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
@@ -52,12 +62,15 @@ def find_compiler(name: str | None = None) -> list[str]:
 
 
 def flags_at_level(level: str) -> tuple[str, ...]:
-    """Return the flags with another level of optimisation, like `O3`."""
+    """Return FLAGS with another optimisation level, for example `O3`."""
     return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
 
 
 def compiler_version(name: str | None = None) -> str:
-    """Return where the compiler is and the first line that it says of itself. Raises BuildError."""
+    """Return the path of the compiler and the first line of its version.
+
+    Raises MissingToolError; BuildError if it does not run.
+    """
     command = find_compiler(name)
     try:
         done = subprocess.run(
@@ -75,14 +88,20 @@ def compile_program(
     flags: Sequence[str] = FLAGS,
     compiler_name: str | None = None,
 ) -> None:
-    """Compile sources into an executable. Raises ToolMissing, BuildError."""
+    """Compile sources with all warnings enabled into an executable or a library, according to
+    `flags`.
+
+    Raises MissingToolError, BuildError.
+    """
     run_compiler(
         [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
     )
 
 
 def run_compiler(command: Sequence[str], target: Path) -> None:
-    """Let a compiler make an executable. Raises BuildError with its first error."""
+    """Run a compiler command with `-o target`. Raises BuildError with its output from the first
+    error on.
+    """
     try:
         done = subprocess.run(
             [*command, "-o", str(target)], capture_output=True, text=True, timeout=TIMEOUT
@@ -96,8 +115,10 @@ def run_compiler(command: Sequence[str], target: Path) -> None:
 def run_executable(
     target: Path, records: bytes, extra_environment: Mapping[str, str] | None = None
 ) -> bytes:
-    """Run a harness on input records, with `extra_environment` in its environment, and return its output
-    records. Raises BuildError.
+    """Run an executable on input records and return its output.
+
+    `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code and
+    after TIMEOUT seconds.
     """
     environment = {**os.environ, **(extra_environment or {})}
     try:
@@ -112,19 +133,23 @@ def run_executable(
 
 
 def _first_error(text: str) -> str:
-    """Return what a compiler said, from its first error on."""
+    """Return the output of a compiler from its first error on; all of it if it has none."""
     lines = text.strip().splitlines()
     first = next((k for k, line in enumerate(lines) if "error:" in line), 0)
     return "\n".join(lines[first:])
 
 
 def has_gcc_vectors() -> bool:
-    """Tell whether the compiler is a GCC for x86-64: tracks use its vectors. Raises ToolMissing."""
+    """Tell whether the compiler is GCC for x86-64, whose vector extensions SIMD code uses.
+
+    Raises MissingToolError.
+    """
     return _has_gcc_vectors(tuple(find_compiler()))
 
 
 @cache
 def _has_gcc_vectors(command: tuple[str, ...]) -> bool:
+    """Tell the same of a compiler command, from its predefined macros; False if it does not run."""
     query = [*command, "-dM", "-E", "-x", "c", "-"]
     try:
         result = subprocess.run(query, input="", capture_output=True, text=True, timeout=TIMEOUT)

@@ -1,4 +1,4 @@
-"""Tool: programs of others that generated C is compiled, run and checked with; how to get them."""
+"""External tools: programs that compile, run and check generated C, and how to install them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ARM_OBJECTS = "arm-none-eabi-objdump"
 ARM_LINES = "arm-none-eabi-addr2line"
 EMULATOR = "qemu-system-arm"
 TOOL_TIMEOUT = 900
-"""Longest run of a tool before it is given up."""
+"""Time limit of a tool [s]."""
 DEBIAN_PACKAGES: Mapping[str, str] = {
     "gcc": "gcc libc6-dev",
     "clang-19": "clang-19 libclang-rt-19-dev",
@@ -31,11 +31,13 @@ DEBIAN_PACKAGES: Mapping[str, str] = {
     "why3": "why3",
     "z3": "z3",
 }
-"""Their Debian packages."""
+"""The Debian packages of the tools."""
 
 
 def require_tool(tool: str) -> str:
-    """Return the name of a tool that is installed. Raises ToolMissing."""
+    """Return the name of a tool if it is installed. Raises MissingToolError with its package
+    otherwise.
+    """
     if shutil.which(tool) is None:
         package = DEBIAN_PACKAGES.get(tool, tool)
         raise MissingToolError(f"`{tool}` is missing: apt-get install {package}")
@@ -45,7 +47,11 @@ def require_tool(tool: str) -> str:
 def run_tool(
     command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a tool in a folder, with `extra_environment` in its environment. Raises ToolMissing, BuildError."""
+    """Run a tool in a folder and return the completed process, whatever its exit code.
+
+    `extra_environment` is added to the environment. Raises MissingToolError; BuildError after
+    TOOL_TIMEOUT seconds.
+    """
     tool, *words = command
     try:
         return subprocess.run(
@@ -64,8 +70,10 @@ def run_tool(
 def output_of(
     command: Sequence[str], folder: Path, extra_environment: Mapping[str, str] | None = None
 ) -> str:
-    """Return what a tool prints, with `extra_environment` in its environment. Raises ToolMissing; BuildError
-    with what it said.
+    """Return the standard output of a tool that is run in a folder.
+
+    `extra_environment` is added to the environment. Raises MissingToolError; BuildError with its
+    error output for a nonzero exit code.
     """
     done = run_tool(command, folder, extra_environment)
     if done.returncode:

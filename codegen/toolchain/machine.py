@@ -1,4 +1,4 @@
-"""Machine: where generated C is compiled for, and how what was compiled is run there."""
+"""Machines: the targets for which generated C is compiled, and how programs are run on them."""
 
 from __future__ import annotations
 
@@ -13,25 +13,31 @@ from codegen.toolchain.compiler import TIMEOUT, BuildError, find_compiler, run_e
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR, require_tool
 
 CORTEX_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+"""Compiler flags of a Cortex-M4F."""
 CORTEX_LINK_FLAGS = (
     "-nostartfiles",
     "-Wl,--gc-sections",
     "--specs=nano.specs",
     "--specs=nosys.specs",
 )
+"""Linker flags of a Cortex-M4F."""
 BOARD, LINKER_SCRIPT = "mps2-an386", "mps2_an386.ld"
+"""The emulated board and its linker script."""
 HARNESS_EXIT_CODES = {
     3: "a file of records cannot be opened",
     4: "records cannot be written",
     6: "FPSCR is not 0",
 }
-"""What exit codes of the harness of a target mean."""
+"""Meaning of the exit codes of the harness on a target."""
 
 
 @dataclass(frozen=True)
 class Machine:
-    """`files` are those of the harness that it needs; `command` and `link` are words of a compiler:
-    for the one that is named, and with the files in a folder. `run` is given records of inputs.
+    """A target machine.
+
+    `files` are the files of the harness that it needs. `command` returns the compiler command for a
+    compiler name or None. `link` returns linker flags, given the folder of the harness files. `run`
+    runs an executable on input records and returns its output.
     """
 
     name: str
@@ -47,11 +53,15 @@ def harness_file(name: str) -> Path:
 
 
 def _find_cross_compiler(name: str | None) -> list[str]:
+    """Return the command of the compiler for a Cortex-M4F. Raises MissingToolError."""
     return [name or require_tool(ARM_COMPILER), *CORTEX_FLAGS]
 
 
 def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
-    """Run a program of a Cortex-M4F in QEMU on records. Raises ToolMissing, BuildError."""
+    """Run a program for a Cortex-M4F in QEMU on input records and return its output.
+
+    Raises MissingToolError; BuildError for a nonzero exit code and after TIMEOUT seconds.
+    """
     emulator = require_tool(EMULATOR)
     semihosting = ("-semihosting-config", "enable=on,target=native")
     headless = ("-nographic", "-monitor", "none", "-serial", "none")
@@ -75,6 +85,7 @@ def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> by
 
 
 HOST = Machine("host", ("stdio.c",), find_compiler, lambda folder: ("-lm",), run_executable)
+"""This machine."""
 CORTEX_M4F = Machine(
     "cortex-m4f",
     ("semihosting.c", "cortex_m4f.c", LINKER_SCRIPT),
@@ -82,4 +93,6 @@ CORTEX_M4F = Machine(
     lambda folder: (*CORTEX_LINK_FLAGS, "-T", str(folder / LINKER_SCRIPT), "-lm", "-lc", "-lgcc"),
     run_in_qemu,
 )
+"""An emulated Cortex-M4F."""
 MACHINES = {machine.name: machine for machine in (HOST, CORTEX_M4F)}
+"""All machines by name."""

@@ -1,6 +1,6 @@
-"""Objects: what is the same in many programs - mathematics, records - is compiled once.
+"""Object cache: sources that many programs share, such as ha_math, are compiled once.
 
-They are kept beside the programs (cache.py), and linked to what is a program's own.
+The objects are stored beside the programs (build_cache.py) and linked with the other sources.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from codegen.toolchain.build_cache import get_or_build, key_of
 from codegen.toolchain.compiler import run_compiler
 
 SHARED_SOURCES = re.compile(r"(ha_mathf?|harness/\w+)\.c$")
-"""Sources that do not follow from a Program. What is beside one of them in `harness` it may read,
-ha_math its own header alone.
+"""Sources that do not depend on a Program. A source in `harness` may read all files beside it;
+ha_math
+
+reads its own header only.
 """
 
 
@@ -24,10 +26,10 @@ def is_shared(source: Path) -> bool:
 
 
 def object_of(source: Path, command: Sequence[str], version: str, folder: Path) -> Path:
-    """Return the object of a shared source, kept from an earlier time if there was one.
+    """Return the object file of a shared source, from the cache if it was compiled before.
 
-    `command` are the compiler and its flags, `version` is what it says of itself. Without a cache
-    the object is made in `folder`. Raises BuildError.
+    `command` is the compiler with its flags, `version` its version. If the cache cannot be used,
+    the object is in `folder`. Raises BuildError.
     """
     read = None if source.parent.name == "harness" else [source, source.with_suffix(".h")]
     key = key_of([source], [*command, "-c"], version, read)
@@ -42,5 +44,5 @@ def object_of(source: Path, command: Sequence[str], version: str, folder: Path) 
 def substitute_objects(
     sources: Sequence[Path], command: Sequence[str], version: str, folder: Path
 ) -> list[Path]:
-    """Return the sources with an object in place of each one that is shared. Raises BuildError."""
+    """Return the sources, with each shared one replaced by its object file. Raises BuildError."""
     return [object_of(s, command, version, folder) if is_shared(s) else s for s in sources]

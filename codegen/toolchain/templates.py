@@ -1,4 +1,4 @@
-"""Rendering: text from a template, and the version that stands in it."""
+"""Templates: renders text with Jinja, and gives the version of the product (rule C25)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from jinja2.bccache import Bucket
 from codegen.toolchain.build_cache import cache_subfolder
 
 TEMPLATE_CACHE = "templates"
-"""Folder inside the cache where compiled templates are kept."""
+"""The folder inside the cache for compiled templates."""
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:
-    """Return a template filled in; a hole without a value is an error (rule C25)."""
+    """Return a rendered template; a variable without a value is an error (rule C25)."""
     return _environment().get_template(template).render(context)
 
 
 @cache
 def _environment() -> jinja2.Environment:
+    """Return the Jinja environment of the templates of this package."""
     folder = resources.files("codegen").joinpath("templates")
     return jinja2.Environment(
         loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
@@ -38,10 +39,13 @@ def _environment() -> jinja2.Environment:
 
 
 class _TemplateCache(jinja2.FileSystemBytecodeCache):
-    """Compiled templates, kept where there is room for them: compiling all takes 0.1 s."""
+    """A cache of compiled templates that ignores damaged and unwritable files.
+
+    The compilation of all templates takes 0.1 s.
+    """
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        with suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):  # damaged: anew
+        with suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):
             super().load_bytecode(bucket)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
@@ -50,6 +54,7 @@ class _TemplateCache(jinja2.FileSystemBytecodeCache):
 
 
 def _template_cache() -> jinja2.BytecodeCache | None:
+    """Return the cache of compiled templates; None if the cache cannot be used."""
     folder = cache_subfolder(TEMPLATE_CACHE)
     return _TemplateCache(str(folder)) if folder else None
 

@@ -1,4 +1,4 @@
-"""Proof: one check of generated C by a tool of others, and what it found."""
+"""Tool verdict: the result of one check of generated C by an external tool."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from codegen.toolchain.external_tools import run_tool
 
 @dataclass(frozen=True)
 class ToolVerdict:
-    """What a `tool` says of the C of a Program: `findings`, none where the proof holds.
+    """The result of a check of generated C by a `tool`.
 
-    `about` tells what was looked at, and how much of it. One that is not asked says nothing.
+    `findings` are the problems; the check holds if there are none. `about` tells what was checked,
+    and how much of it. `is_asked` is false for a check that does not apply.
     """
 
     check: str
@@ -23,12 +24,14 @@ class ToolVerdict:
 
     @property
     def holds(self) -> bool:
-        """Tell whether nothing was found."""
+        """Tell whether there are no findings."""
         return not self.findings
 
 
 def tool_version(tool: str, folder: Path) -> str:
-    """Return the first number that a tool calls its version."""
+    """Return the version of a tool: the first word of its output that begins with a digit, else
+    "".
+    """
     words = run_tool(
         [tool, "--version" if tool != "frama-c" else "-version"], folder
     ).stdout.split()
