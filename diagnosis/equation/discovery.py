@@ -1,4 +1,7 @@
-"""Description: what an unknown is, as a formula - found by regression, fitted as an effect."""
+"""Equation discovery: a formula for an unknown disturbance, found by regression and fitted.
+
+The formula is fitted as an effect of the language, like those of the library.
+"""
 
 from __future__ import annotations
 
@@ -27,19 +30,19 @@ from diagnosis.selection.candidate_search import LogCallback
 from language.text.diagnostic import SpecError
 
 MAX_LOCATIONS = 2
-"""Places that are looked at, those whose freedom explains most."""
+"""Number of locations that are searched, those with the largest gains."""
 MAX_FITS = 3
-"""Formulas that are fitted, the best of the regressions."""
+"""Number of formulas that are fitted, the best ones of the regressions."""
 MAX_TERMS = 2
 LEADING_FRACTION = 0.85
-"""A formula at a place that asked for more of a freedom has to gain only this part."""
+"""Fraction of the best gain that suffices for a formula at a location of higher rank."""
 MIN_SECOND_TERM_GAIN = 45.0
-"""Nats that a second term has to gain."""
+"""Smallest gain [nats] of a second term."""
 
 
 @dataclass(frozen=True)
 class DiscoveredEquation:
-    """A formula at a place with its fit; `text` tells it with its values."""
+    """A formula at a location with its fit; `text` shows it with its values."""
 
     location: Location
     formula: FormulaEffect
@@ -56,7 +59,13 @@ def discover_equation(
     threshold: float,
     log: LogCallback = lambda text: None,
 ) -> DiscoveredEquation | None:
-    """Return the formula that explains most of what the base lacks; None where none gains."""
+    """Return the formula with the largest gain over the base, or None if none exceeds `threshold`.
+
+    The smaller one of the penalised and the cross-validated gain [nats] must exceed the threshold.
+    A formula at a location of higher rank, fitted again from the parameters of the best one, is
+    preferred if it has at least `LEADING_FRACTION` of its gain. `locations` are in the order of
+    their ranks.
+    """
     equations: list[DiscoveredEquation] = []
     for formula, location in _propose_formulas(model_set, base, locations):
         starts = [base.values(0), _values_beside_disturbance(base, location)]
@@ -80,11 +89,13 @@ def discover_equation(
 
 
 def _total_gain(equation: DiscoveredEquation) -> float:
+    """Return the total gain [nats] of a formula, -inf if it is not finite."""
     total = equation.likelihood_gain.total
     return total if np.isfinite(total) else -np.inf
 
 
 def _format_equation(equation: DiscoveredEquation) -> str:
+    """Return a formula with its location and gains as one line."""
     known = equation.likelihood_gain
     gains = f"train {known.penalised:.0f}, left out {known.cross_validated:.0f} nats"
     return f"{equation.text} at {equation.location.path}: {gains}"
@@ -93,7 +104,13 @@ def _format_equation(equation: DiscoveredEquation) -> str:
 def _propose_formulas(
     model_set: ModelSet, base: Estimate, locations: Sequence[Location]
 ) -> list[tuple[FormulaEffect, Location]]:
-    """Return the formulas worth a fit: the best single terms, and the best one with a second."""
+    """Return the formulas to fit, at most `MAX_FITS`: the best at each location, then the next
+    best.
+
+    Candidates are the best single terms and a pair of terms at each location with a gain and
+    without an accepted effect. Formulas without a regression gain, or that the model does not
+    accept, are left out.
+    """
     options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
     places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
     for location in places:
@@ -122,12 +139,16 @@ def _propose_formulas(
 
 
 def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
-    """Return the parameters [SI] that were fitted beside the freedom of a place."""
+    """Return the parameters [SI] that were fitted together with the free disturbance of a
+    location.
+    """
     return (location.free_model or base).values(0)
 
 
 def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
-    """Return the base, or what it is with the parameters fitted beside the freedom of a place."""
+    """Return the base at its own parameters or at those beside the free disturbance, which costs
+    less.
+    """
     point = vector_of(
         base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
     )
@@ -143,7 +164,10 @@ def _fit_formula(
     starts: Sequence[Mapping[str, float]],
     units: Mapping[str, float],
 ) -> DiscoveredEquation | None:
-    """Return a formula fitted from the best of some values of the base's parameters."""
+    """Return a formula fitted from the best of several `starts` [SI] of the base's parameters.
+
+    The result is None if the model with the formula is invalid or the fit diverges.
+    """
     try:
         candidate = model_set.compile_candidate((formula.placed_effect,))
     except SpecError:
@@ -161,11 +185,11 @@ def _fit_formula(
             )
         )
     start = min(starting_fits, key=lambda one: one.cost).point
-    fitted = fit_with_noise(candidate, model_set.series, base.noise_levels, start, units)
-    if not np.isfinite(fitted.cost) or fitted.normal_equations is None:
+    estimate = fit_with_noise(candidate, model_set.series, base.noise_levels, start, units)
+    if not np.isfinite(estimate.cost) or estimate.normal_equations is None:
         return None
-    each = [fitted.values(k) for k in range(len(model_set.series))]
-    text = formula.format_fitted(quantities_of(fitted), each)
+    each = [estimate.values(k) for k in range(len(model_set.series))]
+    text = formula.format_fitted(quantities_of(estimate), each)
     return DiscoveredEquation(
-        location, formula, fitted, likelihood_gain(fitted, base, model_set.series), text
+        location, formula, estimate, likelihood_gain(estimate, base, model_set.series), text
     )

@@ -1,7 +1,7 @@
-"""Probe: how the innovations of a model answer to a known disturbance at one place.
+"""Disturbance response: innovations of a model under a prescribed disturbance at one place.
 
-The disturbance is put in through a drift that is measured without noise: what is prescribed is
-what acts. So each term of a formula is tried by one run, with the observer as it is.
+The disturbance is imposed through a disturbance state that is measured without noise, so the
+observer sets it to the prescribed values. Each term of a formula is tested by one such run.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DisturbanceResponse:
-    """A model that can be disturbed at one place: its observer has the gains of `model`.
+    """A model with an additional disturbance state at one place and the Kalman gains of `model`.
 
-    Its signals are those compared, then `torques` of elements, then the disturbance.
+    Its outputs are the compared ones, then the torques of elements, then the disturbance.
     """
 
     model: Estimate = field(repr=False)
@@ -46,7 +46,9 @@ class DisturbanceResponse:
     steady_state_gains: Reals = field(repr=False)
 
     def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
-        """Return the predictions of all recordings under a disturbance (samples,) of each."""
+        """Return the predictions of all recordings under a disturbance, (samples,) for each
+        recording.
+        """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         limits = np.full(len(predictor.outputs), np.inf)
@@ -56,7 +58,7 @@ class DisturbanceResponse:
         return runs.split()
 
     def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
-        """Return the innovations of such predictions, of which nothing else is told."""
+        """Return the innovations of such predictions after the burn-in, (samples, outputs) each."""
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         runs = predictor.predict_points(
@@ -66,26 +68,32 @@ class DisturbanceResponse:
         return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
 
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
-        """Return the page of each recording and the recordings, with a disturbance measured."""
+        """Return calibration pages, and the recordings with the disturbance as a measured
+        output.
+        """
         together, candidate = stack_recordings(self.series), self.candidate
         recorded, seen = together.recorded, candidate.predictor.outputs
         nothing = np.full((len(recorded.inputs), len(self.element_torques)), np.nan)
-        shown = np.column_stack([recorded.measured, nothing, np.concatenate(disturbance)])
+        measured = np.column_stack([recorded.measured, nothing, np.concatenate(disturbance)])
         first = np.full((len(self.series), len(seen)), np.nan)
         first[:, : together.first_measured.shape[1]] = together.first_measured
         first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
-        given = dataclasses.replace(recorded, measured=np.ascontiguousarray(shown))
-        return candidate.calibration_pages(self._values, first), given
+        with_outputs = dataclasses.replace(recorded, measured=np.ascontiguousarray(measured))
+        return candidate.calibration_pages(self._values, first), with_outputs
 
     @cached_property
     def _values(self) -> list[dict[str, float]]:
+        """The parameter values [SI] of each recording."""
         return [self.model.values(k) for k in range(len(self.series))]
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
-        """Return the innovations of the compared signals behind the burn-in."""
+        """Return the innovations of the compared outputs after the burn-in, (samples, outputs)
+        each.
+        """
         return self._after_burn_in([one.innovations for one in predictions])
 
     def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
+        """Return the part of innovations after the burn-in, for the compared outputs."""
         seen = len(self.model.candidate.predictor.outputs)
         skip = burn_in_samples(self.series[0])
         return [one[skip:, :seen] for one in innovations]
@@ -94,7 +102,10 @@ class DisturbanceResponse:
 def build_disturbance_response(
     model_set: ModelSet, section: str, place: str, model: Estimate
 ) -> DisturbanceResponse:
-    """Return a model of a bench, made ready to be disturbed at a place. Raises SpecError."""
+    """Return the model of a fit, compiled with a disturbance at `section.place`.
+
+    Raises SpecError.
+    """
     kind = DISTURBANCE_KIND_BY_SECTION[section]
     disturbance = disturbance_effect(kind, place)
     placed_effect = PlacedEffect(disturbance.effect, place, f"probe_{place}"[:25])
@@ -114,7 +125,10 @@ def build_disturbance_response(
 
 
 def element_torques(automaton: Automaton) -> tuple[str, ...]:
-    """Return the names of the torques that elastic elements transmit."""
+    """Return the names of the torques that elastic elements transmit.
+
+    Elements whose torque is an expression are left out.
+    """
     trees = [
         one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
     ]
@@ -122,7 +136,7 @@ def element_torques(automaton: Automaton) -> tuple[str, ...]:
 
 
 def _with_outputs(document: Document, names: Sequence[str]) -> Document:
-    """Return a document that shows some names beside its outputs."""
+    """Return a document that has additional outputs before its own."""
     node = document.root.get("outputs")
     assert node is not None
     outputs = outputs_as_mapping(node)
@@ -134,7 +148,11 @@ def _with_outputs(document: Document, names: Sequence[str]) -> Document:
 
 
 def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
-    """Return the gains of a model, for one that has its states and signals among others."""
+    """Return the Kalman gains of a model at the indices of a candidate with more states and
+    outputs.
+
+    The gain from the disturbance output to the disturbance state is 1, all others are 0.
+    """
     states, known = candidate.predictor.states, model.candidate.predictor
     rows = [states.index(name) for name in known.states]
     columns = [candidate.predictor.outputs.index(name) for name in known.outputs]

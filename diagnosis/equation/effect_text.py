@@ -1,4 +1,4 @@
-"""Formula: terms with coefficients as an effect of the language, and as a line for a reader."""
+"""Effect text: terms with coefficients, written as an effect of the language and as a formula."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from language.text.project_files import parse_document
 
 Reals = NDArray[np.float64]
 RANGE_FACTOR = 10.0
-"""A coefficient may become this many times what the regression says."""
+"""Range of a coefficient as a multiple of its value in the regression."""
 
 
 @dataclass(frozen=True)
 class FormulaEffect:
-    """An effect made of terms: `layer` can be laid, `text` is its file, `start` where a fit begins.
+    """An effect that consists of terms, with the `text` of its file.
 
-    `phases` are those of the recordings, by parameter.
+    `initial_values` are the start values of a fit, `phases` those of parameters per recording.
     """
 
     placed_effect: PlacedEffect
@@ -43,7 +43,10 @@ class FormulaEffect:
     def format_fitted(
         self, values: Mapping[str, Quantity], fitted: Sequence[Mapping[str, float]]
     ) -> str:
-        """Return the formula with fitted values: `12.3 N*m * sin(3 * angle of w_w + 0.4)`."""
+        """Return the formula with fitted values, such as `12.3 N*m * sin(3 * angle of w_w + 0.4)`.
+
+        `fitted` are the values [SI] of each recording.
+        """
         return " + ".join(
             _format_term(
                 term,
@@ -66,20 +69,20 @@ def build_formula(
 ) -> FormulaEffect:
     """Return terms with coefficients (recordings, waves) as an effect. Raises SpecError.
 
-    Its name has a `number`: a bench knows candidates by the names of their effects.
+    `number` makes its name unique, because a model set identifies candidates by effect names.
     """
-    made = [
+    parts = [
         _term_text(model_set, section, place, k, *pair)
         for k, pair in enumerate(zip(terms, weights, strict=True), 1)
     ]
     name = f"unknown_{number}_at_{place}"
-    text = _declare_reads(_effect_text(model_set, name, section, terms, made))
+    text = _declare_reads(_effect_text(model_set, name, section, terms, parts))
     problems = Problems()
     effect = read_effect(_parse_text(name, text), problems)
     problems.raise_if_errors()
     placed_effect = PlacedEffect(effect, place, place)
     start, phases = {}, {}
-    for part in made:
+    for part in parts:
         start.update(
             {
                 placed_effect.qualified_name(name): value
@@ -93,11 +96,12 @@ def build_formula(
 
 
 def _parse_text(name: str, text: str) -> Document:
+    """Return the document of an effect given as text."""
     return parse_document(Source(f"{name}.yaml", tuple(text.splitlines())), text)
 
 
 def _declare_reads(text: str) -> str:
-    """Return the text of an effect that says which names of the model it reads."""
+    """Return the text of an effect with a `reads` line for the names of the model that it uses."""
     foreign = external_names(_parse_text("formula", text).root)
     head, sign, rest = text.partition("\nat: ")
     place, _, more = rest.partition("\n")
@@ -107,7 +111,7 @@ def _declare_reads(text: str) -> str:
 
 @dataclass(frozen=True)
 class _TermText:
-    """The lines of one term: by section, and its summand."""
+    """The lines of one term for each section of an effect, and its summand."""
 
     parameters: list[str]
     states: list[str]
@@ -121,6 +125,11 @@ class _TermText:
 def _term_text(
     model_set: ModelSet, section: str, place: str, k: int, term: LibraryTerm, weights: Reals
 ) -> _TermText:
+    """Return the lines of term number `k`; its names end with the number.
+
+    The coefficient starts at the root mean square of `weights` over recordings for a sine, else at
+    their mean; a sine has a phase per recording.
+    """
     a, turns, phase = f"a_{k}", f"turns_{k}", f"ph_{k}"
     unit = _coefficient_unit(model_set, section, place, term)
     size = float(np.sqrt(np.mean(np.sum(weights**2, axis=1)))) or 1e-6
@@ -148,13 +157,14 @@ def _term_text(
 
 
 def _rename_states(text: str, final_names: Mapping[str, str]) -> str:
+    """Return an expression with names of states replaced as whole words."""
     for name, final in final_names.items():
         text = re.sub(rf"(?<![\w.]){name}(?![\w(])", final, text)
     return text
 
 
 def _coefficient_unit(model_set: ModelSet, section: str, place: str, term: LibraryTerm) -> str:
-    """Return the unit of a coefficient: that of the place over that of the term."""
+    """Return the unit of a coefficient: the unit at the place over that of the term."""
     whole = parse_unit(disturbance_unit(model_set, section, place) or "1").dimension
     kind = TreeTypes(model_set.document.root).type_of_formula(
         ScalarNode(term.unit_expression or term.text, Span(Source("term"), 1, 1))
@@ -173,6 +183,7 @@ def _effect_text(
     terms: Sequence[LibraryTerm],
     parts: Sequence[_TermText],
 ) -> str:
+    """Return the YAML text of an effect that adds the sum of the terms at a place of a section."""
     fits = {
         "flow": "balance: {of: rate}",
         "elements": "element: {kind: elastic}",
@@ -205,11 +216,13 @@ def _effect_text(
 
 
 def _quote_value(line: str) -> str:
+    """Return a line `key: value` with the value quoted if it contains a comma."""
     key, _, value = line.partition(": ")
     return f'{key}: "{value}"' if "," in value else line
 
 
 def _quote_flow_value(text: str) -> str:
+    """Return a value quoted if it contains a comma."""
     return f'"{text}"' if "," in text else text
 
 
@@ -220,6 +233,7 @@ def _format_term(
     fitted: Sequence[Mapping[str, float]],
     placed_effect: PlacedEffect,
 ) -> str:
+    """Return term number `k` with its fitted coefficient and phase."""
     amount = values[placed_effect.qualified_name(f"a_{k}")]
     unit = "" if amount.unit == "1" else f" {amount.unit}"
     own = [one[placed_effect.qualified_name(f"a_{k}")] for one in fitted]

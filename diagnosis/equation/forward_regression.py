@@ -1,6 +1,6 @@
-"""Regression: which terms explain innovations, sparsely (forward, by BIC, each part left out).
+"""Forward regression: sparse selection of terms that explain innovations, with a BIC penalty.
 
-All that is needed of the data are products of columns, part by part of each recording: made once.
+All computations use products of columns, which are formed once for each part of each recording.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
 FOLDS = 4
-"""Parts of each recording, one of which is left out at a time."""
+"""Number of parts of each recording; one is left out at a time."""
 RIDGE = 1e-6
-"""Added to products of a column with itself, as a part of them: columns may be alike."""
+"""Relative ridge added to the diagonal of the products, because columns can be collinear."""
 
 
 @dataclass(frozen=True)
 class TermColumns:
-    """A term as columns of a problem, at `places`; with `has_own` each recording has its own."""
+    """A term as columns of a problem, at the indices `places`.
+
+    With `has_recording_coefficients` each recording has coefficients of its own.
+    """
 
     name: str
     places: tuple[int, ...]
@@ -29,9 +32,10 @@ class TermColumns:
 
 @dataclass(frozen=True)
 class RegressionProblem:
-    """`products` (recordings, parts, columns, columns): of columns with each other, and of the
-    innovations (the last one). The first `parameters` columns are in units of priors. `samples`
-    innovations there are, `inflation` of them count as one.
+    """The products of columns and innovations, (recordings, parts, columns, columns).
+
+    The last column is the innovations. The first `parameters` columns are parameters of the model
+    in prior standard deviations. `samples` is the number of innovations.
     """
 
     products: Reals = field(repr=False)
@@ -42,7 +46,9 @@ class RegressionProblem:
 
 @dataclass(frozen=True)
 class SelectedTerm:
-    """A term that was chosen: what it gains beside those before it [nats], after its price."""
+    """A selected term with its penalised gain and its cross-validated gain over earlier terms
+    [nats].
+    """
 
     columns: TermColumns
     gain: float
@@ -55,9 +61,10 @@ def build_problem(
     features: Sequence[Reals],
     integrated_autocorrelation: float,
 ) -> RegressionProblem:
-    """Return the problem of innovations (samples,) of each recording, over their deviations.
+    """Return the regression problem of normalised innovations (samples,) of each recording.
 
-    `parameters` (samples, parameters) and `features` (samples, columns) are how they fall with each.
+    `parameters` (samples, parameters) and `features` (samples, columns) are the decreases of the
+    innovations per unit of each coefficient.
     """
     products = []
     for e, moved, wave in zip(innovations, parameters, features, strict=True):
@@ -72,7 +79,7 @@ def build_problem(
 def rank_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns]
 ) -> list[tuple[float, TermColumns]]:
-    """Return each term alone with what it gains [nats] after its price, the best first."""
+    """Return the penalised gain [nats] of each term alone, with the term, in descending order."""
     before = _cost(problem, [])
     ranked = [
         (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
@@ -83,9 +90,10 @@ def rank_terms(
 def select_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns], max_terms: int, min_gain: float
 ) -> list[SelectedTerm]:
-    """Return the terms one after the other, as long as each gains `min_gain` nats.
+    """Return the terms of a forward selection, each with a penalised gain of at least `min_gain`
+    [nats].
 
-    Those behind the first have to gain as much in parts of the recordings that were left out.
+    Terms after the first must also have this gain in the cross-validation.
     """
     chosen: list[SelectedTerm] = []
     selected: list[TermColumns] = []
@@ -110,7 +118,7 @@ def select_terms(
 
 
 def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
-    """Return the coefficients of each term (recordings, waves)."""
+    """Return the least-squares coefficients of each selected term, (recordings, waves) each."""
     fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     shared, own = problem.parameters, 0
     coefficients = []
@@ -127,6 +135,7 @@ def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns])
 
 
 def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
+    """Return the BIC penalty [nats] of a term, with the effective number of samples."""
     count = len(term.places) * (len(problem.products) if term.has_recording_coefficients else 1)
     return float(
         0.5 * count * np.log(max(problem.samples / problem.integrated_autocorrelation, 2.0))
@@ -134,13 +143,13 @@ def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
 
 
 def _cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
-    """Return half the squares that are left [nats], over the inflation."""
+    """Return half the residual squares [nats], over the integrated autocorrelation."""
     fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     return 0.5 * fit.residual_squares / problem.integrated_autocorrelation
 
 
 def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
-    """Return half the squares of each part as the other parts foresee it [nats]."""
+    """Return half the squares of each part as predicted from the other parts [nats]."""
     total = 0.0
     recordings = np.arange(len(problem.products))
     for fold in range(FOLDS):
@@ -156,7 +165,9 @@ def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermCol
 
 @dataclass(frozen=True)
 class _LeastSquaresFit:
-    """Coefficients: `shared`, `own` (recordings, own); the squares that are `left`, with priors."""
+    """The shared coefficients, those per recording (recordings, n), and the residual squares with
+    priors.
+    """
 
     shared: Reals
     per_recording: Reals
@@ -166,7 +177,10 @@ class _LeastSquaresFit:
 def _solve_least_squares(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> _LeastSquaresFit:
-    """Return the coefficients by least squares; those of one recording are eliminated first."""
+    """Return the coefficients; those per recording are eliminated by Schur complements.
+
+    `products` (recordings, columns, columns) are summed over the parts that are used.
+    """
     shared = problem.parameters + sum(
         len(one.places) for one in selected if not one.has_recording_coefficients
     )
@@ -190,7 +204,7 @@ def _solve_least_squares(
 def _selected_products(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> tuple[Reals, Reals]:
-    """Return the products of the columns in use: parameters, shared terms, terms of a recording."""
+    """Return the products of the used columns: parameters, shared terms, terms per recording."""
     shared = [
         place for one in selected if not one.has_recording_coefficients for place in one.places
     ]

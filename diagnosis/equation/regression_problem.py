@@ -1,4 +1,4 @@
-"""Excess: the innovations at a place as a regression problem, with a column for each term."""
+"""Regression problem: innovations at a place, and the response of innovations to each term."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from language.overlays.tree_types import TreeTypes, format_si_unit
 
 Reals = NDArray[np.float64]
 TEST_DISTURBANCE = 0.1
-"""Size of a disturbance that a term is tried with, in SI: small beside all that acts."""
+"""Size [SI] of the disturbance in a test of a term, small relative to what acts."""
 
 
 @dataclass(frozen=True)
 class EquationRegression:
-    """What is missing at a place: the regression `problem`, and `terms` with their `columns`."""
+    """The regression problem at a place, and its terms with their columns."""
 
     problem: RegressionProblem = field(repr=False)
     terms: tuple[LibraryTerm, ...] = field(repr=False)
@@ -37,15 +37,18 @@ class EquationRegression:
 def regression_at(
     model_set: ModelSet, model: Estimate, section: str, place: str
 ) -> EquationRegression:
-    """Return what the innovations of a model ask for at a place. Raises SpecError."""
+    """Return the regression of a model's innovations on terms at `section.place`.
+
+    Raises SpecError.
+    """
     probe = build_disturbance_response(model_set, section, place, model)
     zero_disturbance = [np.zeros(one.count) for one in model_set.series]
     runs = probe.predict(zero_disturbance)
     before = probe.innovations(runs)
     weigh = _HuberWeights(model, before)
     signals = _formula_signals(model_set, probe, runs)
-    shown = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
-    terms = tuple(generate_terms(signals, section, shown))
+    output = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
+    terms = tuple(generate_terms(signals, section, output))
     model = model if model.jacobian else with_normal_equations(model, model_set.series)
     parameters = _parameter_responses(model, weigh)
     waves: list[tuple[Reals, ...]] = []
@@ -63,7 +66,11 @@ def regression_at(
 
 
 class _HuberWeights:
-    """Innovations over their standard deviations; those far out count less (Huber 1964)."""
+    """Weights of innovations: inverse standard deviations, reduced beyond the Huber limits.
+
+    The weight is multiplied by sqrt(limit / |e|) beyond the limit (Huber 1964); unknown ones have
+    0.
+    """
 
     def __init__(self, model: Estimate, innovations: Sequence[Reals]) -> None:
         size = np.sqrt(model.prediction.variances)
@@ -74,6 +81,7 @@ class _HuberWeights:
         ]
 
     def weight_and_flatten(self, values: Sequence[Reals]) -> tuple[Reals, ...]:
+        """Return weighted values of each recording as vectors (samples * outputs,)."""
         pairs = zip(values, self.weights, strict=True)
         return tuple((np.nan_to_num(one) * weight).reshape(-1) for one, weight in pairs)
 
@@ -84,7 +92,9 @@ def _weighted_response(
     values: Sequence[Reals],
     weights: _HuberWeights,
 ) -> tuple[Reals, ...]:
-    """Return how the innovations fall where some values act, of each recording."""
+    """Return the weighted decrease of innovations per unit of a disturbance `values`, by
+    recording.
+    """
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
     after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])
     moved = [(a - b) * (size / TEST_DISTURBANCE) for a, b in zip(before, after, strict=True)]
@@ -92,7 +102,9 @@ def _weighted_response(
 
 
 def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals, ...]:
-    """Return how the innovations fall with each parameter (samples * seen, parameters)."""
+    """Return the weighted decrease of innovations per coordinate (samples * outputs,
+    parameters).
+    """
     columns = [
         weights.weight_and_flatten(
             [-model.jacobian[name][part] for part in model.prediction.slices]
@@ -105,7 +117,7 @@ def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals
 def _formula_signals(
     model_set: ModelSet, response: DisturbanceResponse, runs: Sequence[Prediction]
 ) -> Signals:
-    """Return what formulas may read: states, inputs, torques and twists of elements."""
+    """Return the signals that formulas may read: states, inputs, element torques and twists."""
     predictor = response.candidate.predictor
     known = TreeTypes(model_set.document.root)
     values: dict[str, list[Reals]] = {}

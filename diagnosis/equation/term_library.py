@@ -1,6 +1,7 @@
-"""Term: what a formula of something unknown may be made of - a text of the language with values.
+"""Term library: the terms from which a formula of an unknown disturbance may be built.
 
-Each has a coefficient of its own; a `phased` one is a sine of an angle, with a phase besides.
+Each term is an expression of the language with its values, and has a coefficient. A term with an
+order is a sine of an angle, with a phase as well.
 """
 
 from __future__ import annotations
@@ -13,23 +14,24 @@ from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 9, 10, 12, 16, 18, 24, 36, 48)
-"""Periods per turn that are tried."""
+"""Periods per turn that are tested."""
 LAGS = (0.005, 0.02, 0.06)
-"""Time constants [s] by which an input may be late."""
+"""Time constants [s] of lags that are tested."""
 RISE_TIMES = (0.15, 0.4, 1.0)
-"""Times [s] in which the largest value may be reached at a limited rate."""
+"""Times [s] to the largest value at a limited rate that are tested."""
 LIMIT_FRACTIONS = (0.4, 0.6, 0.8)
-"""Limits that are tried, as parts of the largest value."""
+"""Limits that are tested, as fractions of the largest value."""
 
 
 @dataclass(frozen=True)
 class LibraryTerm:
-    """One summand without its coefficient.
+    """A summand without its coefficient.
 
-    `text` is an expression; with an `angle` (a state that the term brings) it is what stands
-    before the sine of `order` times that angle. `states` are those it brings: name to unit and
-    balance. `values` (samples,) by recording; of a sine these are its two parts. `each`: one
-    coefficient for every recording.
+    `text` is an expression; with an `order` it is the factor of the sine of `order` times the angle
+    `th`, a state of the term. `states` are the states that the term adds: name to unit and flow.
+    `values` are the waves, (samples,) for each recording; a sine has two. `per_recording` gives
+    each recording a coefficient. `unit_expression` has the unit of the term if `text` reads its
+    states.
     """
 
     name: str
@@ -42,13 +44,15 @@ class LibraryTerm:
 
     @property
     def has_recording_coefficients(self) -> bool:
-        """Whether each recording has a coefficient or phase of its own."""
+        """Whether each recording has a coefficient or a phase of its own."""
         return self.per_recording or self.order > 0
 
 
 @dataclass(frozen=True)
 class Signals:
-    """What terms are made of: names to values (samples,) of each recording, and their units."""
+    """The signals of terms: values (samples,) of each recording and units by name, and
+    their roles.
+    """
 
     values: Mapping[str, Sequence[Reals]] = field(repr=False)
     units: Mapping[str, str]
@@ -59,12 +63,12 @@ class Signals:
     period: float
 
     def largest(self, name: str) -> float:
-        """Return the largest amount of a signal."""
+        """Return the largest magnitude of a signal, or 1 if it is 0."""
         return float(max(np.max(np.abs(values)) for values in self.values[name])) or 1.0
 
 
 def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator[LibraryTerm]:
-    """Yield the terms that may stand at a place; at an output `output` is what it shows."""
+    """Yield the terms that may act at a place of a section; `output` is the signal of an output."""
     count = {name: [len(one) for one in values] for name, values in signals.values.items()}
     lengths = next(iter(count.values()))
     ones = [np.ones(n) for n in lengths]
@@ -86,10 +90,12 @@ def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator
 
 
 def _linear_term(name: str, text: str, values: Sequence[Reals]) -> LibraryTerm:
+    """Return a term with one coefficient."""
     return LibraryTerm(name, text, (tuple(values),))
 
 
 def _signal_terms(signals: Signals, output: str) -> Iterator[LibraryTerm]:
+    """Yield the terms of an output: itself, its lags and its orders."""
     yield _linear_term(output, output, signals.values[output])
     yield from _lag_terms(signals, output)
     for rate in signals.angle_rates:
@@ -97,6 +103,7 @@ def _signal_terms(signals: Signals, output: str) -> Iterator[LibraryTerm]:
 
 
 def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
+    """Yield the sign, the value and the square of each speed."""
     for name in signals.speeds:
         values, unit = signals.values[name], signals.units[name]
         bend = _round_two_digits(0.005 * signals.largest(name))
@@ -106,6 +113,7 @@ def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
 
 
 def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator[LibraryTerm]:
+    """Yield the value, the signed square and the cube of a signal, those in `powers`."""
     values = signals.values[name]
     if 1 in powers:
         yield _linear_term(name, name, values)
@@ -117,6 +125,9 @@ def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator
 
 
 def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
+    """Yield the terms of a torque: powers, magnitude, limits, products with speeds, lags,
+    growth.
+    """
     values = signals.values[name]
     yield from _power_terms(signals, name, (1, 2, 3))
     yield _linear_term(f"the amount of {name}", f"abs({name})", [np.abs(x) for x in values])
@@ -143,6 +154,7 @@ def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
 
 
 def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[LibraryTerm]:
+    """Yield a loss that opposes the speed, the product of torque and speed, and power limits."""
     values = list(zip(signals.values[torque], signals.values[speed], strict=True))
     unit, of_speed = signals.units[torque], signals.units[speed]
     bend = _round_two_digits(0.005 * signals.largest(speed))
@@ -163,29 +175,31 @@ def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[L
 
 
 def _lag_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
+    """Yield the differences between a first-order lag of a signal and the signal."""
     for lag in LAGS:
         late = [_low_pass(x, lag, signals.period) for x in signals.values[name]]
         less = [b - a for a, b in zip(signals.values[name], late, strict=True)]
         states = {"late": (signals.units[name], f"{lag:g} s * der(late) = {name} - late")}
         text = f"(late - {name})"
-        told = f"{name} that is late by {1000 * lag:g} ms"
-        yield LibraryTerm(told, text, (tuple(less),), states, unit_expression=name)
+        label = f"{name} that is late by {1000 * lag:g} ms"
+        yield LibraryTerm(label, text, (tuple(less),), states, unit_expression=name)
 
 
 def _rate_limit_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
-    """What follows at a limited rate: the rates that would take some tenths of a second."""
+    """Yield the differences between a rate-limited signal and the signal, for several rates."""
     unit = signals.units[name]
     for span in RISE_TIMES:
         rate = _round_two_digits(signals.largest(name) / span)
         less = [_limit_rate(x, rate * signals.period) - x for x in signals.values[name]]
         bound = f"({rate:g} {unit}) / (1 s)"
         flow = f"der(late) = clip(({name} - late) / (2 ms), -{bound}, {bound})"
-        told = f"{name} that follows at most {rate:g} {unit}/s"
+        label = f"{name} that follows at most {rate:g} {unit}/s"
         states = {"late": (unit, flow)}
-        yield LibraryTerm(told, f"(late - {name})", (tuple(less),), states, unit_expression=name)
+        yield LibraryTerm(label, f"(late - {name})", (tuple(less),), states, unit_expression=name)
 
 
 def _limit_rate(values: Reals, max_change: float) -> Reals:
+    """Return a signal that follows `values` by at most `max_change` a sample."""
     found, now = np.empty_like(values), float(values[0])
     for k, value in enumerate(values):
         now += min(max(float(value) - now, -max_change), max_change)
@@ -194,6 +208,7 @@ def _limit_rate(values: Reals, max_change: float) -> Reals:
 
 
 def _low_pass(values: Reals, lag: float, period: float) -> Reals:
+    """Return a signal after a first-order lag with time constant `lag` [s]."""
     kept = np.exp(-period / lag)
     found, now = np.empty_like(values), float(values[0])
     for k, value in enumerate(values):
@@ -205,6 +220,10 @@ def _low_pass(values: Reals, lag: float, period: float) -> Reals:
 def _order_terms(
     signals: Signals, rate: str, name: str, factor: Sequence[Reals]
 ) -> Iterator[LibraryTerm]:
+    """Yield sine and cosine waves of orders of an angle, times a signal.
+
+    Orders whose frequency exceeds 0.3 of the sample rate are left out.
+    """
     angles = [np.cumsum(w) * signals.period for w in signals.values[rate]]
     fastest = signals.largest(rate) / (2.0 * np.pi)
     for order in ORDERS:
@@ -214,11 +233,12 @@ def _order_terms(
             tuple(x * wave(order * angle) for x, angle in zip(factor, angles, strict=True))
             for wave in (np.sin, np.cos)
         ]
-        told = f"order {order} of the angle of {rate}"
-        told = told if name == "1" else f"{name} times {told}"
+        label = f"order {order} of the angle of {rate}"
+        label = label if name == "1" else f"{name} times {label}"
         turned = {"th": ("rad", f"der(th) = {rate}")}
-        yield LibraryTerm(told, name, tuple(waves), turned, order)
+        yield LibraryTerm(label, name, tuple(waves), turned, order)
 
 
 def _round_two_digits(value: float) -> float:
+    """Return a value rounded to two significant digits."""
     return float(f"{value:.2g}")

@@ -1,7 +1,7 @@
-"""Doubt: when a formula is tried beside the effects of the library, and when it is the verdict.
+"""Trigger: when a formula is searched beside the library effects, and when it is the verdict.
 
-The nearest effect of a library that lacks the true one gains a great deal: what it leaves over
-tells that it is not the right one.
+If the library lacks the true effect, the nearest one still gains a lot. The remaining gain beside
+it shows that it is not the right one.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from diagnosis.selection.forward_selection import Selection
 from language.text.diagnostic import SpecError
 
 UNEXPLAINED_FACTOR = 2.5
-"""Times the threshold that the freedom of a place gains where a formula is tried."""
+"""Multiple of the threshold of the unexplained gain from which a formula is searched."""
 REMAINDER_FACTOR = 2.0
-"""Times the threshold that a term gains where an accepted effect leaves something over."""
+"""Multiple of the threshold that a term must gain beside accepted effects."""
 REMAINDER_FRACTION = 0.3
-"""And this part of what the effect gained: a strong one is never described quite well."""
+"""Fraction of the effects' gain that a term must gain as well: no strong effect fits exactly."""
 LARGE_REMAINDER_FRACTION = 0.8
-"""Part of what accepted effects gained that a term at their place gains beside them, from which on
-they are something else: the right ones left a third of it at most."""
+"""Fraction of the effects' gain from which a term beside them shows that they are wrong.
+
+Right effects left a third at most.
+"""
 MAX_DISTURBANCE_LEVEL = 0.5
-"""Units of its drifts below which a model with what was accepted needs none."""
+"""Level in units below which a model does not need its disturbances."""
 EQUATION_GAIN_FACTOR = 1.5
-"""A formula is the verdict where it gains so many times as much as what was accepted."""
+"""Factor by which a formula must gain more than the accepted effects to be the verdict."""
 
 
 def triggers_discovery(
@@ -43,9 +45,10 @@ def triggers_discovery(
     remaining_gain: float,
     threshold: float,
 ) -> bool:
-    """Tell whether a formula might say more than the verdict does.
+    """Return whether a formula should be searched, by the outcome and the gains that are left.
 
-    `unexplained` is what the base leaves unexplained [nats], `remaining_gain` what accepted effects leave.
+    It is always searched for unknown and ambiguous outcomes. `unexplained` is the gain [nats] that
+    the base leaves, `remaining_gain` the one that accepted effects leave.
     """
     if outcome in ("unknown", "ambiguous"):
         return True
@@ -57,20 +60,22 @@ def triggers_discovery(
 
 
 def has_large_remainder(selection: Selection, remaining_gain: float, threshold: float) -> bool:
-    """Tell whether accepted effects leave over much of what they gained: they are not what is
-    missing, whether or not a formula is found that says more.
+    """Return whether a term beside accepted effects gains nearly as much as they do.
+
+    The effects are then wrong, whether or not a better formula is found.
     """
     return remaining_gain > max(threshold, LARGE_REMAINDER_FRACTION * _gained(selection))
 
 
 def _gained(selection: Selection) -> float:
+    """Return the sum of the penalised gains of accepted effects [nats]."""
     return sum(
         tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
     )
 
 
 def needs_no_disturbance(selection: Selection, units: Mapping[str, float]) -> bool:
-    """Tell whether a model with what was accepted needs no drift."""
+    """Return whether all disturbances of the selected model have small levels."""
     drifts = selection.model.noise_levels.process
     return all(drifts.get(name, 0.0) < MAX_DISTURBANCE_LEVEL * unit for name, unit in units.items())
 
@@ -78,8 +83,9 @@ def needs_no_disturbance(selection: Selection, units: Mapping[str, float]) -> bo
 def remaining_term_gain(
     model_set: ModelSet, selection: Selection, units: Mapping[str, float]
 ) -> float:
-    """Return what the best term gains [nats] where effects were accepted, beside them; nothing
-    where the model needs no drift.
+    """Return the largest gain [nats] of a term in the balances of accepted effects, beside them.
+
+    It is 0 if the model needs no disturbance.
     """
     most, model = 0.0, selection.model
     if needs_no_disturbance(selection, units):
@@ -96,7 +102,7 @@ def remaining_term_gain(
 
 
 def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> bool:
-    """Tell whether a formula gains clearly more than all that was accepted."""
+    """Return whether a formula gains clearly more than all accepted effects together."""
     gains = [
         ranking_gain(tried.likelihood_gain) for tried in selection.accepted if tried.likelihood_gain
     ]
@@ -104,7 +110,9 @@ def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> b
 
 
 def select_equation(selection: Selection, equation: DiscoveredEquation) -> Selection:
-    """Return a selection in which a formula is what was accepted, and no candidate is likely."""
+    """Return a selection in which a formula is the accepted effect and no library effect is
+    likely.
+    """
     tried = CandidateFit(
         equation.formula.placed_effect,
         equation.likelihood_gain.penalised,

@@ -1,8 +1,8 @@
-"""Plan: the manoeuvre that would tell candidates apart - each drives it, the other foresees it.
+"""Discriminating experiment: the manoeuvre that separates candidates best (T-optimality).
 
-What one candidate would show is foreseen by another, with its observer and its parameters moved as
-far as the recordings that there are let them: half the squares that remain, over its innovations'
-variances, are the nats by which the first would be preferred.
+The outputs of one candidate are predicted by another one with its observer, after its parameters
+have moved as far as the existing recordings allow. Half the remaining squares over the variances of
+innovations is the expected log Bayes factor [nats] (Atkinson, Fedorov 1975).
 """
 
 from __future__ import annotations
@@ -25,15 +25,16 @@ from diagnosis.model.parameter_vector import ParameterVector, vector_of
 
 Reals = NDArray[np.float64]
 MAX_CANDIDATES = 3
-"""Candidates that are told apart pair by pair."""
+"""Number of candidates that are compared pair by pair."""
 MIN_LOG_BAYES_FACTOR = 20.0
-"""Nats below which a manoeuvre would tell nothing."""
+"""Log Bayes factor [nats] from which a manoeuvre discriminates."""
 
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """A manoeuvre with the nats by which it would tell the two nearest candidates apart, and what
-    each candidate would show: `shown` (samples, seen) in the order of the plan's names.
+    """A manoeuvre with the smallest expected log Bayes factor [nats] of all pairs of candidates.
+
+    `outputs` (samples, outputs) are the simulated ones of each candidate, in the order of the plan.
     """
 
     manoeuvre: Manoeuvre
@@ -43,18 +44,18 @@ class CandidateExperiment:
 
 @dataclass(frozen=True)
 class ExperimentPlan:
-    """Candidates by name, and the options, the best first."""
+    """The names of the candidates and the manoeuvres, the most discriminating first."""
 
     names: tuple[str, ...]
     options: tuple[CandidateExperiment, ...]
 
     @property
     def is_discriminating(self) -> bool:
-        """Whether the best manoeuvre would tell the candidates apart."""
+        """Whether the best manoeuvre separates the candidates."""
         return bool(self.options) and self.options[0].log_bayes_factor >= MIN_LOG_BAYES_FACTOR
 
     def format_sentence(self) -> str:
-        """Return what to record, in one sentence."""
+        """Return in one sentence what to record."""
         names = " from ".join((self.names[0], " and ".join(self.names[1:])))
         if not self.is_discriminating:
             return f"no manoeuvre that was tried would tell {names}"
@@ -68,16 +69,20 @@ class ExperimentPlan:
 def plan_experiment(
     model_set: ModelSet, candidates: Sequence[tuple[str, Estimate]]
 ) -> ExperimentPlan | None:
-    """Return the plan for two or more fitted candidates; None where nothing can be planned."""
+    """Return the plan for the first three fitted candidates.
+
+    Manoeuvres in which a candidate diverges are left out. The result is None for fewer than two
+    candidates or without a manoeuvre.
+    """
     some = list(candidates)[:MAX_CANDIDATES]
     if len(some) < 2:
         return None
     options = []
     for manoeuvre in manoeuvres_for(model_set):
-        shown = [_simulate_outputs(model, manoeuvre.series) for _, model in some]
-        if any(one is None for one in shown):
+        simulated = [_simulate_outputs(model, manoeuvre.series) for _, model in some]
+        if any(one is None for one in simulated):
             continue
-        runs = [one for one in shown if one is not None]
+        runs = [one for one in simulated if one is not None]
         nats = [
             _expected_log_bayes_factor(model, model_set.series, manoeuvre.series, run)
             for k, (_, model) in enumerate(some)
@@ -90,7 +95,7 @@ def plan_experiment(
 
 
 def _simulate_outputs(model: Estimate, series: SampledRecording) -> Reals | None:
-    """Return what a model shows of a manoeuvre (samples, seen); None where it does not run."""
+    """Return the outputs of a model under a manoeuvre without correction; None if it diverges."""
     gains = KalmanGains(model.gains.transient[:0], np.zeros_like(model.gains.steady_state))
     run = predict(
         model.candidate, [series], [model.values(0)], gains, model.noise_levels.huber_limits
@@ -101,7 +106,12 @@ def _simulate_outputs(model: Estimate, series: SampledRecording) -> Reals | None
 def _expected_log_bayes_factor(
     model: Estimate, recorded: Sequence[SampledRecording], series: SampledRecording, outputs: Reals
 ) -> float:
-    """Return the nats by which a model would fail to foresee what another one shows."""
+    """Return the expected log Bayes factor [nats] against a model for the outputs of another one.
+
+    The parameters move by one Gauss-Newton step, with the information of the recordings `recorded`
+    as their prior. The result is divided by the integrated autocorrelation; it is 0 if the model
+    diverges.
+    """
     record = dataclasses.replace(series, measured=np.ascontiguousarray(outputs))
     point = vector_of(model.candidate, 1, model.values(0))
     before = _normalised_innovations(model, record, point)
@@ -128,7 +138,9 @@ def _expected_log_bayes_factor(
 def _normalised_innovations(
     model: Estimate, record: SampledRecording, point: ParameterVector
 ) -> Reals | None:
-    """Return the innovations over their standard deviations (samples * seen,)."""
+    """Return innovations over their standard deviations (samples * outputs,); None if it
+    diverges.
+    """
     values = {
         one.name: one.value(float(point.shared[k]))
         for k, one in enumerate(model.candidate.free_parameters)

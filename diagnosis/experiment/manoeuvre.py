@@ -1,4 +1,4 @@
-"""Manoeuvre: a course of the inputs that might tell candidates apart, as large as recorded ones."""
+"""Manoeuvres: time courses of the inputs for an experiment, scaled to the recorded inputs."""
 
 from __future__ import annotations
 
@@ -24,14 +24,20 @@ FORCE_UNITS = ("N*m", "N")
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A manoeuvre as `series` without measurements but the first ones: where it starts."""
+    """A manoeuvre as a sampled recording; only its first measurements are known, as initial
+    state.
+    """
 
     name: str
     series: SampledRecording = field(repr=False)
 
 
 def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
-    """Return the menu for what is driven on a bench; nothing where no force or torque drives it."""
+    """Return the manoeuvres for the driving input of a model set; none if no force or torque
+    varies.
+
+    The driving input is the first one with both signs. Manoeuvres with a brake need a second force.
+    """
     forces = [name for name in model_set.automaton.inputs if _is_force(model_set, name)]
     names = list(model_set.automaton.inputs)
     whole = np.concatenate([one.inputs for one in model_set.series])
@@ -51,23 +57,27 @@ def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
 
 @cache
 def _read_manoeuvres() -> Mapping[str, Mapping[str, Any]]:
+    """Return the definitions of manoeuvres by name, from `manoeuvres.yaml`."""
     text = resources.files("diagnosis.experiment").joinpath("manoeuvres.yaml").read_text("utf-8")
     menu: Mapping[str, Mapping[str, Any]] = yaml.safe_load(text)
     return menu
 
 
 def _is_force(model_set: ModelSet, name: str) -> bool:
+    """Return whether an input is a force or a torque."""
     kind = TreeTypes(model_set.document.root).type_of_name(name)
     return isinstance(kind, Dimension) and str(kind) in FORCE_UNITS
 
 
 def _has_both_signs(values: Reals) -> bool:
+    """Return whether values are both negative and positive."""
     return bool(np.min(values) < 0.0 < np.max(values))
 
 
 def _manoeuvre_series(
     model_set: ModelSet, name: str, definition: Mapping[str, Any], drive: str, brake: str | None
 ) -> SampledRecording:
+    """Return a manoeuvre as a recording; other inputs have their recorded median."""
     period = float(model_set.period)
     count = round(definition["drive"][-1][0] / period) + 1
     time = np.arange(count) * period
@@ -75,8 +85,8 @@ def _manoeuvre_series(
     whole = np.concatenate([one.inputs for one in model_set.series])
     inputs = np.tile(np.median(whole, axis=0), (count, 1))
     largest = np.max(np.abs(whole), axis=0)
-    wanted = _interpolate(time, definition["drive"]) + _chirp(time, definition.get("sweep"))
-    inputs[:, names.index(drive)] = largest[names.index(drive)] * wanted
+    course = _interpolate(time, definition["drive"]) + _chirp(time, definition.get("sweep"))
+    inputs[:, names.index(drive)] = largest[names.index(drive)] * course
     if brake is not None:
         part = _interpolate(time, definition["brake"]) if "brake" in definition else np.zeros(count)
         inputs[:, names.index(brake)] = largest[names.index(brake)] * part
@@ -93,11 +103,13 @@ def _manoeuvre_series(
 
 
 def _interpolate(time: Reals, points: Sequence[Sequence[float]]) -> Reals:
+    """Return the values at `time` on a line through points (time, value)."""
     times, values = np.array(points, dtype=float).T
     return np.asarray(np.interp(time, times, values), dtype=np.float64)
 
 
 def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
+    """Return a linear chirp (frequencies [Hz], amplitude, mean); 0 without a definition."""
     if sweep is None:
         return np.zeros(len(time))
     low, high, amplitude, mean = sweep
@@ -107,8 +119,10 @@ def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
 
 
 def _initial_outputs(model_set: ModelSet, part: float) -> Reals:
-    """Return what was recorded where the first signal is a part of its largest, or nearest."""
+    """Return recorded outputs at a sample where the first one is nearest to a part of its
+    largest.
+    """
     rows = np.concatenate([one.measured for one in model_set.series])
     rows = rows[np.all(np.isfinite(rows), axis=1)]
-    wanted = part * float(np.max(np.abs(rows[:, 0])))
-    return np.asarray(rows[int(np.argmin(np.abs(rows[:, 0] - wanted)))], dtype=np.float64)
+    target = part * float(np.max(np.abs(rows[:, 0])))
+    return np.asarray(rows[int(np.argmin(np.abs(rows[:, 0] - target)))], dtype=np.float64)

@@ -21,8 +21,6 @@ from diagnosis.estimation.kalman_gain import LocalModel, local_models
 Reals = NDArray[np.float64]
 AVERAGING_TIME = 1.0
 """Time [s] over which normalised squared innovations are averaged."""
-LARGEST = 1e12
-"""A larger deviation is outside the range of the model."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Case: what is diagnosed - a model, a map, recordings - and how its recordings are read."""
+"""Case: the input of a diagnosis - a model, a map and recordings - and how recordings are read."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from language.overlays.expand_document import Project
 from language.text.document import Document
 
 BootstrapMode = Literal["never", "kept", "made"]
-"""Whether thresholds of a bootstrap are used: never, where one has left them, always."""
+"""Whether bootstrap thresholds are used: never, if an earlier bootstrap stored them, or always."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is diagnosed: an expanded automaton, a map, and recordings.
+    """The input of a diagnosis: an expanded automaton, a map and recordings.
 
-    `names` are those of files whose bare name is not theirs alone, `read` what was read already,
-    `opened` what is read on the way.
-    In the folder `stages` it is kept what was found, so that a diagnosis that was ended goes on
-    from there. `before` is called before each fit: it may raise what ends the diagnosis.
+    `names` are display names of files whose own names repeat, `recordings` are already read, and
+    `opened_recordings` collects those that are read later. Fits are stored in `checkpoint_folder`,
+    so an interrupted diagnosis continues. `before_fit` is called before each fit; it may raise to
+    end the diagnosis.
     """
 
     document: Document
@@ -52,16 +52,17 @@ class Case:
     before_fit: Callable[[], None] = lambda: None
 
     def name_of(self, path: Path) -> str:
-        """Return what a recording is called."""
+        """Return the display name of a recording."""
         return self.names.get(path, path.name)
 
 
 def read_series(
     path: Path, case: Case, automaton: Automaton, output_names: Sequence[str]
 ) -> tuple[SampledRecording, ...]:
-    """Return a recording of a case on its grid, a series for each window that is used of it.
+    """Return one sampled recording for each window of a file of a case.
 
-    Raises SpecError, ValueError, ToolMissing.
+    A file that is not read yet is read and stored in `opened_recordings`. Raises SpecError,
+    ValueError and MissingToolError.
     """
     used = [
         column.name
@@ -81,7 +82,9 @@ def build_model_set(
     series: Sequence[SampledRecording],
     output_names: tuple[str, ...],
 ) -> ModelSet:
-    """Return the bench of a case for some recordings as they were read."""
+    """Return the model set of a case for sampled recordings, with the shipped effects by
+    default.
+    """
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_disturbances(case.document, automaton)
     bodies = [f"{one.name} {node_text(one.body)}" for one in effects]
@@ -101,7 +104,7 @@ def build_model_set(
 
 
 def file_digests(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
-    """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
+    """Return the first 16 hexadecimal digits of the SHA-256 of each file, by display name."""
     return {
         case.name_of(path): hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]
         for path in files

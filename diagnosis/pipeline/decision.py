@@ -1,4 +1,4 @@
-"""Judgement: which models of a case are accepted, from its training recordings alone."""
+"""Decision: which models of a case are accepted, from its training recordings alone."""
 
 from __future__ import annotations
 
@@ -63,7 +63,9 @@ UNKNOWN_FACTOR = 8.0
 
 @dataclass(frozen=True)
 class DiagnosisDecision:
-    """What selection has come to; `bench` has the recordings as they were judged."""
+    """The result of the selection; `model_set` has the recordings on which the decision is
+    based.
+    """
 
     model_set: ModelSet
     base: Estimate
@@ -77,9 +79,10 @@ class DiagnosisDecision:
 def decide(
     case: Case, full_rate_set: ModelSet, recalibrated: Sequence[RecalibratedSet], log: LogCallback
 ) -> DiagnosisDecision:
-    """Return what is accepted of a case, for the ways that its recordings can be read in.
+    """Return the decision on a case, for the recordings under each inter-sample behaviour.
 
-    A model that forgets is judged by whole simulations, every other by what its observer foresees.
+    A base with fading memory is decided by the output-error criterion, every other one by
+    prediction errors.
     """
     model_set, base = best_hold(recalibrated)
     if has_fading_memory(base, model_set.series):

@@ -1,7 +1,7 @@
-"""Diagnose: recordings against a model - recalibrate, locate, name, model, show.
+"""Diagnosis: the whole procedure - recalibration, localisation, selection, decision, validation.
 
-Selection knows the training recordings alone. What is held out is opened after that is final; it
-can confirm the verdict or not, and change nothing else.
+Only the training recordings are used until the decision is final. Held-out recordings are read
+after that; they confirm the verdict or not, and change nothing else.
 """
 
 from __future__ import annotations
@@ -45,18 +45,19 @@ from language.model.automaton import Automaton
 from language.text.diagnostic import SpecError
 
 MAX_WORSE_RATIO = 1.1
-"""Part of the misfit of simulation from which on a signal is simulated worse."""
+"""Ratio of the simulation misfit after to before from which a signal is simulated worse."""
 CONFIRMATION_RATIO = 0.8
-"""Part of the misfit of simulation that is left at most where an effect is confirmed by it."""
+"""Ratio below which the misfit of every signal confirms an effect."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict with the models behind it; `bench` holds the training recordings.
+    """A verdict with the models behind it; `model_set` holds the training recordings.
 
-    `description` is the formula that an unknown was turned into: it then is what was accepted.
-    `plan` is what would tell an accepted effect from those that do nearly as well. `shuffles` is
-    what follows the largest step: of the base, then of the model with what was accepted.
+    `equation` is the formula that is accepted for an unknown disturbance. `plan` is the experiment
+    that would separate an accepted effect from its rivals. `oscillations` after the largest step
+    are those of the base and, if effects were accepted, of the final model. `unread` says which
+    held-out files could not be used.
     """
 
     verdict: Verdict
@@ -71,7 +72,10 @@ class Diagnosis:
 
 
 def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
-    """Return the diagnosis of a case. Raises SpecError, ValueError, ToolMissing."""
+    """Return the diagnosis of a case; progress is reported to `log`.
+
+    Raises SpecError, ValueError (for instance if no output is compared) and MissingToolError.
+    """
     start_time = time.monotonic()
     automaton = automaton_of(case.document, case.project)
     seen = compared_outputs(case.mapping, automaton)
@@ -79,8 +83,8 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
     raw = build_model_set(case, automaton, series, seen)
-    ways = recalibrate_by_hold(raw, log)
-    decision = decide(case, raw, ways, log)
+    recalibrated = recalibrate_by_hold(raw, log)
+    decision = decide(case, raw, recalibrated, log)
     model_set, selection, locations = decision.model_set, decision.selection, decision.locations
     plan = plan_experiment(model_set, _models_to_discriminate(selection, automaton))
     if plan is not None:
@@ -115,15 +119,18 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
         )
         verdict = _confirm(verdict, selection, held_out)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - start_time)
-    shuffles = _oscillations(selection, model_set)
-    details = decision.equation, decision.thresholds, plan, shuffles
+    oscillations = _oscillations(selection, model_set)
+    details = decision.equation, decision.thresholds, plan, oscillations
     return Diagnosis(verdict, selection, model_set, held_out, *details, unread=unread)
 
 
 def _read_held_out(
     case: Case, automaton: Automaton, output_names: Sequence[str], is_first_order_hold: bool
 ) -> tuple[tuple[SampledRecording, ...], tuple[str, ...]]:
-    """Open what is held out; what cannot be read is told, for the verdict stands without it."""
+    """Return the held-out recordings, and a message for each file that cannot be used.
+
+    Unreadable files and copies of other recordings are left out; the verdict stands without them.
+    """
     recordings: list[SampledRecording] = []
     unread = []
     for k, path in enumerate(case.held_out):
@@ -146,13 +153,16 @@ def _read_held_out(
 
 
 def _oscillations(selection: Selection, model_set: ModelSet) -> tuple[Oscillation, ...]:
+    """Return the oscillation of the base and of the final model; empty if the base has none."""
     models = [selection.base, *([selection.model] if selection.accepted else [])]
     found = [analyse_oscillation(model, model_set.series) for model in models]
     return tuple(one for one in found if one is not None) if found[0] is not None else ()
 
 
 def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFit]:
-    """Return the candidates that gain more than the `min_gain` [nats], best first."""
+    """Return the candidates of the first round with a gain above `min_gain` [nats], best score
+    first.
+    """
     rounds = selection.first_round
     near = [
         one for one in rounds if one.likelihood_gain and one.likelihood_gain.penalised > min_gain
@@ -163,7 +173,7 @@ def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFi
 def _models_to_discriminate(
     selection: Selection, automaton: Automaton
 ) -> list[tuple[str, Estimate]]:
-    """Return the first accepted effect and its rivals, by name."""
+    """Return the first accepted effect and its rivals with their fits, by name and place."""
     some = (*selection.accepted[:1], *selection.rivals)
     return [
         ("@".join(_verdict_name(tried.placed_effect, automaton)), tried.estimate)
@@ -179,6 +189,7 @@ def _build_verdict(
     automaton: Automaton,
     fit: dict[str, dict[str, Misfit]],
 ) -> Verdict:
+    """Return the verdict of a selection, without held-out misfits and run time."""
     effects = tuple(
         named_effect_of(tried.placed_effect, selection.model, automaton)
         for tried in selection.accepted
@@ -201,12 +212,16 @@ def _build_verdict(
 
 
 def _verdict_name(placed_effect: PlacedEffect, automaton: Automaton) -> tuple[str, str]:
-    """Return how verdicts name an effect, and its place."""
+    """Return the name of an effect in a verdict, and its place."""
     return verdict_id(placed_effect, automaton), place_path(placed_effect)
 
 
 def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[RankedCandidate, ...]:
-    """Return the fitted candidates, best first: forms of one name at one place are one."""
+    """Return the fitted candidates in the order of the first round.
+
+    Forms with the same name and place are merged: probabilities are added, the gain is the first
+    one.
+    """
     probabilities = selection.probabilities()
     found: dict[tuple[str, str], RankedCandidate] = {}
     for tried in selection.first_round:
@@ -223,7 +238,9 @@ def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[Ranked
 
 
 def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffect, ...]:
-    """Return the rivals as verdicts name them, but for other forms of what is named already."""
+    """Return the rivals under their names in a verdict, without the accepted names and
+    repetitions.
+    """
     taken = [_verdict_name(one.placed_effect, automaton) for one in selection.accepted]
     found: dict[tuple[str, str], NamedEffect] = {}
     for tried in selection.rivals:
@@ -236,24 +253,26 @@ def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffec
 def _confirm(
     verdict: Verdict, selection: Selection, held_out: tuple[SampledRecording, ...]
 ) -> Verdict:
-    """Return the verdict with what the held out recordings say of it.
+    """Return the verdict with the misfits of held-out recordings and whether they confirm it.
 
-    They confirm it where they are foreseen better and no signal is simulated worse, or each much
-    better: a base that drifts may foresee as well without knowing why.
+    They confirm accepted effects if the likelihood is better and no signal is simulated worse by 10
+    %, or if every misfit falls by 20 %: a base with disturbances may predict as well without the
+    physics.
     """
     base = reestimate_per_recording(selection.base, held_out)
     model = reestimate_per_recording(selection.model, held_out)
-    shown = compare_misfits(base, model, held_out)
-    fit = {**verdict.fit, "held_out": shown}
-    left = [one.nrmse_after / one.nrmse_before for one in shown.values() if one.nrmse_before]
-    is_foreseen = (
+    misfits = compare_misfits(base, model, held_out)
+    fit = {**verdict.fit, "held_out": misfits}
+    left = [one.nrmse_after / one.nrmse_before for one in misfits.values() if one.nrmse_before]
+    is_predicted = (
         model.negative_log_likelihood < base.negative_log_likelihood
         and max(left, default=0.0) < MAX_WORSE_RATIO
     )
-    is_better = is_foreseen or max(left, default=1.0) < CONFIRMATION_RATIO
+    is_better = is_predicted or max(left, default=1.0) < CONFIRMATION_RATIO
     confirmed = is_better if selection.accepted else None
     return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
 
 
 def _file_digest(path: Path) -> str:
+    """Return the first 16 hexadecimal digits of the SHA-256 of a file."""
     return hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]

@@ -1,7 +1,7 @@
-"""Fit: parameters of an automaton from recordings, and how well these determine them.
+"""Parameter fit: parameters of an automaton from recordings, with their uncertainties.
 
-What each recording has of its own - where states start, slow disturbances - is taken up by the
-observer that foresees it from sample to sample, not by the parameters.
+Properties of single recordings, such as initial states and slow disturbances, are absorbed by the
+observer that predicts one sample ahead.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from language.text.document import Document, MappingNode
 from language.text.node_edit import put_node
 
 BOUND_TOLERANCE = 1e-3
-"""Part of its range from an end within which a parameter is at it."""
+"""Distance from a bound, as a fraction of the range, within which a parameter is at the bound."""
 UNDETERMINED_RATIO = 0.8
-"""Part of the prior's standard deviation that is left where data say next to nothing."""
+"""Ratio of posterior to prior standard deviation above which data do not determine a parameter."""
 STRONG_CORRELATION = 0.9
-"""Correlation from which two parameters are hardly told apart."""
+"""Correlation from which two parameters can hardly be separated."""
 
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A fitted parameter: what was declared, its value [SI], and how far data determine it.
+    """A fitted parameter with its declared value [SI] and how well the data determine it.
 
-    `left` is its standard deviation as a part of its prior's: 1 where data say nothing. `strongest`
-    is the parameter that it is correlated with most, with the correlation.
+    `prior_ratio` is its standard deviation over that of its prior, 1 without information.
+    `strongest_correlation` names the parameter with which it correlates most. `note` is a remark.
     """
 
     name: str
@@ -56,9 +56,9 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters fitted to recordings; `misfits` of free simulation, as declared and as fitted.
+    """Parameters fitted to recordings; `misfits` of free simulation as declared and as fitted.
 
-    `correlations` are those of pairs, the strongest first; `inputs` are hashes of the files.
+    `correlations` of pairs are in descending order; `inputs` are digests of the files.
     """
 
     automaton: Automaton
@@ -70,13 +70,13 @@ class Fit:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """The parameters of which these data say next to nothing."""
+        """The parameters that the data hardly determine."""
         return tuple(
             one.name for one in self.parameters if not one.prior_ratio <= UNDETERMINED_RATIO
         )
 
     def calibration(self, name: str, date: str = "") -> str:
-        """Return the fit as a calibration file, values in SI."""
+        """Return the fit as the YAML text of a calibration file, values in SI."""
         lines = ["language: 1", f"calibration: {name}", f"of: {self.automaton.name}"]
         lines.append(f"from: {json.dumps(', '.join(self.inputs), ensure_ascii=False)}")
         lines += [f"date: {date}"] if date else []
@@ -94,9 +94,10 @@ class Fit:
 def fit(
     case: Case, parameters: Sequence[str] | None = None, log: LogCallback = lambda text: None
 ) -> Fit:
-    """Return a case's parameters (all that have a range, or those named) fitted to its recordings.
+    """Return the parameters of a case fitted to its recordings: all with a range, or the named
+    ones.
 
-    Raises SpecError, ValueError, ToolMissing.
+    Raises SpecError, ValueError (no compared output, no free parameter) and MissingToolError.
     """
     automaton = automaton_of(case.document, case.project)
     if parameters is not None:
@@ -128,7 +129,10 @@ def fit(
 def restrict_free_parameters(
     document: Document, automaton: Automaton, names: Sequence[str]
 ) -> Document:
-    """Return an expanded document in which no other parameters have a range. Raises SpecError."""
+    """Return an expanded document in which only the named parameters have a range.
+
+    Raises SpecError if a name is unknown or has no range.
+    """
     problems = Problems()
     for name in names:
         parameter = automaton.parameters.get(name)
@@ -151,12 +155,14 @@ def restrict_free_parameters(
 
 
 def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:
+    """Return the table of a parameter in a document, or None."""
     section = root.get("parameters")
     node = section.get(name) if isinstance(section, MappingNode) else None
     return node if isinstance(node, MappingNode) else None
 
 
 def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[FittedParameter, ...]:
+    """Return the fitted parameters of an estimate in its order."""
     strongest: dict[str, tuple[str, float]] = {}
     for (first, second), together in correlations_of(estimate).items():
         strongest.setdefault(first, (second, together))
@@ -175,7 +181,7 @@ def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[Fitted
 
 
 def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
-    """Return what is to be said of a fitted parameter; empty where there is nothing."""
+    """Return a remark on a fitted parameter: at a bound, undetermined, or ""."""
     width = BOUND_TOLERANCE * (coordinate.high - coordinate.low)
     if min(fitted_value.value - coordinate.low, coordinate.high - fitted_value.value) < width:
         return "at the end of its range"
@@ -185,6 +191,6 @@ def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
 
 
 def prior_std_ratio(fitted_value: Quantity, coordinate: FreeParameter) -> float:
-    """Return the standard deviation of a fitted parameter as a part of its prior's."""
+    """Return the standard deviation of a fitted parameter over that of its prior."""
     slope = coordinate.sd * (fitted_value.value if coordinate.is_log else 1.0)
     return fitted_value.std / abs(slope) if slope else 1.0

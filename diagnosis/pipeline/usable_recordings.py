@@ -1,4 +1,4 @@
-"""Workable: whether a model can follow a recording at all, even one that is wanted anyway."""
+"""Usable recordings: which recordings a diagnosis can use, even if the user ignores errors."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from engine.recordings.recording import Channel, Recording
 
 
 def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
-    """Return the recordings to conclude from: none where half of them or more have an error.
+    """Return the training recordings without errors; none if half of them or more have one.
 
-    A mistake in a few is one of these files, which are left out; in many it is one of the map.
+    An error in few recordings is one of these files; in many recordings it is one of the map.
     """
     bad = {finding.recording for finding in recording_errors(check)}
     kept = tuple(file for file in case.train if case.name_of(file) not in bad)
@@ -26,28 +26,28 @@ def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
 
 
 def recording_errors(check: RecordingCheck) -> list[Finding]:
-    """Return what makes recordings worthless."""
+    """Return the findings that are errors."""
     return [finding for finding in check.findings if finding.severity == "error"]
 
 
 MIN_SAMPLES = 10
-"""Samples of a channel from which on something can be said."""
+"""Smallest number of samples of a channel."""
 
 MIN_SAMPLE_PERIOD = 1e-6
-"""Time [s] between samples below which the unit of the time is a mistake."""
+"""Smallest sample period [s]; below it the unit of the time is wrong."""
 
 MAX_SAMPLES = 10_000_000
-"""Samples, at the usual distance, between the first and the last one: a day at 100 Hz."""
+"""Largest number of samples between the first and the last stamp: a day at 100 Hz."""
 
 MAX_VALUE = 1e12
-"""Value in SI beyond which a run of a model is given up."""
+"""Magnitude [SI] above which a run of a model diverges."""
 
 
 class LazyRecordings(Mapping[Path, Recording]):
-    """Recordings as they were read; those held out are read when they are asked for, no sooner.
+    """Recordings by path; held-out ones are read at their first access.
 
-    Raises ValueError for one of these that no model can follow, SpecError and ToolMissing as
-    `read` does.
+    Access raises ValueError for a held-out recording that no model can follow, KeyError for an
+    unknown path, and the errors of the reader.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class LazyRecordings(Mapping[Path, Recording]):
         held_out: Collection[Path],
         read: Callable[[Path], Recording],
     ) -> None:
-        """Take what is known, and how others are read."""
+        """Store known recordings and the function that reads the held-out ones."""
         self._known = dict(known)
         self._held_out = held_out
         self._read = read
@@ -79,7 +79,10 @@ class LazyRecordings(Mapping[Path, Recording]):
 def select_usable(
     case: Case, check: RecordingCheck, anyway: bool
 ) -> tuple[tuple[Path, ...], list[str]]:
-    """Return the recordings of a case to conclude from, and why others are none of them."""
+    """Return the usable training recordings of a case, and why others are left out.
+
+    With `anyway` errors of the check are ignored, but not recordings that no model can follow.
+    """
     usable_files = case.train if anyway else usable_recordings(check, case)
     reasons = (
         [text for _, text in format_findings(recording_errors(check))]
@@ -94,7 +97,7 @@ def select_usable(
 
 
 def unusable_reason(recording: Recording) -> str:
-    """Return why no model can follow a recording; nothing where one can."""
+    """Return why no model can follow a recording; "" if one can."""
     for channel in recording.channels.values():
         reason = _range_fault(channel) or (
             _sampling_fault(channel) if channel.column.compare else ""
@@ -105,12 +108,13 @@ def unusable_reason(recording: Recording) -> str:
 
 
 def _range_fault(channel: Channel) -> str:
+    """Return a phrase if values of a channel are too large, else ""."""
     largest = float(np.max(np.abs(channel.array)))
     return f"values up to {largest:.2g} in SI, beyond {MAX_VALUE:g}" if largest > MAX_VALUE else ""
 
 
 def _sampling_fault(channel: Channel) -> str:
-    """Return why what is compared with a model shows no course over time."""
+    """Return a phrase if a channel has too few samples or an implausible sample period, else ""."""
     count = len(channel.times)
     if count < MIN_SAMPLES:
         return f"{count} of the {MIN_SAMPLES} samples that are needed"
@@ -119,5 +123,6 @@ def _sampling_fault(channel: Channel) -> str:
         return f"samples {sample_period:.2g} s apart: is its time in another unit?"
     duration = float(channel.times[-1] - channel.times[0])
     if duration > MAX_SAMPLES * sample_period:
-        return f"samples {sample_period:.2g} s apart in {duration:.2g} s: `FILE@0..60` uses a part of it"
+        spacing = f"samples {sample_period:.2g} s apart in {duration:.2g} s"
+        return f"{spacing}: `FILE@0..60` uses a part of it"
     return ""

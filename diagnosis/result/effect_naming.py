@@ -1,4 +1,4 @@
-"""Naming: effects and their places as verdicts name them, with fitted values and their spread."""
+"""Effect names: names and places of effects in verdicts, with fitted values."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ VERDICT_ALIASES = {
     "second_gap": ("backlash", "on an elastic element that has a gap"),
     "added_inertia": ("compliance", "on an inertia"),
 }
-"""Names that verdicts use: of which effect, and where."""
+"""Names of verdicts that differ from the effect's: the effect, and where it has this name."""
 
 
 def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
-    """Return the name of an effect: a second gap and an added inertia have one of their own."""
+    """Return the name of an effect in a verdict, which depends on its place for two effects."""
     element = automaton.elements.get(placed_effect.place)
     if element is not None and placed_effect.effect.name == "backlash" and "gap" in element.parts:
         return "second_gap"
@@ -32,12 +32,12 @@ def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
 def named_effect_of(
     placed_effect: PlacedEffect, model: Estimate, automaton: Automaton
 ) -> NamedEffect:
-    """Return an effect of a model with its parameters, named as the effect names them."""
+    """Return an effect of a model with its fitted parameters, under their names in the effect."""
     quantities = quantities_of(model)
-    brought = effect_names(placed_effect)
+    original_names = effect_names(placed_effect)
     own = {
-        brought[name]: quantity
+        original_names[name]: quantity
         for name, quantity in quantities.items()
-        if name in brought and name not in automaton.parameters
+        if name in original_names and name not in automaton.parameters
     }
     return NamedEffect(verdict_id(placed_effect, automaton), place_path(placed_effect), own)

@@ -1,4 +1,4 @@
-"""Verdict: what a diagnosis says, as data; its JSON has the format `modewright-verdict/1`."""
+"""Verdict: the result of a diagnosis as data; its JSON has the format `modewright-verdict/1`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """A candidate: its probability, and what it gained in training [nats], give or take `std`."""
+    """A candidate with its probability and its penalised gain [nats], with standard deviation
+    `std`.
+    """
 
     id: str
     place: str
@@ -38,10 +40,10 @@ class RankedCandidate:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found: see docs/diagnosis.md for each part.
+    """The result of a diagnosis; docs/diagnosis.md describes each part.
 
-    `fit` is by set (`train`, `held_out`) and signal; `base` are the recalibrated parameters before
-    and after the effects were accepted.
+    `fit` gives misfits by set (`train`, `held_out`) and signal; `base` gives recalibrated
+    parameters before and after effects were accepted.
     """
 
     verdict: DecisionOutcome
@@ -58,7 +60,7 @@ class Verdict:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the verdict as written to `verdict.json`."""
+        """Return the content of `verdict.json`; locations without a gain are left out."""
         locations = [
             location for location in self.location if location.gain > 0.0 or location.is_accepted
         ]
@@ -101,6 +103,7 @@ class Verdict:
 
 
 def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
+    """Return an effect as a JSON object."""
     return {
         "id": effect.id,
         "place": effect.place,
@@ -109,4 +112,5 @@ def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
 
 
 def _quantity_to_json(quantity: Quantity) -> dict[str, Any]:
+    """Return a quantity as a JSON object."""
     return {"value": quantity.value, "unit": quantity.unit, "std": quantity.std}

@@ -1,7 +1,7 @@
-"""Adequacy: whether effects that were accepted leave more unexplained than they explain.
+"""Adequacy: whether accepted effects leave more unexplained than they explain.
 
-The nearest effect of a library that lacks the true one gains a great deal; but drifts that are let
-free still find much to do beside it, and innovations of the model remember, which noise does not.
+If the library lacks the true effect, the nearest one still gains a lot. But free disturbances then
+gain much beside it, and the innovations of the model are autocorrelated.
 """
 
 from __future__ import annotations
@@ -23,38 +23,47 @@ from diagnosis.selection.stopping import disturbance_gain
 from diagnosis.validation.free_simulation import nrmse
 
 MAX_REMAINING_FRACTION = 0.12
-"""Part of what was gained that drifts which are let free may gain beside it: forms differ."""
+"""Fraction of the effects' gain that free disturbances may gain beside them."""
 MIN_AUTOCORRELATION = 1.2
-"""Innovations that count as one from which on those of a model remember."""
+"""Integrated autocorrelation above which innovations are autocorrelated."""
 WITHDRAWAL_AUTOCORRELATION = 1.6
-"""The same from which on a name is taken back: a rate limit by steps has 1.54."""
+"""The same above which an effect is withdrawn; a stepwise rate limit has 1.54."""
 MAX_AUTOCORRELATION_RATIO = 0.25
-"""Part of what the base's innovations remembered that those of an adequate model may: noise has no
-memory, and a form that is not quite right leaves little of it."""
+"""Fraction of the base's excess autocorrelation that an adequate model may leave.
+
+White noise has none, and a slightly wrong form leaves little.
+"""
 MAX_MEDIAN_RATIO = 0.2
-"""The same for the recordings, for which it is the median: a few may be far from the others."""
+"""The same for the median over recordings, a few of which may differ."""
 
 STRONG_AUTOCORRELATION, MAX_STRONG_MEDIAN_RATIO = 3.0, 0.05
-"""Innovations that count as one from which on those of a model are loud, and the typical part that
-an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
+"""Integrated autocorrelation that is strong, and the median fraction that may then be left.
+
+The lag of a sensor that imitates a delay leaves a tenth.
+"""
 
 STACKED_FRACTION = 0.35
-"""Part of what an effect gained that a further one gains at the same place, where neither is it:
-0.28 at most beside right ones."""
+"""Fraction of an effect's gain from which a second effect at its place shows that both are wrong.
+
+Beside right effects it is 0.28 at most.
+"""
 
 SMALL_GAIN = 800.0
-"""Nats that effects gained together below which simulations have to show them as well."""
+"""Total gain [nats] below which effects must improve the simulation as well."""
 MIN_MISFIT_RATIO = 0.85
-"""Part of the misfit of simulation from which on they hardly show them: what foresees a little
-better from sample to sample and simulates no better is bent to what is there."""
+"""Ratio of simulation misfits above which the simulation is not improved.
+
+A model that predicts slightly better and simulates no better is adapted to the recordings only.
+"""
 
 REJECTION_LEAD = 20.0
-"""Nats by which "none of these" then leads the best candidate."""
+"""Lead [nats] of "none of these" over the best candidate after a rejection."""
 
 
 def is_inadequate(model_set: ModelSet, selection: Selection, min_gain: float) -> bool:
-    """Tell whether free drifts gain much of what the accepted effects gained, and what is `min_gain`
-    [nats].
+    """Return whether free disturbances gain much beside the accepted effects.
+
+    The limit is `min_gain` [nats] or `MAX_REMAINING_FRACTION` of the effects' gain, the larger one.
     """
     known = [
         tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
@@ -65,11 +74,11 @@ def is_inadequate(model_set: ModelSet, selection: Selection, min_gain: float) ->
 
 
 def free_disturbance_gain(model_set: ModelSet, selection: Selection) -> float:
-    """Return what drifts that are let free in all balances and elements gain [nats], the parameters
-    fitted with them; those of elements are left out where they do not go along.
+    """Return the effective gain [nats] of free disturbances in all balances and elements.
 
-    An effect that may walk along a recording, such as a grade, leaves what it leaves at its place.
-    A free error of an output is none of them: a sensor follows whatever the model gets wrong.
+    Parameters are fitted with them. Elements are left out if the model with them has no finite
+    cost. An effect that varies slowly, such as a grade, excludes its place. Outputs are not
+    included, because a sensor error follows any error of the model.
     """
     inside = [
         placed_effect
@@ -86,7 +95,9 @@ def free_disturbance_gain(model_set: ModelSet, selection: Selection) -> float:
 def _disturbance_gain(
     model_set: ModelSet, selection: Selection, disturbances: Sequence[PlacedEffect]
 ) -> float:
-    """Return what some drifts gain [nats] that are let free; -inf where they do not go along."""
+    """Return the effective gain [nats] of some free disturbances; -inf if they cannot be
+    combined.
+    """
     held = {
         tried.placed_effect.place
         for tried in selection.accepted
@@ -97,7 +108,7 @@ def _disturbance_gain(
 
 
 def has_autocorrelated_residuals(model_set: ModelSet, selection: Selection) -> bool:
-    """Tell whether innovations remember much of what they did before effects were accepted."""
+    """Return whether innovations keep much of the autocorrelation that they had in the base."""
     before, after = (
         integrated_autocorrelation(one, model_set.series)
         for one in (selection.base, selection.model)
@@ -106,9 +117,10 @@ def has_autocorrelated_residuals(model_set: ModelSet, selection: Selection) -> b
 
 
 def has_autocorrelated_residuals_in_most(model_set: ModelSet, selection: Selection) -> bool:
-    """Tell whether innovations remember, and those of most recordings in which they did before.
+    """Return whether innovations are autocorrelated, also in most recordings where the base's were.
 
-    Where a form is not quite right some recordings show it that drive it far.
+    The fraction that is left is compared for the median recording, because an inexact form shows in
+    those few that drive it far.
     """
     together = integrated_autocorrelation(selection.model, model_set.series)
     is_loud = together > STRONG_AUTOCORRELATION
@@ -128,8 +140,9 @@ def has_autocorrelated_residuals_in_most(model_set: ModelSet, selection: Selecti
 
 
 def has_stacked_effects(selection: Selection) -> bool:
-    """Tell whether an effect needed another one at its place, which gains much of what it gained:
-    together they imitate what is neither.
+    """Return whether a further effect at the same place gains much of what the first one gained.
+
+    Two such effects together imitate a third one.
     """
     firsts: dict[str, float] = {}
     for tried in selection.accepted:
@@ -144,7 +157,7 @@ def has_stacked_effects(selection: Selection) -> bool:
 
 
 def lacks_simulation_improvement(model_set: ModelSet, selection: Selection) -> bool:
-    """Tell whether effects that gained little leave simulations nearly as they were."""
+    """Return whether effects of small gain leave the simulation misfit nearly unchanged."""
     gained = sum(
         tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
     )
@@ -155,7 +168,7 @@ def lacks_simulation_improvement(model_set: ModelSet, selection: Selection) -> b
 
 
 def reject_effects(selection: Selection) -> Selection:
-    """Return a selection in which nothing was accepted, and no candidate is likely."""
+    """Return a selection without accepted effects in which no candidate is likely."""
     totals = [
         tried.likelihood_gain.total for tried in selection.first_round if tried.likelihood_gain
     ]

@@ -1,4 +1,4 @@
-"""Sureness: a first name that may be an imitation is less sure than its gain makes it."""
+"""Confidence cap: an upper limit of the probability of an effect that may be an imitation."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ right; the twelve others were wrong, nine of them where the library lacked the e
 
 
 def cap_probability(model_set: ModelSet, selection: Selection, log: LogCallback) -> Selection:
-    """Return a selection whose first effect is less sure if it is not alone or its parameters vary
-    from recording to recording.
+    """Return a selection with a lower probability of the first effect if it may be an imitation.
 
-    What goes along with it may take up what its form gets wrong. Physics does come in pairs; but so
-    does what imitates an effect that the library lacks.
+    This is the case if its parameters vary between recordings, or if it needs other effects:
+    physics can come in pairs, but an imitation of a missing effect does as well.
     """
     scores = [tried.score for tried in selection.first_round if tried.likelihood_gain]
     why = _cap_reason(model_set.series, selection)

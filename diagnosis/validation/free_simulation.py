@@ -1,8 +1,8 @@
-"""Simulation: how far a model goes astray when nothing corrects it, before and after.
+"""Free simulation: the error of a model without corrections, before and after a diagnosis.
 
-An observer runs for a second, then the model is alone for one and a half: the difference to what
-was recorded there, over the spread of the recorded signal. A model that forgets where it started
-is alone for the whole of each recording, once its states have been found.
+An observer corrects the model for one second, then it runs freely for one and a half. The error
+there is normalised by the standard deviation of the recorded signal. A model with fading memory
+runs freely for the whole recording after the burn-in.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from diagnosis.validation.misfit import Misfit
 
 Reals = NDArray[np.float64]
 OBSERVED_TIME = 1.0
-"""Seconds in which the observer follows."""
+"""Time [s] with corrections by the observer."""
 FREE_TIME = 1.5
-"""Seconds in which the model is alone."""
+"""Time [s] of free simulation."""
 
 
 def compare_misfits(
     before: Estimate, after: Estimate, series: Sequence[SampledRecording]
 ) -> dict[str, Misfit]:
-    """Return the misfit of each compared signal, of two models that are fitted to `series`."""
+    """Return the misfit of each compared output for two models that are fitted to `series`."""
     first, second = nrmse(before, series), nrmse(after, series)
     names = before.candidate.predictor.outputs
     return {
@@ -39,7 +39,9 @@ def compare_misfits(
 
 
 def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the normalised root mean square of free simulation by signal (seen,)."""
+    """Return the root mean square error of free simulation over the standard deviation
+    (outputs,).
+    """
     squares, counts = [], []
     for one, simulated in zip(series, simulate_free(model, series), strict=True):
         counted = is_after_burn_in(one) if model.noise_levels.is_output_error else is_free(one)
@@ -52,13 +54,15 @@ def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
 
 
 def output_stds(series: Sequence[SampledRecording]) -> Reals:
-    """Return the standard deviation of each compared signal [SI] (seen,)."""
+    """Return the standard deviation [SI] of each compared output over all recordings (outputs,)."""
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
 
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
-    """Return what a model shows for each recording (samples, seen): followed, then alone."""
+    """Return the outputs of a model for each recording (samples, outputs), observed and free in
+    turn.
+    """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
         for one in series
@@ -74,11 +78,11 @@ def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[R
 
 
 def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the samples (samples,) behind those in which the states are found."""
+    """Return the mask (samples,) of samples after the burn-in."""
     return np.asarray(np.arange(series.count) >= burn_in_samples(series))
 
 
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the samples (samples,) at which the model is alone."""
+    """Return the mask (samples,) of samples in free simulation."""
     time = np.arange(series.count) * float(series.period)
     return np.asarray(np.mod(time, OBSERVED_TIME + FREE_TIME) >= OBSERVED_TIME)

@@ -1,4 +1,4 @@
-"""The misfit between simulation and recording."""
+"""Misfit: the error of free simulation against a recording."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Misfit:
-    """Root mean square of what free simulation misses, before and after.
+    """Root mean square errors of free simulation before and after a diagnosis.
 
-    As a part of the standard deviation of the recorded signal, and in SI.
+    They are given relative to the standard deviation of the recorded signal, and in SI.
     """
 
     nrmse_before: float

@@ -1,5 +1,7 @@
-"""Shuffle: the oscillation after the largest step - how long a model follows it, and cycle by cycle
-its frequency and damping over its amplitude, as recorded and as simulated.
+"""Driveline oscillation (shuffle): frequency and damping after the largest step, cycle by cycle.
+
+The recorded oscillation is compared with the simulated one, and the time for which the model
+follows it is determined.
 """
 
 from __future__ import annotations
@@ -17,30 +19,33 @@ from diagnosis.estimation.innovations import predict
 
 Reals = NDArray[np.float64]
 OBSERVED_TIME = 0.5
-"""Seconds before the step that an observer needs at least."""
+"""Shortest time [s] of observation before the step."""
 MAX_TIME = 2.5
-"""Seconds after it that are looked at."""
+"""Longest time [s] after the step that is analysed."""
 STEP_TIME = 0.06
-"""Seconds in which a step is over."""
+"""Duration [s] of a step."""
 MIN_FREQUENCY, MAX_FREQUENCY = 1.0, 25.0
-"""Frequencies [Hz] that are looked for."""
+"""Range of frequencies [Hz] that is searched."""
 MIN_NOISE_RATIO = 8.0
-"""A cycle counts where its amplitude is so many times the noise."""
+"""Smallest amplitude of a cycle relative to the noise."""
 MAX_ERROR_FRACTION = 0.35
-"""The model fits while it misses less than this part of the amplitude of the time: its phase is 20
-degrees off then, which is seen where both are drawn over each other.
+"""Largest error of the model, relative to the amplitude at that time.
+
+It is a phase error of 20 degrees, which is visible in a plot.
 """
 LARGE_AMPLITUDE, SMALL_AMPLITUDE = 0.5, 0.25
-"""Cycles are compared above and below these parts of the largest amplitude."""
+"""Cycles above and below these fractions of the largest amplitude are compared."""
 FREQUENCY_TOLERANCE = 0.02
-"""Frequencies that differ by less, as a part, are the same."""
+"""Frequencies with a smaller relative difference are equal."""
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """The cycles of an oscillation: `times` [s] after the step, `rates` [Hz], `amplitudes`.
+    """The cycles of an oscillation:
 
-    One begins at every crossing of zero: each overlaps the next by a half.
+    `times` [s] after the step, `frequencies` [Hz] and `amplitudes`.
+
+    A cycle begins at every zero crossing, so consecutive cycles overlap by a half.
     """
 
     times: Reals
@@ -48,12 +53,14 @@ class Cycles:
     amplitudes: Reals
 
     def mean_frequency_after(self, time: float) -> float:
-        """Return the mean frequency [Hz] of the cycles from a time on; NaN without any."""
+        """Return the mean frequency [Hz] of the cycles from a time [s] on; NaN without any."""
         late = self.frequencies[self.times >= time]
         return float(np.mean(late)) if len(late) else float("nan")
 
     def frequency_trend(self) -> float:
-        """Return the part by which small cycles are faster than large ones; NaN without both."""
+        """Return the relative frequency of small cycles over large ones, minus 1; NaN
+        without both.
+        """
         part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
         large, little = (
             self.frequencies[part > LARGE_AMPLITUDE],
@@ -64,7 +71,9 @@ class Cycles:
         return float(np.mean(little) / np.mean(large) - 1.0)
 
     def damping_ratio(self) -> float:
-        """Return the damping ratio from how the amplitudes fall; NaN with fewer than three."""
+        """Return the damping ratio from the logarithmic decrement; NaN for fewer than three
+        cycles.
+        """
         if len(self.amplitudes) < 3:
             return float("nan")
         slope = np.polyfit(np.arange(len(self.amplitudes)), np.log(self.amplitudes), 1)[0]
@@ -73,9 +82,10 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """What follows the step at `start` [s] of a recording: `until` [s] after it the model fits.
+    """The oscillation after the step at `start` [s] of a recording.
 
-    `signal` is the one in which it shows most; cycles as recorded and as simulated.
+    `signal` is the output with the clearest oscillation. The model follows it for `followed_time`
+    [s] of `length` [s].
     """
 
     recording: str
@@ -88,7 +98,7 @@ class Oscillation:
 
     @property
     def has_other_frequency(self) -> bool:
-        """Whether the model leaves the recording, and by another frequency."""
+        """Whether the model stops following, and then has another frequency."""
         rates = [
             one.mean_frequency_after(self.followed_time) for one in (self.recorded, self.simulated)
         ]
@@ -96,7 +106,7 @@ class Oscillation:
         return bool(known and abs(rates[0] / rates[1] - 1.0) > FREQUENCY_TOLERANCE)
 
     def format_sentence(self) -> str:
-        """Return until when the model fits, then both frequencies, in one sentence."""
+        """Return in one sentence how long the model follows, and both frequencies after that."""
         begin = f"after the step at {self.start:.2f} s of {self.recording}"
         if self.followed_time >= self.length:
             return f"{self.signal} fits to the end, {self.length:.2f} s {begin}"
@@ -111,7 +121,9 @@ class Oscillation:
         return text + self._format_trend() + self._format_damping()
 
     def _format_trend(self) -> str:
-        """Return how the recorded frequency goes with the amplitude, against the model's."""
+        """Return the trend of frequency with amplitude, recorded and simulated; "" if they
+        agree.
+        """
         more = [one.frequency_trend() for one in (self.recorded, self.simulated)]
         if not all(np.isfinite(more)) or abs(more[0] - more[1]) < FREQUENCY_TOLERANCE:
             return ""
@@ -120,6 +132,7 @@ class Oscillation:
         return f", {word} as the amplitude falls ({parts[0]}, in the model {parts[1]})"
 
     def _format_damping(self) -> str:
+        """Return both damping ratios; "" if they agree."""
         dampings = [100.0 * one.damping_ratio() for one in (self.recorded, self.simulated)]
         if not all(np.isfinite(dampings)) or abs(dampings[0] - dampings[1]) < 0.5:
             return ""
@@ -127,7 +140,11 @@ class Oscillation:
 
 
 def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> Oscillation | None:
-    """Return what follows the largest step of some recordings; None without an oscillation."""
+    """Return the oscillation after the largest step of some recordings, recorded and simulated.
+
+    The model is corrected before the step and free after it. The result is None without a step, an
+    oscillation of at least two clear cycles, or a complete run.
+    """
     place = _largest_step(series)
     if place is None:
         return None
@@ -167,7 +184,10 @@ def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> 
 
 
 def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | None:
-    """Return the recording of the largest step of an input, its sample, and the next one's."""
+    """Return recording, sample, and end sample of the largest input step relative to its range.
+
+    The end is the next large step, the end of the recording, or `MAX_TIME` after the step.
+    """
     scale = np.max([np.ptp(one.inputs, axis=0) for one in series], axis=0)
     scale = np.where(scale > 0.0, scale, np.inf)
     best, found = 0.0, None
@@ -187,7 +207,7 @@ def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | 
 
 
 def _cycle_samples(values: Reals, period: float) -> int | None:
-    """Return the samples of one cycle of the strongest oscillation (samples,)."""
+    """Return the number of samples of one cycle of the strongest oscillation; None without one."""
     time = np.arange(len(values))
     rest = values - np.polyval(np.polyfit(time, values, 3), time)
     rates = np.fft.rfftfreq(len(rest), period)
@@ -200,7 +220,7 @@ def _cycle_samples(values: Reals, period: float) -> int | None:
 
 
 def _remove_moving_mean(values: Reals, width: int) -> Reals:
-    """Return what oscillates: values less their means over one cycle around; NaN at the ends."""
+    """Return a signal without its moving mean over one cycle, NaN at the ends."""
     known = np.isfinite(values)
     if not np.any(known):
         return np.full(len(values), np.nan)
@@ -216,7 +236,7 @@ def _remove_moving_mean(values: Reals, width: int) -> Reals:
 
 
 def _find_cycles(wave: Reals, period: float, min_gain: float) -> Cycles:
-    """Return the cycles between crossings of zero, until one is smaller than `min_gain`."""
+    """Return the cycles between zero crossings, until an amplitude is below `min_gain`."""
     known = np.flatnonzero(np.isfinite(wave))
     x, offset = wave[known], int(known[0]) if len(known) else 0
     places = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0.0)

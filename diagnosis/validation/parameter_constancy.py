@@ -1,7 +1,7 @@
-"""Constancy: whether the parameters of an effect are the same in each recording.
+"""Parameter constancy: whether the parameters of an effect are equal in all recordings.
 
-Physics is: a constant of a machine does not change with the manoeuvre. What imitates an effect that
-the library lacks finds another value in each that comes nearest to it.
+A physical constant of a machine does not depend on the manoeuvre. An effect that imitates another
+one, which the library lacks, has another best value in each recording.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from language.text.document import MappingNode, ScalarNode
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VARIATION_GAIN, VARIATION_FRACTION = 20.0, 0.012
-"""Nats that values of its own in each recording would gain for an effect, and part of what it
-gained, from which on its parameters vary."""
+"""Gain [nats] of separate values, and its fraction of the effect's gain, above which they vary."""
 REJECTION_FRACTION, DELAY_REJECTION_FRACTION = 0.2, 0.06
-"""The same part from which on they are no constants of a machine: right ones have 0.17 at most. A
-lag or a delay alone has 0.01 (two of fifty 0.03 and 0.05): nothing beside it makes its time
-another."""
+"""Fraction of the effect's gain above which the effect is rejected, in general and for a delay
+alone.
+
+Right effects have 0.17 at most. A single lag or delay has 0.01 (two of fifty 0.03 and 0.05),
+because no other effect changes its time.
+"""
 
 
 def rejects_constancy(
@@ -40,8 +42,9 @@ def rejects_constancy(
     series: Sequence[SampledRecording],
     is_only_effect: bool,
 ) -> bool:
-    """Tell whether they differ so much that the effect is another one: the normal equations foresee
-    it, and runs with values of their own show it.
+    """Return whether an effect is rejected because its parameters differ between recordings.
+
+    Both the predicted and the simulated gain of separate values must exceed the limit.
     """
     part = (
         DELAY_REJECTION_FRACTION
@@ -55,7 +58,9 @@ def rejects_constancy(
 
 
 def is_lag_or_delay(placed_effect: PlacedEffect) -> bool:
-    """Tell whether an effect is a lag or a delay: it has a time, without which it is absent."""
+    """Return whether an effect has a parameter that is a time and whose neutral value is
+    `absent`.
+    """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
     return any(
@@ -65,6 +70,7 @@ def is_lag_or_delay(placed_effect: PlacedEffect) -> bool:
 
 
 def _is_time_with_absent_neutral(parameter: MappingNode) -> bool:
+    """Return whether a declared parameter is a time with `neutral: absent`."""
     neutral, value = parameter.get("neutral"), parameter.get("value")
     if (
         not isinstance(neutral, ScalarNode)
@@ -79,7 +85,7 @@ def _is_time_with_absent_neutral(parameter: MappingNode) -> bool:
 def has_varying_parameters(
     model: Estimate, candidate_fit: CandidateFit, series: Sequence[SampledRecording]
 ) -> bool:
-    """Tell whether the parameters of an effect that a model holds are not the same in each."""
+    """Return whether the parameters of an effect vary between recordings, by the predicted gain."""
     return heterogeneity_score(model, candidate_fit.placed_effect, series) > max(
         VARIATION_GAIN, VARIATION_FRACTION * candidate_fit.gain
     )
@@ -88,10 +94,9 @@ def has_varying_parameters(
 def heterogeneity_score(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> float:
-    """Return what values of their own in each recording would gain [nats] for the parameters of an
-    effect, beyond what noise gives them: the normal equations foresee it, all else held.
+    """Return the predicted gain [nats] of separate parameter values beyond the gain from noise.
 
-    (The score test of Rao 1948, of parameters that are the same against some that are not.)
+    This is the score test (Rao 1948) of equal against separate values, all else fixed.
     """
     steps = _recording_steps(model, placed_effect, series)
     return sum(step.predicted_gain - step.expected_gain for step in steps)
@@ -100,9 +105,9 @@ def heterogeneity_score(
 def simulated_heterogeneity(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> float:
-    """Return what they gain [nats] where the recordings are run with them, beyond what noise gives.
+    """Return the gain [nats] of separate values in simulations, beyond the gain from noise.
 
-    A step that does a recording no good is shortened: what bends is not foreseen far.
+    Steps are shortened if that is better, because predictions are local.
     """
     steps = _recording_steps(model, placed_effect, series)
     if not steps:
@@ -124,8 +129,10 @@ def simulated_heterogeneity(
 
 @dataclass(frozen=True)
 class _RecordingStep:
-    """How far an effect's parameters, the `places` of a model, would go in one recording from where
-    they are `at` in all; what that is foreseen to gain [nats], and what noise gives it by chance.
+    """The step of an effect's parameters (`indices` of a model) in one recording.
+
+    It begins at the shared coordinates `start`. `predicted_gain` [nats] follows from the normal
+    equations, `expected_gain` is the mean gain that noise causes.
     """
 
     recording: int
@@ -137,12 +144,14 @@ class _RecordingStep:
     bounds: Reals
 
     def point_at(self, part: float) -> Reals:
-        """Return where a part of the step leads, within the ranges (parameters,)."""
+        """Return the coordinates after a fraction of the step, within the ranges (parameters,)."""
         low, high = self.bounds
         return np.clip(self.start + part * self.step, low, high)
 
     def values(self, model: Estimate, z: Reals) -> dict[str, float]:
-        """Return the parameters [SI] of the recording with those of the effect at some point."""
+        """Return the values [SI] of the recording with the effect's parameters at
+        coordinates `z`.
+        """
         known = [model.candidate.free_parameters[k] for k in self.indices]
         own = {one.name: one.value(float(at)) for one, at in zip(known, z, strict=True)}
         return {**model.values(self.recording), **own}
@@ -151,12 +160,15 @@ class _RecordingStep:
 def _recording_steps(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> list[_RecordingStep]:
-    """Return how far the parameters that all share of an effect would go in each recording."""
+    """Return the Gauss-Newton step of an effect's shared parameters in each recording.
+
+    The list is empty without normal equations.
+    """
     if model.normal_equations is None:
         return []
-    brought = effect_names(placed_effect)
-    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
-    indices = np.flatnonzero(is_brought & ~model.normal_equations.own)
+    added_names = effect_names(placed_effect)
+    is_added = np.array([name in added_names for name in model.candidate.names], dtype=bool)
+    indices = np.flatnonzero(is_added & ~model.normal_equations.own)
     effective_fraction, steps = 1.0 / integrated_autocorrelation(model, series), []
     at, bounds = model.point.shared[indices], bounds_of(model.candidate)[indices].T
     for recording in np.unique(model.normal_equations.of).tolist():
@@ -175,8 +187,8 @@ def _recording_steps(
 
 
 def _recording_costs(model: Estimate, prediction: PredictionResult) -> Reals:
-    """Return half the squares of each recording, over what a model leaves (recordings,); without
-    bound where one leaves all bounds.
+    """Return half the normalised squares of each recording (recordings,), infinite if it
+    diverges.
     """
     costs = 0.5 * np.sum(prediction.runs.squared_sums / model.prediction.variances, axis=1)
     return np.where(prediction.runs.completed == np.diff(prediction.runs.starts), costs, np.inf)

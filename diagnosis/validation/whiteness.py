@@ -1,6 +1,6 @@
-"""Whiteness: whether what a model misses from sample to sample still hangs together.
+"""Whiteness: the autocorrelation of the innovations of a model (Ljung, Box 1978).
 
-Where it does, something that was recorded is not in the model (Ljung, Box 1978).
+Autocorrelated innovations show that the model lacks something that was recorded.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from diagnosis.estimation.estimate import Estimate
 
 Reals = NDArray[np.float64]
 MAX_LAG_TIME = 0.25
-"""Longest lag looked at [s]."""
+"""Longest lag [s]."""
 MAX_LAGS = 60
 BAND_STDS = 2.576
-"""Standard deviations beyond which one lag in a hundred lies by accident."""
+"""Standard deviations of the 99 % band."""
 NEGLIGIBLE_FRACTION = 0.05
-"""Part of the variance told by the past that is too small to matter, whatever the test says."""
+"""Predictable fraction of the variance that is negligible, whatever the test says."""
 SIGNIFICANCE_LEVEL = 0.01
-"""Chance of the test to call white noise coloured."""
+"""Probability with which the test rejects white noise."""
 
 
 @dataclass(frozen=True)
 class WhitenessTest:
-    """Of one signal: `correlations` at `lags` [s] (lags,), and the `band` for 99 % of them.
+    """The test of one signal: `correlations` at `lags` [s] (lags,), and the 99 % `band`.
 
-    `chance` is that of white noise to hang together as much (Ljung, Box), `foretold` the part of
-    the variance that its own past tells, `rms` the size [SI] of what is missed.
+    `p_value` is that of the Ljung-Box test, `predictable_fraction` the fraction of the variance
+    that a linear predictor explains, `rms` the size [SI] of the innovations.
     """
 
     signal: str
@@ -45,24 +45,27 @@ class WhitenessTest:
 
     @property
     def is_white(self) -> bool:
-        """Tell whether the test has nothing to object."""
+        """Whether the test does not reject whiteness."""
         return self.p_value >= SIGNIFICANCE_LEVEL
 
     @property
     def rating(self) -> str:
-        """The answer in words."""
+        """The result in words."""
         if self.is_white:
             return "white"
         return "nearly white" if self.predictable_fraction < NEGLIGIBLE_FRACTION else "coloured"
 
     @property
     def lags_outside_band(self) -> int:
-        """The number of lags beyond the band."""
+        """The number of lags outside the band."""
         return int(np.sum(np.abs(self.correlations) > self.band))
 
 
 def innovation_whiteness(model: Estimate, period: float) -> list[WhitenessTest]:
-    """Return for each compared signal how white the innovations of a model are; `period` [s]."""
+    """Return the test of the innovations of each compared output; `period` [s].
+
+    Innovations are clipped at the Huber limits.
+    """
     prediction = model.prediction
     names = model.candidate.predictor.outputs
     found = []
@@ -74,7 +77,11 @@ def innovation_whiteness(model: Estimate, period: float) -> list[WhitenessTest]:
 
 
 def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest:
-    """Return how white the pieces of a signal are, NaN where nothing is known; `period` [s]."""
+    """Return the test of a signal given in parts, NaN where unknown; `period` [s].
+
+    The statistic is the sum over lags of the number of pairs times the squared autocorrelation; it
+    has a chi-squared distribution with as many degrees of freedom as lags. There are up to 60 lags.
+    """
     shortest = min(len(part) for part in parts)
     count = max(1, min(MAX_LAGS, round(MAX_LAG_TIME / period), shortest // 4))
     total = sum(int(np.sum(np.isfinite(part))) for part in parts)
@@ -88,22 +95,23 @@ def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest
         r[k - 1] = float(np.sum(known)) / pairs[k - 1] / max(power, 1e-300)
     q = float(np.sum(pairs * r**2))
     band = BAND_STDS / float(np.sqrt(np.median(pairs)))
-    chance = float(chi2.sf(q, count))
+    p_value = float(chi2.sf(q, count))
     return WhitenessTest(
         name,
         lags * period,
         r,
         band,
-        chance,
+        p_value,
         _predictable_fraction(r * pairs / max(total, 1)),
         float(np.sqrt(power)),
     )
 
 
 def _predictable_fraction(r: Reals) -> float:
-    """Return the part of the variance that a linear prediction from the past tells.
+    """Return the fraction of the variance that the linear predictor of this order explains.
 
-    `r` are sums over all pairs by the number of all values: such a matrix is never indefinite.
+    `r` are biased autocorrelations (over the number of all values), so the Toeplitz matrix is
+    positive definite (Yule-Walker equations).
     """
     weights = solve_toeplitz(np.concatenate([[1.0], r[:-1]]), r)
     return float(np.clip(weights @ r, 0.0, 1.0))

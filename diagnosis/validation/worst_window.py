@@ -1,4 +1,4 @@
-"""Worst window: where free simulation of the base misses most, with the model beside it."""
+"""Worst window: where the free simulation of the base has its largest error, beside the model's."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WorstWindow:
-    """A window of a recording: times [s] (n,), `inputs` (n, fed), and `measured`, `before`, `after`
-    (n, seen) in SI.
+    """A window of a recording: times [s] (n,), `inputs` (n, inputs) and outputs (n, outputs) in SI.
 
-    The model is alone from `alone` [s] on. `units` are those of the signals; `words` say which
-    recordings it is the worst of.
+    `before` and `after` are the outputs of the base and the model, which run freely from
+    `free_from` [s]. `units` are those of the signals; `title` names the recordings of which it is
+    the worst.
     """
 
     recording: str
@@ -38,7 +38,7 @@ class WorstWindow:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free simulations of recordings: `before` and `after`, (samples, seen) of each, in SI."""
+    """Free simulations of recordings by two models, (samples, outputs) each, in SI."""
 
     series: Sequence[SampledRecording]
     before: Sequence[Reals]
@@ -49,13 +49,17 @@ class FreeRuns:
 def simulate_free_runs(
     base: Estimate, model: Estimate, series: Sequence[SampledRecording]
 ) -> FreeRuns:
-    """Return how both models go where they are alone."""
+    """Return the free simulations of the base and of the model."""
     names = tuple(base.candidate.predictor.outputs)
     return FreeRuns(series, simulate_free(base, series), simulate_free(model, series), names)
 
 
 def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
-    """Return name and root mean squares of what is missed, before and after (seen,), in SI."""
+    """Return the name and the root mean square errors of each recording, before and after
+    (outputs,).
+
+    Only samples in free simulation count; the values are in SI.
+    """
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
         alone = is_free(one)
@@ -65,9 +69,10 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 
 
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
-    """Return the window in which the base, alone, misses most: squares over those of a signal.
+    """Return the window with the largest squared error of the base, normalised by the signals'
+    spread.
 
-    `label` says in words which recordings these are.
+    `label` names the set of recordings in the title.
     """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
@@ -100,14 +105,16 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
 
 
 def _sample_count(series: SampledRecording, seconds: float) -> int:
+    """Return the number of samples in a time [s]."""
     return round(seconds / float(series.period))
 
 
 def _window_starts(series: SampledRecording) -> range:
-    """Return the first samples of the windows that have a part in which the model is alone."""
+    """Return the first samples of the windows that contain free simulation."""
     last = max(1, series.count - _sample_count(series, OBSERVED_TIME) - 1)
     return range(0, last, max(1, _sample_count(series, OBSERVED_TIME + FREE_TIME)))
 
 
 def _window_slice(series: SampledRecording, start: int) -> slice:
+    """Return the samples of the window at a start."""
     return slice(start, min(series.count, start + _sample_count(series, OBSERVED_TIME + FREE_TIME)))
