@@ -95,17 +95,19 @@ def _read_model(
         label = f"`{base.name}` has a `model` itself: a model is a continuous automaton"
         problems.error("model", node.span, label)
         problems.raise_if_errors()
-    theirs = _parameter_table(base.root)
-    shared = {key: entry for key, entry in own.entries.items() if key in theirs.entries}
-    merged = apply_overlay(theirs, MappingNode(shared, own.span), problems, template=True)
-    known = MappingNode({**theirs.entries, **own.entries}, own.span)
-    passed = {key: value for key, value in values.items() if key in theirs.entries}
-    kept = {key: value for key, value in values.items() if key not in passed}
+    model_parameters = _parameter_table(base.root)
+    shared = {key: entry for key, entry in own.entries.items() if key in model_parameters.entries}
+    merged = apply_overlay(model_parameters, MappingNode(shared, own.span), problems, template=True)
+    known = MappingNode({**model_parameters.entries, **own.entries}, own.span)
+    model_values = {key: value for key, value in values.items() if key in model_parameters.entries}
+    own_values = {key: value for key, value in values.items() if key not in model_values}
     root = _with_entry(base.root, "parameters", merged)
     changed = Document(base.kind, base.name, base.name_span, root, base.source)
-    model = read_automaton(changed, project, passed, problems)
-    rest = without_keys(own, *shared)
-    return _set_values(_with_entry(tree, "parameters", rest), rest, kept, known, problems), model
+    model = read_automaton(changed, project, model_values, problems)
+    remaining = without_keys(own, *shared)
+    return _set_values(
+        _with_entry(tree, "parameters", remaining), remaining, own_values, known, problems
+    ), model
 
 
 def _parameter_table(tree: MappingNode) -> MappingNode:
@@ -170,7 +172,7 @@ class _AutomatonReader(Reader):
         numbers = self._read_number_type()
         own = ParameterReader(self.problems, tree).read_parameters()
         modes = self._read_modes()
-        main, *beside = modes.regions
+        main, *parallel = modes.regions
         places = fault_modes(modes.statechart) if modes.statechart else main.modes
         element_reader = ElementReader(self.problems)
         variables = VariableReader(self.problems, model, self.is_sampled, tree, places)
@@ -186,14 +188,14 @@ class _AutomatonReader(Reader):
             inputs={**variables.read_inputs(tree.get("inputs")), **events},
             states=variables.read_states(tree.get("states")),
             discrete=variables.read_discrete(tree.get("discrete")),
-            modes=attach_regions(main.modes, tuple(beside)),
+            modes=attach_regions(main.modes, tuple(parallel)),
             initial=main.initial,
             outputs=outputs.spans,
             span=self.span,
             output_sources=outputs.sources,
             elements=element_reader.read_elements(tree.get("elements")),
             places=element_reader.read_places(tree.get("places")),
-            regions=tuple(beside),
+            regions=tuple(parallel),
             numbers=numbers,
             faults=variables.faults,
             fault_mode=variables.fault_mode,

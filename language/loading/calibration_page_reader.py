@@ -40,9 +40,9 @@ def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibrat
         times[time.strip()] = MappingNode({**before.entries, entry.key: entry}, span)
     table = {time: Entry(time, page.span, page) for time, page in times.items()}
     problems.raise_if_errors()
-    found = read_pages(MappingNode(table, Span(Source("--change"), 1, 1)), system, problems)
+    pages = read_pages(MappingNode(table, Span(Source("--change"), 1, 1)), system, problems)
     problems.raise_if_errors()
-    return found
+    return pages
 
 
 class _PageReader(StimulusReader):
@@ -64,20 +64,20 @@ class _PageReader(StimulusReader):
 
     def read_pages(self, node: YamlNode | None) -> tuple[ScheduledCalibration, ...]:
         """Return the pages in the order of the file; times that do not ascend are reported."""
-        found: list[ScheduledCalibration] = []
+        pages: list[ScheduledCalibration] = []
         for entry in self.read_mapping(node, "pages"):
             error_count = len(self.problems.reported)
             time = self.read_time(
                 ScalarNode(entry.key, entry.span), "the time of a page", entry.span
             )
             is_time = len(self.problems.reported) == error_count
-            if is_time and found and time <= found[-1].time:
+            if is_time and pages and time <= pages[-1].time:
                 self.problems.error("order", entry.span, "pages are in the order of time")
             values: dict[tuple[str, str], Fraction] = {}
             for item in self.read_mapping(entry.node, f"pages.{entry.key}"):
                 values.update(self._read_values(item))
-            found.append(ScheduledCalibration(time, values))
-        return tuple(found)
+            pages.append(ScheduledCalibration(time, values))
+        return tuple(pages)
 
     def _read_values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
         """Return the value of an entry by instance and parameter.
@@ -86,9 +86,11 @@ class _PageReader(StimulusReader):
         parameter. Waits and parameters that are not tunable are reported.
         """
         owner, dot, name = entry.key.rpartition(".")
-        held = [o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)]
-        if held:
-            label = f"`{held[0]}.{name}` is a wait: it stays as it is while a system runs"
+        wait_owners = [
+            o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)
+        ]
+        if wait_owners:
+            label = f"`{wait_owners[0]}.{name}` is a wait: it stays as it is while a system runs"
             self.problems.error("name", entry.span, label)
             return {}
         owners = [o for o in self.tunable if name in self.tunable[o] and (not dot or o == owner)]

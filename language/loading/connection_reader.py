@@ -166,7 +166,7 @@ class ConnectionReader(Reader):
 
     def read_connections(self, node: YamlNode | None) -> dict[tuple[str, str], Connection]:
         """Return the connections by instance and input; one with a problem is left out."""
-        found = {}
+        connections = {}
         for entry in self.read_mapping(node, "connections"):
             owner, _, name = entry.key.partition(".")
             target = self.instances.get(owner)
@@ -181,29 +181,29 @@ class ConnectionReader(Reader):
             if source is None:
                 continue
             with self.problems.collect_errors():
-                found[owner, name] = self._read_connection(target, name, source)
-        return found
+                connections[owner, name] = self._read_connection(target, name, source)
+        return connections
 
     def _read_connection(self, target: Instance, name: str, source: ScalarNode) -> Connection:
         """Return the connection of an input: a constant, a signal or an expression."""
-        wanted = target.automaton.inputs[name]
+        declaration = target.automaton.inputs[name]
         to = (target.name, name)
         formula = self.read_expression(source, name, source.span)
         tree = formula.tree if formula else ErrorNode(source.span)
-        if isinstance(tree, BoolLiteral) and wanted.is_bool:
+        if isinstance(tree, BoolLiteral) and declaration.is_bool:
             return Connection(to, Fraction(tree.value), source.span)
-        if source.text in wanted.values or (not names(tree) and not wanted.is_bool):
-            unit, values = wanted.unit, wanted.values
+        if source.text in declaration.values or (not names(tree) and not declaration.is_bool):
+            unit, values = declaration.unit, declaration.values
             value = self.read_typed_value(
-                source, source.text, source.span, unit, wanted.type, values
+                source, source.text, source.span, unit, declaration.type, values
             )
             return Connection(to, value, source.span)
         tree = self._replace_delays(tree)
         if isinstance(tree, Name):
-            self._check_direct_connection(tree, declared_kind(wanted))
+            self._check_direct_connection(tree, declared_kind(declaration))
             return Connection(to, tree.path, source.span)
         check = TypeChecker(self._scope(), self.problems)
-        check.check_assignment(tree, declared_kind(wanted), f"the input {name}")
+        check.check_assignment(tree, declared_kind(declaration), f"the input {name}")
         return Connection(to, Formula(tree, f"connections.{target.name}.{name}"), source.span)
 
     def _check_direct_connection(self, tree: Name, expected: ExprType) -> None:
@@ -271,7 +271,7 @@ class ConnectionReader(Reader):
 
     def read_outputs(self, node: YamlNode | None) -> dict[str, str | Formula]:
         """Return the outputs of the system by name: the name of a signal, or an expression."""
-        found: dict[str, str | Formula] = {}
+        outputs: dict[str, str | Formula] = {}
         for entry in self.named_entries(node, "outputs"):
             source = self.read_scalar(entry.node, entry.key, entry.span)
             if source is None:
@@ -280,20 +280,20 @@ class ConnectionReader(Reader):
                 label = f"`{entry.key}` is an input or a sensor of the system, too"
                 self.problems.error("duplicate", entry.span, label)
             if source.text.endswith(".mode") and source.text.split(".")[0] in self.instances:
-                found[entry.key] = self._read_output(source)
+                outputs[entry.key] = self._read_output(source)
                 continue
             formula = self.read_expression(source, entry.key, entry.span)
             if formula is None:
                 continue
             if isinstance(formula.tree, Name):
-                found[entry.key] = self._read_output(source)
+                outputs[entry.key] = self._read_output(source)
                 continue
             self._check_no_delay(formula.tree)
             kind = TypeChecker(self._scope(), self.problems).infer_type(formula.tree)
             if isinstance(kind, Dimension):
                 self.dimensions[entry.key] = kind
-            found[entry.key] = Formula(formula.tree, f"outputs.{entry.key}")
-        return found
+            outputs[entry.key] = Formula(formula.tree, f"outputs.{entry.key}")
+        return outputs
 
     def _read_output(self, source: ScalarNode) -> str:
         """Return the name of a signal; one that does not exist is reported."""

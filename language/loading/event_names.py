@@ -53,13 +53,13 @@ def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEn
             return None
     if automaton.statechart is not None:
         return ModeEntryEvent(instance, region, mode, source)
-    taken = [
+    transitions = [
         (transition.source, transition.target)
-        for each in automaton.region(region).modes.values()
-        for transition in each.transitions
+        for other_mode in automaton.region(region).modes.values()
+        for transition in other_mode.transitions
     ]
-    taken.append(("", automaton.fault_mode or ""))
-    if not any(to == mode and source in ("", of) for of, to in taken):
+    transitions.append(("", automaton.fault_mode or ""))
+    if not any(to == mode and source in ("", of) for of, to in transitions):
         label = f"no transition enters `{mode}`" + (f" from `{source}`" if source else "")
         problems.error("event", scalar.span, label, "an event is the entry of a mode")
         return None
@@ -72,20 +72,20 @@ def modes_by_name(system: System) -> dict[str, tuple[str, str, str]]:
     Superstates are included. In the system of a single automaton, names without the instance are
     included too.
     """
-    found = {}
+    modes = {}
     for name, instance in system.instances.items():
         for region in instance.automaton.all_regions:
             for mode in region.modes:
                 place = (name, region.name, mode)
                 inner = mode if region.name == CHART else f"{region.name}.{mode}"
-                found[f"{name}.{inner}"] = place
+                modes[f"{name}.{inner}"] = place
                 if system.sole_instance:
-                    found[inner] = place
+                    modes[inner] = place
         for outer in instance.automaton.superstates:
             if outer.key.split(".")[-2:-1] == ["modes"]:
                 path = outer.name if outer.region == CHART else f"{outer.region}.{outer.name}"
                 place = (name, outer.region, outer.name)
-                found[f"{name}.{path}"] = place
+                modes[f"{name}.{path}"] = place
                 if system.sole_instance:
-                    found[path] = place
-    return found
+                    modes[path] = place
+    return modes

@@ -64,14 +64,14 @@ class _InstanceDeclaration:
     def host_names_of_outputs(self) -> dict[str, str]:
         """The host variable of each output: `main_closed` for `main.closed`."""
         outputs = self.tree.get("outputs")
-        found: dict[str, str] = {}
+        sources: dict[str, str] = {}
         for item in outputs.nodes if isinstance(outputs, SequenceNode) else ():
             if isinstance(item, ScalarNode):
-                found[item.text] = item.text
+                sources[item.text] = item.text
         for output in outputs if isinstance(outputs, MappingNode) else ():
             if isinstance(output.node, ScalarNode):
-                found[output.key] = output.node.text
-        known = {out: source for out, source in found.items() if source in self.names}
+                sources[output.key] = output.node.text
+        known = {out: source for out, source in sources.items() if source in self.names}
         return {f"{self.name}.{out}": self.names[source] for out, source in known.items()}
 
 
@@ -93,9 +93,9 @@ def expand_instances(tree: MappingNode, project: Project, problems: Problems) ->
     }
     tree = _rename_output_reads(tree, reads)
     for instance in instances:
-        asked = find_node(tree, ("instances", instance.name))
-        assert isinstance(asked, MappingNode)
-        tree = reader.merge_instance(tree, instance, asked)
+        options = find_node(tree, ("instances", instance.name))
+        assert isinstance(options, MappingNode)
+        tree = reader.merge_instance(tree, instance, options)
     problems.raise_if_errors()
     return MappingNode(
         {k: entry for k, entry in tree.entries.items() if k != "instances"}, tree.span
@@ -107,8 +107,8 @@ def _rename_output_reads(tree: MappingNode, reads: Mapping[str, str]) -> Mapping
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
         """Return an expression with outputs of instances replaced."""
-        text, found = substitute_reads(scalar.text, reads)
-        return ScalarNode(text, scalar.span) if found else scalar
+        text, hits = substitute_reads(scalar.text, reads)
+        return ScalarNode(text, scalar.span) if hits else scalar
 
     tree = map_formulas(tree, HOST_EXPRESSIONS, change)
     outputs = tree.get("outputs")
@@ -141,8 +141,10 @@ class _InstanceReader(Reader):
     def read_instance(self, entry: Entry) -> _InstanceDeclaration | None:
         """Return an instance with the tree of its automaton, or None with a problem reported."""
         check_region_name(entry.key, entry.span, self.problems)
-        asked = self.read_mapping(entry.node, f"instances.{entry.key}", ("of", "inputs", "values"))
-        of = self.read_scalar(asked.get("of"), "of", entry.span)
+        options = self.read_mapping(
+            entry.node, f"instances.{entry.key}", ("of", "inputs", "values")
+        )
+        of = self.read_scalar(options.get("of"), "of", entry.span)
         known = len(self.problems.reported)
         root = self._read_root(of) if of else None
         if root is None or len(self.problems.reported) > known:
@@ -151,7 +153,7 @@ class _InstanceReader(Reader):
         own = [*added_names(root), *inputs.entries]
         own += [name for mode in mode_mappings(root) for name in _equation_names(mode)]
         names = {name: f"{entry.key}_{name}" for name in own}
-        return _InstanceDeclaration(entry, asked, root, names)
+        return _InstanceDeclaration(entry, options, root, names)
 
     def _read_root(self, reference: ScalarNode) -> MappingNode | None:
         """Return the expanded tree of an instantiated automaton; None with a reported problem."""
@@ -197,16 +199,16 @@ class _InstanceReader(Reader):
         entry, names = instance.entry, instance.names
         for final in names.values():
             self._check_host_name(tree, final, entry)
-        theirs = instance.tree.span.source
-        layer = Source(theirs.name, theirs.lines, f"instance {entry.key}", entry.span)
+        source = instance.tree.span.source
+        layer = Source(source.name, source.lines, f"instance {entry.key}", entry.span)
         body = replace_source(instance.tree, layer)
         assert isinstance(body, MappingNode)
         body = self._apply_values(body, options)
         inputs = self._input_expressions(body, options, entry)
         body = _rename_to_host(body, instance)
         for section in SECTIONS:
-            for thing in self.read_mapping(body.get(section), section):
-                tree = put_node(tree, (section, thing.key), thing.node)
+            for declaration in self.read_mapping(body.get(section), section):
+                tree = put_node(tree, (section, declaration.key), declaration.node)
         for name, node in inputs.items():
             tree = put_node(tree, ("equations", names[name]), node)
         region = {key: body.entries[key] for key in REGION_SECTIONS if key in body.entries}
@@ -248,8 +250,8 @@ class _InstanceReader(Reader):
                 label = f"`{value.key}` is derived: set what it follows from"
                 self.problems.error("values", value.span, label)
             else:
-                made = override_parameter(known.node, value.node, self.problems)
-                body = put_node(body, ("parameters", value.key), made)
+                overridden = override_parameter(known.node, value.node, self.problems)
+                body = put_node(body, ("parameters", value.key), overridden)
         return body
 
     def _input_expressions(
@@ -260,22 +262,26 @@ class _InstanceReader(Reader):
         Unknown inputs and inputs without a value are reported.
         """
         declared = self.read_mapping(body.get("inputs"), "inputs").entries
-        given = self.read_mapping(options.get("inputs"), "inputs").entries
-        for name, own in given.items():
+        connected = self.read_mapping(options.get("inputs"), "inputs").entries
+        for name, own in connected.items():
             if name not in declared:
                 label = f"there is no input `{name}`"
                 self.problems.error("name", own.span, label, suggest_name(name, declared))
-        found: dict[str, ScalarNode] = {}
-        for name, thing in declared.items():
-            default = thing.node.get("default") if isinstance(thing.node, MappingNode) else None
-            node = given[name].node if name in given else default
+        expressions: dict[str, ScalarNode] = {}
+        for name, declaration in declared.items():
+            default = (
+                declaration.node.get("default")
+                if isinstance(declaration.node, MappingNode)
+                else None
+            )
+            node = connected[name].node if name in connected else default
             if isinstance(node, ScalarNode):
-                found[name] = node
+                expressions[name] = node
             else:
                 label = f"the input `{name}` of `{entry.key}` has no value"
                 hint = f"`inputs: {{{name}: ...}}`"
                 self.problems.error("missing", entry.span, label, hint)
-        return found
+        return expressions
 
 
 def _requirements_entry(entry: Entry, body: MappingNode) -> dict[str, Entry]:
@@ -283,11 +289,13 @@ def _requirements_entry(entry: Entry, body: MappingNode) -> dict[str, Entry]:
 
     These are the requirements of the instance and of the sections of `body` that are not merged.
     """
-    kept = {
-        key: each for key, each in body.entries.items() if key not in (*SECTIONS, *REGION_SECTIONS)
+    unmerged = {
+        key: requirement
+        for key, requirement in body.entries.items()
+        if key not in (*SECTIONS, *REGION_SECTIONS)
     }
-    named = [*find_requirements(entry.node), *find_requirements(MappingNode(kept, body.span))]
-    names = tuple(ScalarNode(each.requirement, each.span) for each in named)
+    named = [*find_requirements(entry.node), *find_requirements(MappingNode(unmerged, body.span))]
+    names = tuple(ScalarNode(requirement.requirement, requirement.span) for requirement in named)
     return {"req": Entry("req", entry.span, SequenceNode(names, entry.span))} if names else {}
 
 
@@ -310,7 +318,7 @@ def _rename_to_host(body: MappingNode, instance: _InstanceDeclaration) -> Mappin
 
 def _rename_keys(table: MappingNode, instance: _InstanceDeclaration, path: KeyPath) -> MappingNode:
     """Return a mapping whose keys, and names of templates, are host names, at any depth."""
-    made = {}
+    renamed = {}
     for entry in table:
         key, node = entry.key, entry.node
         if isinstance(node, MappingNode):
@@ -323,5 +331,5 @@ def _rename_keys(table: MappingNode, instance: _InstanceDeclaration, path: KeyPa
             key = instance.names.get(key, key)
         elif path == ("templates",):
             key = f"{instance.name}_{key}"
-        made[key] = Entry(key, entry.span, node)
-    return MappingNode(made, table.span)
+        renamed[key] = Entry(key, entry.span, node)
+    return MappingNode(renamed, table.span)

@@ -26,17 +26,19 @@ def pair_columns(
             _check_output(automaton, column, problems)
             used.append(column.name)
             continue
-        thing = automaton.inputs.get(column.to or "")
-        if thing is None:
+        declaration = automaton.inputs.get(column.to or "")
+        if declaration is None:
             left_out.append(column.name)
             continue
-        _check_dimension(column, thing.unit.dimension, f"input `{thing.name}`", problems)
-        if thing.name in fed:
-            problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
-        fed.add(thing.name)
+        _check_dimension(
+            column, declaration.unit.dimension, f"input `{declaration.name}`", problems
+        )
+        if declaration.name in fed:
+            problems.error("duplicate", column.span, f"input `{declaration.name}` is fed twice")
+        fed.add(declaration.name)
         used.append(column.name)
-    for name, thing in automaton.inputs.items():
-        if name not in fed and thing.default is None:
+    for name, declaration in automaton.inputs.items():
+        if name not in fed and declaration.default is None:
             label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
             problems.error("missing", mapping.span, label, suggest_name(name, left_out))
     return used, left_out
@@ -75,8 +77,8 @@ def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problem
     """Report a column that is compared with an unknown output or one of another dimension."""
     output = column.compare or ""
     if output in automaton.outputs:
-        want = automaton.dimensions.get(automaton.output_source(output), PURE_NUMBER)
-        _check_dimension(column, want, f"output `{output}`", problems)
+        expected = automaton.dimensions.get(automaton.output_source(output), PURE_NUMBER)
+        _check_dimension(column, expected, f"output `{output}`", problems)
         return
     label = f"`{output}` is not an output of `{automaton.name}`"
     problems.error("name", column.span, label, suggest_name(output, automaton.outputs))
@@ -94,8 +96,8 @@ def _check_dimension(
 def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
     """Report constants of another dimension than the input of the same name."""
     for name, (_, dimension) in mapping.constants.items():
-        thing = automaton.inputs.get(name)
-        if thing and not are_compatible(dimension, thing.unit.dimension):
+        declaration = automaton.inputs.get(name)
+        if declaration and not are_compatible(dimension, declaration.unit.dimension):
             label = f"constant `{name}` is in `{dimension.display_name}`"
-            hint = f"input `{name}` is in `{thing.unit.dimension.display_name}`"
+            hint = f"input `{name}` is in `{declaration.unit.dimension.display_name}`"
             problems.error("dimension", mapping.span, label, hint)

@@ -41,9 +41,9 @@ def read_map(document: Document, project: Project) -> RecordingMap:
     problems = Problems()
     require_kind(document, "map", problems)
     problems.raise_if_errors()
-    found = read_map_table(document.root, document.name, document.name_span, problems)
+    mapping = read_map_table(document.root, document.name, document.name_span, problems)
     problems.raise_if_errors()
-    return found
+    return mapping
 
 
 def read_map_table(root: MappingNode, name: str, span: Span, problems: Problems) -> RecordingMap:
@@ -98,7 +98,7 @@ class _MapReader(Reader):
 
     def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
         """Return the windows of a list; windows must be ordered and must not overlap."""
-        found: list[Window] = []
+        windows: list[Window] = []
         if not isinstance(node, SequenceNode) or not node.nodes:
             label = "`windows` is a list like `[[1 s, 8 s]]`, or such a list for each file"
             self.problems.error("form", node.span, label)
@@ -112,11 +112,11 @@ class _MapReader(Reader):
             start, end = (self._read_time(part) for part in item.nodes)
             if end <= start:
                 self.problems.error("range", item.span, "a window ends after it starts")
-            elif found and start <= found[-1][1]:
+            elif windows and start <= windows[-1][1]:
                 label = "this window starts before the one above it ends"
                 self.problems.error("range", item.span, label, "windows stand in order")
-            found.append((start, end))
-        return tuple(found)
+            windows.append((start, end))
+        return tuple(windows)
 
     def _read_time(self, node: YamlNode) -> Fraction:
         """Return a time [s]; another dimension is reported."""

@@ -115,9 +115,9 @@ class _ScenarioReader(StimulusReader):
                     file, read_map_table(other.root, other.name, named.span, self.problems)
                 )
             return None
-        kept = MappingNode({k: e for k, e in table.entries.items() if k != "file"}, table.span)
+        entries = MappingNode({k: e for k, e in table.entries.items() if k != "file"}, table.span)
         return self._resolve_recording(
-            file, read_map_table(kept, document.name, table.span, self.problems)
+            file, read_map_table(entries, document.name, table.span, self.problems)
         )
 
     def _resolve_recording(
@@ -136,25 +136,25 @@ class _ScenarioReader(StimulusReader):
             Path(),
             Path(os.environ.get(RECORDINGS_ENV, "")),
         ]
-        found = [folder / file.text for folder in folders if path_exists(folder / file.text)]
+        paths = [folder / file.text for folder in folders if path_exists(folder / file.text)]
         with self.problems.collect_errors():
-            for path in found[:1]:
+            for path in paths[:1]:
                 require_inside_project(path, file.span, self.project.root)
-        return RecordingSource(found[0] if found else Path(file.text), mapping, file.span)
+        return RecordingSource(paths[0] if paths else Path(file.text), mapping, file.span)
 
     def _read_signals(self, items: Sequence[ScalarNode]) -> tuple[str, ...]:
         """Return the names of the signals to record; unknown and repeated names are reported."""
         known = self.system.signals
-        found: dict[str, None] = {}
+        signals: dict[str, None] = {}
         for item in items:
             name = item.text if item.text in known else self._qualified_name(item.text)
             if name not in known:
                 label = f"`{item.text}` is not a signal of `{self.system.name}`"
                 self.problems.error("name", item.span, label, suggest_name(item.text, known))
-            elif name in found:
+            elif name in signals:
                 self.problems.error("duplicate", item.span, f"`{item.text}` is given twice")
-            found[name] = None
-        return tuple(found)
+            signals[name] = None
+        return tuple(signals)
 
     def _qualified_name(self, name: str) -> str:
         """Return a name prefixed by its instance.
@@ -169,7 +169,7 @@ class _ScenarioReader(StimulusReader):
 
         Unknown states are reported and left out.
         """
-        found: dict[str, Fraction | str] = {}
+        values: dict[str, Fraction | str] = {}
         instances = self.system.instances
         known = [f"{i.name}.{s}" for i in instances.values() for s in i.automaton.states]
         for entry in self.read_mapping(tree.get("initial"), "initial"):
@@ -179,12 +179,12 @@ class _ScenarioReader(StimulusReader):
                 label = f"`{entry.key}` is not a state of an instance of `{self.system.name}`"
                 self.problems.error("name", entry.span, label, suggest_name(full, known))
                 continue
-            wanted = instances[owner].automaton.states[name].unit
+            unit = instances[owner].automaton.states[name].unit
             formula = self.read_expression(entry.node, entry.key, entry.span)
             if formula:
                 with self.problems.collect_errors():
-                    found[full] = self._read_initial_value(formula.tree, wanted)
-        return found
+                    values[full] = self._read_initial_value(formula.tree, unit)
+        return values
 
     def _read_initial_value(self, tree: SyntaxTree, unit: Unit) -> Fraction | str:
         """Return a value in SI, or the name of the column for `column(name)`."""
@@ -230,48 +230,50 @@ class _ScenarioReader(StimulusReader):
         reported.
         """
         known = self.system.inputs
-        found = self._recorded_stimuli()
+        stimuli = self._recorded_stimuli()
         for entry in self.read_mapping(tree.get("inputs"), "inputs"):
             if entry.key not in known:
                 label = f"`{entry.key}` is not an input of `{self.system.name}`"
                 self.problems.error("name", entry.span, label, suggest_name(entry.key, known))
                 continue
-            if entry.key in found:
+            if entry.key in stimuli:
                 label = f"input `{entry.key}` is given by the recording, too"
                 self.problems.error("duplicate", entry.span, label)
-            thing = known[entry.key]
-            found[entry.key] = self.read_stimulus(entry, thing, self._reader_periods(entry.key))
-        for name, thing in known.items():
-            if name not in found and thing.default is not None:
-                found[name] = Stimulus(
-                    (StimulusPiece(Fraction(0), thing.default),), is_bool=thing.is_bool
+            declaration = known[entry.key]
+            stimuli[entry.key] = self.read_stimulus(
+                entry, declaration, self._reader_periods(entry.key)
+            )
+        for name, declaration in known.items():
+            if name not in stimuli and declaration.default is not None:
+                stimuli[name] = Stimulus(
+                    (StimulusPiece(Fraction(0), declaration.default),), is_bool=declaration.is_bool
                 )
-            elif name not in found and not self.problems.has_errors:
+            elif name not in stimuli and not self.problems.has_errors:
                 label = f"input `{name}` of `{self.system.name}` has no value in the scenario"
                 self.problems.error("missing", at, label)
-        return found
+        return stimuli
 
     def _recorded_stimuli(self) -> dict[str, Stimulus]:
         """Return the stimuli of the inputs that columns or constants of the recording map give."""
-        found: dict[str, Stimulus] = {}
+        stimuli: dict[str, Stimulus] = {}
         known = self.system.inputs
         if self.mapping is None:
-            return found
+            return stimuli
         for name, (value, dimension) in self.mapping.constants.items():
             if name in known:
                 if not are_compatible(dimension, known[name].unit.dimension):
                     label = f"constant `{name}` is in `{dimension.display_name}`"
                     self.problems.error("dimension", self.mapping.span, label)
-                found[name] = Stimulus(
+                stimuli[name] = Stimulus(
                     (StimulusPiece(Fraction(0), value),), is_bool=known[name].is_bool
                 )
         for column in self.mapping.columns.values():
             if column.to is not None and column.to in known:
-                want = known[column.to].unit.dimension
-                self._check_column(column.name, column.span, want, f"input `{column.to}`")
-                if column.to in found:
+                expected = known[column.to].unit.dimension
+                self._check_column(column.name, column.span, expected, f"input `{column.to}`")
+                if column.to in stimuli:
                     label = f"input `{column.to}` is fed twice"
                     self.problems.error("duplicate", column.span, label)
                 none = (StimulusPiece(Fraction(0), Fraction(0)),)
-                found[column.to] = Stimulus(none, column.name, known[column.to].is_bool)
-        return found
+                stimuli[column.to] = Stimulus(none, column.name, known[column.to].is_bool)
+        return stimuli

@@ -13,15 +13,15 @@ def signal_kinds(system: System) -> dict[str, ExprType]:
 
     Outputs without a known type, such as modes, are left out.
     """
-    found: dict[str, ExprType] = {
-        name: declared_kind(thing) for name, thing in system.inputs.items()
+    kinds: dict[str, ExprType] = {
+        name: declared_kind(declaration) for name, declaration in system.inputs.items()
     }
     for instance in system.instances.values():
-        found.update(output_kinds(instance))
-    found.update({name: sensor.dimension for name, sensor in system.sensors.items()})
+        kinds.update(output_kinds(instance))
+    kinds.update({name: sensor.dimension for name, sensor in system.sensors.items()})
     for name, output in system.outputs.items():
-        if isinstance(output, str) and output in found:
-            found[name] = found[output]
+        if isinstance(output, str) and output in kinds:
+            kinds[name] = kinds[output]
         elif name in system.dimensions:
-            found[name] = system.dimensions[name]
-    return found
+            kinds[name] = system.dimensions[name]
+    return kinds

@@ -158,14 +158,14 @@ class StimulusReader(Reader):
         self, entry: Entry, table: MappingNode, declaration: SystemInput
     ) -> list[StimulusPiece]:
         """Return one piece for each step; times that do not ascend are reported."""
-        found: list[StimulusPiece] = []
+        pieces: list[StimulusPiece] = []
         for step in self.read_mapping(table.get("steps"), f"inputs.{entry.key}.steps"):
             time = self.read_time(ScalarNode(step.key, step.span), "the time of a step", step.span)
             value = self._read_value(step.node, "step", step.span, declaration)
-            if found and time <= found[-1].start:
+            if pieces and time <= pieces[-1].start:
                 self.problems.error("order", step.span, "steps are in the order of time")
-            found.append(StimulusPiece(time, value))
-        return found
+            pieces.append(StimulusPiece(time, value))
+        return pieces
 
     def _read_pulses(
         self,
@@ -178,27 +178,27 @@ class StimulusReader(Reader):
 
         Adjacent pulses are merged, overlapping ones are reported.
         """
-        found = [StimulusPiece(Fraction(0), Fraction(0))]
+        pieces = [StimulusPiece(Fraction(0), Fraction(0))]
         node = table.entries["pulses"]
         if not declaration.is_bool or len({*periods}) != 1:
             label = "`pulses` are of an input that is true or false, read by sampled automata of "
             self.problems.error(
                 "form", node.span, f"{label}one period", "`steps` give any values at any times"
             )
-            return found
+            return pieces
         if "start" in table.entries:
             label = "`pulses` have no `start`: before and after each the input is false"
             self.problems.error("form", table.entries["start"].span, label)
         (period,) = {*periods}
         for item in self.read_list(node.node, "pulses"):
             time = self.read_time(item, "the time of a pulse", item.span)
-            if time < found[-1].start:
+            if time < pieces[-1].start:
                 label = "pulses are in the order of time, a period apart"
                 self.problems.error("order", item.span, label)
-            if len(found) > 1 and time == found[-1].start:
-                found.pop()
-            found += [StimulusPiece(time, Fraction(1)), StimulusPiece(time + period, Fraction(0))]
-        return found
+            if len(pieces) > 1 and time == pieces[-1].start:
+                pieces.pop()
+            pieces += [StimulusPiece(time, Fraction(1)), StimulusPiece(time + period, Fraction(0))]
+        return pieces
 
     def _read_table(
         self, entry: Entry, table: MappingNode, unit: Unit
@@ -262,17 +262,17 @@ class StimulusReader(Reader):
             self.problems.error("form", chirp.span, label)
             return (first,)
         span = chirp.span
-        sweep = (rates[1] - rates[0]) / (2 * (end - begin))
+        half_rate = (rates[1] - rates[0]) / (2 * (end - begin))
         since = Arithmetic("-", Name("time", span), NumberLiteral(begin, TIME, span), span)
-        turns: SyntaxTree = _product(
-            since, _sum(_number(rates[0], span), _product(_number(sweep, span), since))
+        cycles: SyntaxTree = _product(
+            since, _sum(_number(rates[0], span), _product(_number(half_rate, span), since))
         )
-        angle = _product(_number(Fraction(2 * math.pi), span), turns)
+        angle = _product(_number(Fraction(2 * math.pi), span), cycles)
         wave = _product(_number(amplitude, span), FunctionCall("sin", (angle,), span))
         formula = Formula(_sum(_number(first.value, span), wave), "chirp")
-        moving = StimulusPiece(begin, first.value, formula=formula)
-        still = () if begin == 0 else (first,)
-        return (*still, moving, StimulusPiece(end, first.value))
+        sweep_piece = StimulusPiece(begin, first.value, formula=formula)
+        lead = () if begin == 0 else (first,)
+        return (*lead, sweep_piece, StimulusPiece(end, first.value))
 
 
 def _number(value: Fraction, span: Span) -> NumberLiteral:

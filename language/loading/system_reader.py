@@ -68,10 +68,15 @@ def single_instance_system(automaton: Automaton) -> System:
     return System(
         name=name,
         inputs={
-            thing.name: SystemInput(
-                thing.name, thing.unit, thing.default, thing.span, thing.type, thing.values
+            declaration.name: SystemInput(
+                declaration.name,
+                declaration.unit,
+                declaration.default,
+                declaration.span,
+                declaration.type,
+                declaration.values,
             )
-            for thing in automaton.inputs.values()
+            for declaration in automaton.inputs.values()
         },
         instances={name: Instance(name, automaton, Fraction(0), name, at)},
         connections={(name, key): Connection((name, key), key, at) for key in automaton.inputs},
@@ -156,9 +161,9 @@ class _SystemReader(Reader):
         if of is None:
             raise SpecError(())
         automaton = self._read_automaton(of, values)
-        mine = self._overrides_of(entry.key, automaton)
-        if mine:
-            automaton = self._read_automaton(of, {**values, **mine})
+        overrides = self._overrides_of(entry.key, automaton)
+        if overrides:
+            automaton = self._read_automaton(of, {**values, **overrides})
         return Instance(entry.key, automaton, offset, key, entry.span)
 
     def _read_automaton(self, reference: ScalarNode, values: Mapping[str, YamlNode]) -> Automaton:
@@ -166,27 +171,30 @@ class _SystemReader(Reader):
 
         Instances with the same reference and the same values share one object.
         """
-        wanted = (reference.text, *((name, format_inline(value)) for name, value in values.items()))
-        if wanted not in self.automaton_cache:
+        cache_key = (
+            reference.text,
+            *((name, format_inline(value)) for name, value in values.items()),
+        )
+        if cache_key not in self.automaton_cache:
             path = self.project.path_of(reference.text, reference.span)
             if path not in self.documents:
                 self.documents[path] = self.project.read(path)
-            made = automaton_of(self.documents[path], self.project, values)
-            self.automaton_cache[wanted] = made
-        return self.automaton_cache[wanted]
+            automaton = automaton_of(self.documents[path], self.project, values)
+            self.automaton_cache[cache_key] = automaton
+        return self.automaton_cache[cache_key]
 
     def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, ScalarNode]:
         """Return the command-line values for an instance by parameter, and mark them as used.
 
         A value with the name of the instance takes precedence over one without.
         """
-        found = {}
+        overrides = {}
         for name, value in sorted(self.overrides.items(), key=lambda item: "." in item[0]):
             owner, _, parameter = name.rpartition(".")
             if owner == instance or (not owner and parameter in automaton.parameters):
-                found[parameter] = value
+                overrides[parameter] = value
                 self.used_overrides.add(name)
-        return found
+        return overrides
 
     def _report_unused_overrides(self, instances: Mapping[str, Instance]) -> None:
         """Report command-line values whose parameter no instance has."""
@@ -208,8 +216,8 @@ class _SystemReader(Reader):
     ) -> None:
         """Report inputs of instances without a connection and without a default."""
         for instance in instances.values():
-            for name, thing in instance.automaton.inputs.items():
-                if (instance.name, name) not in connections and thing.default is None:
+            for name, declaration in instance.automaton.inputs.items():
+                if (instance.name, name) not in connections and declaration.default is None:
                     label = f"input `{instance.name}.{name}` is not connected"
                     hint = "connect it, or give it a `default` in the automaton"
                     self.problems.error("missing", instance.span, label, hint)
@@ -234,14 +242,14 @@ class _SystemReader(Reader):
                 self._check_continuous_read(wires, read, target, connection)
                 if owner in edges and target.automaton.is_sampled:
                     edges[owner].append(target.name)
-        found = topological_sort(edges)
-        if found is None:
+        order = topological_sort(edges)
+        if order is None:
             label = (
                 f"instances read each other at the same instant: {format_cycle(find_cycle(edges))}"
             )
             hint = "a delay breaks the cycle: `delay(signal, 1 ms)`, or a sensor with `delay`"
             self.problems.error("loop", span, label, hint)
-        return tuple(found or instances)
+        return tuple(order or instances)
 
     def _check_continuous_read(
         self, wires: ConnectionReader, read: str, target: Instance, at: Connection

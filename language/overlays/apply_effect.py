@@ -110,8 +110,8 @@ class _EffectApplier:
         table = body.get("equations")
         if isinstance(table, MappingNode):
             own = set(self.private_names.values())
-            kept = {key: entry for key, entry in table.entries.items() if key in own}
-            body = put_node(body, ("equations",), MappingNode(kept, table.span))
+            entries = {key: entry for key, entry in table.entries.items() if key in own}
+            body = put_node(body, ("equations",), MappingNode(entries, table.span))
         return body
 
     def _choose_private_names(self) -> dict[str, str]:
@@ -198,7 +198,7 @@ class _EffectApplier:
 
     def _fill_keys(self, table: MappingNode, path: KeyPath) -> MappingNode:
         """Return a mapping with holes in keys and texts filled, and keys renamed."""
-        made = {}
+        filled = {}
         for entry in table:
             node = entry.node
             if isinstance(node, MappingNode):
@@ -206,8 +206,8 @@ class _EffectApplier:
             elif isinstance(node, ScalarNode) and "$" in node.text:
                 node = rewrite_scalar(node, self._fill_text(node.text), self.application.span)
             for key in self._fill_key(entry.key, path):
-                made[key] = Entry(key, entry.span, node)
-        return MappingNode(made, table.span)
+                filled[key] = Entry(key, entry.span, node)
+        return MappingNode(filled, table.span)
 
     def _fill_key(self, key: str, path: KeyPath) -> tuple[str, ...]:
         """Return the keys that replace a key: several if its hole is a list, else one.
@@ -215,10 +215,10 @@ class _EffectApplier:
         `path` is the path of the mapping that contains the key.
         """
         if "$" in key:
-            found = HOLE_PATTERN.search(key)
-            value = self.place.holes[found.group(1)] if found else ""
+            match = HOLE_PATTERN.search(key)
+            value = self.place.holes[match.group(1)] if match else ""
             values = (value,) if isinstance(value, str) else value
-            return tuple(HOLE_PATTERN.sub(one, key, count=1) for one in values)
+            return tuple(HOLE_PATTERN.sub(text, key, count=1) for text in values)
         if path in (("elements",), ("regions",)) or (path[:1] == ("terms",) and len(path) == 2):
             return (self._with_suffix(key),)
         names = len(path) == 1 and path[0] in (*VARIABLE_SECTIONS, "flow", "terms")
@@ -272,15 +272,15 @@ class _EffectApplier:
                 misfit = PlaceMismatch(f"`{old}` would be redirected, and only a name can be", help)
                 _report_mismatch(self.application, misfit, self.problems)
                 return tree
-        tree, found = redirect_reads(tree, Redirection(paths, excepted, new, entry.span))
+        tree, hits = redirect_reads(tree, Redirection(paths, excepted, new, entry.span))
         is_list = any(
             not isinstance(self.place.holes[h], str) for h in HOLE_PATTERN.findall(entry.key)
         )
-        if not found and not is_list:
+        if not hits and not is_list:
             olds = " or ".join(f"`{old}`" for old in new)
-            where = "nothing" if paths[0] == "everywhere" else f"nothing in `{paths[0]}`"
+            readers = "nothing" if paths[0] == "everywhere" else f"nothing in `{paths[0]}`"
             _report_mismatch(
-                self.application, PlaceMismatch(f"{where} reads {olds}"), self.problems
+                self.application, PlaceMismatch(f"{readers} reads {olds}"), self.problems
             )
         return tree
 
@@ -345,8 +345,8 @@ class _EffectApplier:
                 label = f"`{name}` is derived: set what it follows from"
                 self.problems.error("values", entry.span, label)
             elif isinstance(entry.node, ScalarNode):
-                made = set_parameter_value(table, entry.node)
-                body = put_node(body, ("parameters", self.private_names[name]), made)
+                overridden = set_parameter_value(table, entry.node)
+                body = put_node(body, ("parameters", self.private_names[name]), overridden)
         self.problems.raise_if_errors()
         return body
 
@@ -362,22 +362,22 @@ def _used_names(tree: MappingNode) -> Iterator[str]:
 
 def _holes_in(body: MappingNode) -> list[str]:
     """Return the names of the holes in the body of an effect, each once."""
-    found: dict[str, None] = {}
+    holes: dict[str, None] = {}
 
     def look(node: YamlNode | None) -> None:
         """Collect the holes of a node."""
         match node:
             case ScalarNode():
-                found.update(dict.fromkeys(HOLE_PATTERN.findall(node.text)))
+                holes.update(dict.fromkeys(HOLE_PATTERN.findall(node.text)))
             case SequenceNode():
                 for part in node.nodes:
                     look(part)
             case MappingNode():
                 for entry in node:
-                    found.update(dict.fromkeys(HOLE_PATTERN.findall(entry.key)))
+                    holes.update(dict.fromkeys(HOLE_PATTERN.findall(entry.key)))
                     if entry.key not in ("about", "req"):
                         look(entry.node)
 
     for section in (*ADDED_SECTIONS, "redirect", "move"):
         look(body.get(section))
-    return list(found)
+    return list(holes)

@@ -75,8 +75,8 @@ def apply_calibration(
             label = f"`{name}` is derived: set what it follows from"
             problems.error("values", value.span, label)
         else:
-            made = override_parameter(parameters[name], value.value, problems)
-            tree = put_node(tree, ("parameters", name), made)
+            overridden = override_parameter(parameters[name], value.value, problems)
+            tree = put_node(tree, ("parameters", name), overridden)
     return tree
 
 

@@ -36,10 +36,10 @@ def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -
             if isinstance(unit, ScalarNode):
                 texts.append((unit.text, unit.span))
     for text, span in texts:
-        for found in HOLE_PATTERN.finditer(text):
-            hole = found.group()
+        for match in HOLE_PATTERN.finditer(text):
+            hole = match.group()
             if hole not in holes:
-                report_unknown_hole(hole, span.subspan(found.start(), len(hole)), holes, problems)
+                report_unknown_hole(hole, span.subspan(match.start(), len(hole)), holes, problems)
 
 
 def report_unknown_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
@@ -69,9 +69,11 @@ def check_parameters(tree: MappingNode, problems: Problems) -> None:
     """Report wrong or inconsistent values, ranges and starts of the parameters of an effect."""
     known = tree.get("parameters")
     if isinstance(known, MappingNode):
-        made = {entry.key: _remove_hole_unit(entry) for entry in known}
+        checkable = {entry.key: _remove_hole_unit(entry) for entry in known}
         tree = put_node(
-            tree, ("parameters",), MappingNode({k: e for k, e in made.items() if e}, known.span)
+            tree,
+            ("parameters",),
+            MappingNode({k: e for k, e in checkable.items() if e}, known.span),
         )
     ParameterReader(problems, tree).read_parameters()
 
@@ -91,8 +93,8 @@ def _remove_hole_unit(entry: Entry) -> Entry | None:
         return entry
     if any(_has_unit(table.get(key)) for key in QUANTITY_KEYS):
         return None
-    kept = {key: part for key, part in table.entries.items() if key != "unit"}
-    return Entry(entry.key, entry.span, MappingNode(kept, table.span))
+    entries_without_unit = {key: part for key, part in table.entries.items() if key != "unit"}
+    return Entry(entry.key, entry.span, MappingNode(entries_without_unit, table.span))
 
 
 def _has_unit(node: YamlNode | None) -> bool:

@@ -121,10 +121,10 @@ def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicat
 
 def _matches_key(path: KeyPath, key: str) -> bool:
     """Tell whether a path is a key path or below it; `flow.w` also matches in each mode."""
-    wanted = tuple(key.split("."))
-    if path[: len(wanted)] == wanted:
+    key_path = tuple(key.split("."))
+    if path[: len(key_path)] == key_path:
         return True
-    return path[0] in MODE_CONTAINERS and path[-len(wanted) :] == wanted
+    return path[0] in MODE_CONTAINERS and path[-len(key_path) :] == key_path
 
 
 def _equation_keys(tree: MappingNode, key: str) -> list[str]:
@@ -202,15 +202,15 @@ def remove_summands(
         text = f"{left} = {join_summands(remaining)}"
         tree = put_node(tree, ("flow", state), rewrite_scalar(balance, text, span))
     moved: dict[str, YamlNode] = {}
-    kept = {}
+    remaining_terms = {}
     terms = find_node(tree, ("terms", state))
     for entry in entries(terms):
         if isinstance(entry.node, ScalarNode) and names & set(names_in_text(entry.node.text)):
             moved[entry.key] = entry.node
         else:
-            kept[entry.key] = entry
+            remaining_terms[entry.key] = entry
     if moved and terms:
-        tree = put_node(tree, ("terms", state), MappingNode(kept, terms.span))
+        tree = put_node(tree, ("terms", state), MappingNode(remaining_terms, terms.span))
     return MovedSummands(tree, removed, moved, balance.span)
 
 

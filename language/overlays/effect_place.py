@@ -45,14 +45,14 @@ def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPla
     """
     known = TreeTypes(tree)
     misfits = []
-    for fit in effect.place_patterns:
-        found = PLACE_FINDERS[fit.kind](tree, known, fit, name)
-        if isinstance(found, EffectPlace):
-            lacking = [key for key in fit.has if key not in found.holes]
+    for pattern in effect.place_patterns:
+        place = PLACE_FINDERS[pattern.kind](tree, known, pattern, name)
+        if isinstance(place, EffectPlace):
+            lacking = [key for key in pattern.has if key not in place.holes]
             if not lacking:
-                return found
-            found = _missing_hole(fit, name, lacking[0])
-        misfits.append(found)
+                return place
+            place = _missing_hole(pattern, name, lacking[0])
+        misfits.append(place)
     hints = dict.fromkeys(misfit.help for misfit in misfits if misfit.help)
     return PlaceMismatch("; ".join(misfit.reason for misfit in misfits), "; ".join(hints))
 
@@ -74,8 +74,8 @@ def _find_balance(
     both. `inertia` is the coefficient of the derivative if it is the same in all modes.
     """
     balances = list(formula_entries(tree, "flow"))
-    found = [scalar for state, scalar in balances if state == name]
-    if not found:
+    scalars = [scalar for state, scalar in balances if state == name]
+    if not scalars:
         return PlaceMismatch(
             f"there is no balance of `{name}`", suggest_name(name, {s for s, _ in balances})
         )
@@ -84,7 +84,7 @@ def _find_balance(
         return PlaceMismatch(f"the unit of `{name}` is not known")
     if pattern.of == "rate" and kind.powers[2] != -1:
         return PlaceMismatch(f"`{name}` is in `{kind}`: it is no speed")
-    force = known.balance_dimension(name, found[0])
+    force = known.balance_dimension(name, scalars[0])
     if pattern.unit and (force is None or not are_compatible(force, pattern.unit)):
         return PlaceMismatch(f"the balance of `{name}` is in `{force}`, not in `{pattern.unit}`")
     holes: dict[str, Hole] = {"x": name, "unit": format_si_unit(kind)}
@@ -96,7 +96,7 @@ def _find_balance(
         holes["drag_unit"] = format_si_unit(
             _multiply_dimensions(_multiply_dimensions(force, kind, -1), kind, -1)
         )
-        factors = {_balance_coefficient(scalar.text, name) for scalar in found}
+        factors = {_balance_coefficient(scalar.text, name) for scalar in scalars}
         if len(factors) == 1:
             holes["inertia"] = factors.pop()
     return EffectPlace(name, {**holes, **_declared_holes(tree, name)}, name)
@@ -195,7 +195,7 @@ def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
             _multiply_dimensions(kinds["inertia"], kinds["speed"]), SECOND, -1
         )
         force = Dimension(force.powers, kinds["inertia"].angle or 0)
-    found: dict[str, Hole] = {}
+    holes: dict[str, Hole] = {}
     if angle is not None and force is not None:
         units["angle"], units["force"] = angle, force
         units.setdefault("stiffness", _multiply_dimensions(force, angle, -1))
@@ -203,9 +203,9 @@ def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
             "damping", _multiply_dimensions(_multiply_dimensions(force, angle, -1), SECOND)
         )
     for part, dimension in units.items():
-        found[part if part in ("angle", "force") else f"{part}_unit"] = format_si_unit(dimension)
+        holes[part if part in ("angle", "force") else f"{part}_unit"] = format_si_unit(dimension)
     unit = units.get("force" if of == "elastic" else "speed")
-    return {**found, "unit": format_si_unit(unit)} if unit else found
+    return {**holes, "unit": format_si_unit(unit)} if unit else holes
 
 
 def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
@@ -217,13 +217,13 @@ def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
     twist, gap = holes.get("twist"), holes.get("gap")
     if twist is None or gap is None:
         return {"stretch": twist, "gap_rate": "0"} if twist else {}
-    found: dict[str, Hole] = {"stretch": f"{twist} - {gap}"}
+    gap_holes: dict[str, Hole] = {"stretch": f"{twist} - {gap}"}
     balances = {scalar.text for state, scalar in formula_entries(tree, "flow") if state == gap}
     if len(balances) == 1:
         left, right = split_balance(balances.pop())
         if left == f"der({gap})":
-            found["gap_rate"] = right
-    return found
+            gap_holes["gap_rate"] = right
+    return gap_holes
 
 
 def _declared_holes(tree: MappingNode, name: str) -> dict[str, Hole]:

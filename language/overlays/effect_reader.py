@@ -206,11 +206,11 @@ def _entries(node: YamlNode | None) -> Iterator[Entry]:
 
 def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> dict[str, Entry]:
     """Return the entries of a mapping by key; entries that are no scalars are reported."""
-    found = {}
+    scalars = {}
     for entry in reader.read_mapping(node, what):
         if reader.read_scalar(entry.node, entry.key, entry.span):
-            found[entry.key] = entry
-    return found
+            scalars[entry.key] = entry
+    return scalars
 
 
 class _EffectReader(Reader):

@@ -48,10 +48,10 @@ def expand_document(
     """
     problems = problems or Problems()
     *variants, base = _extension_chain(document, project)
-    made = _apply_effects_and_calibrations(base, base, project, problems)
+    expanded = _apply_effects_and_calibrations(base, base, project, problems)
     for variant in reversed(variants):
-        made = _apply_variant_body(made, variant, project, problems)
-    return made
+        expanded = _apply_variant_body(expanded, variant, project, problems)
+    return expanded
 
 
 def apply_variant(
@@ -63,15 +63,17 @@ def apply_variant(
     SpecError.
     """
     assert variant.kind == "variant"
-    wanted = _base_name_of(variant)
-    if wanted.text not in lineage(base, project):
-        label = f"variant `{variant.name}` extends `{wanted.text}`, not `{base.name}`"
-        problems.error("variant", wanted.span, label)
+    base_name = _base_name_of(variant)
+    if base_name.text not in lineage(base, project):
+        label = f"variant `{variant.name}` extends `{base_name.text}`, not `{base.name}`"
+        problems.error("variant", base_name.span, label)
     problems.raise_if_errors()
-    made = _apply_variant_body(expand_document(base, project, problems), variant, project, problems)
-    head = Entry(made.kind, base.name_span, ScalarNode(base.name, base.name_span))
-    root = MappingNode({**made.root.entries, made.kind: head}, made.root.span)
-    return Document(made.kind, base.name, base.name_span, root, variant.source)
+    expanded = _apply_variant_body(
+        expand_document(base, project, problems), variant, project, problems
+    )
+    head = Entry(expanded.kind, base.name_span, ScalarNode(base.name, base.name_span))
+    root = MappingNode({**expanded.root.entries, expanded.kind: head}, expanded.root.span)
+    return Document(expanded.kind, base.name, base.name_span, root, variant.source)
 
 
 def lineage(document: Document, project: Project) -> list[str]:
@@ -115,8 +117,8 @@ def _apply_variant_body(
     name = ScalarNode(variant.name, variant.name_span)
     named = {**root.entries, base.kind: Entry(base.kind, variant.name_span, name)}
     tree = MappingNode(named, variant.root.span)
-    made = Document(base.kind, variant.name, variant.name_span, tree, variant.source)
-    return _apply_effects_and_calibrations(made, variant, project, problems)
+    merged = Document(base.kind, variant.name, variant.name_span, tree, variant.source)
+    return _apply_effects_and_calibrations(merged, variant, project, problems)
 
 
 def add_calibrations(document: Document, names: Sequence[str], option: str) -> Document:
@@ -127,10 +129,10 @@ def add_calibrations(document: Document, names: Sequence[str], option: str) -> D
     node = document.root.get("calibrations")
     own = node.nodes if isinstance(node, SequenceNode) else ()
     span = Span(Source(option, (" ".join(names),)), 1, 1)
-    more = tuple(ScalarNode(name, span) for name in names)
-    if not more:
+    added = tuple(ScalarNode(name, span) for name in names)
+    if not added:
         return document
-    entry = Entry("calibrations", span, SequenceNode((*own, *more), span))
+    entry = Entry("calibrations", span, SequenceNode((*own, *added), span))
     root = MappingNode({**document.root.entries, "calibrations": entry}, document.root.span)
     return dataclasses.replace(document, root=root)
 
@@ -215,28 +217,28 @@ def _calibrate_system(
     calibration of the system names them `instance.parameter`. Unknown parameters, and a calibration
     of something else, are reported.
     """
-    found: dict[str, tuple[str, str]] = {}
+    targets: dict[str, tuple[str, str]] = {}
     is_applicable = calibration.of.text in names
     for entry in entries(root.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
         if not isinstance(of, ScalarNode):
             continue
         document = project.read(project.path_of(of.text, of.span))
-        mine = calibration.of.text in lineage(document, project)
-        is_applicable = is_applicable or mine
+        is_target = calibration.of.text in lineage(document, project)
+        is_applicable = is_applicable or is_target
         tree = expand_document(document, project).root
         for name in (*parameters_of(tree, project), *instance_parameters_of(tree, project)):
-            found[name if mine else f"{entry.key}.{name}"] = (entry.key, name)
-            if mine and name in calibration.values:
+            targets[name if is_target else f"{entry.key}.{name}"] = (entry.key, name)
+            if is_target and name in calibration.values:
                 root = set_instance_value(root, (entry.key, name), calibration.values[name].value)
     if not is_applicable:
         _report_wrong_target(calibration, names[0], calibration.of.span, problems)
         return root
-    for key, given in calibration.values.items():
-        if key not in found:
-            report_unknown_parameter(calibration, given, found, problems)
+    for key, value in calibration.values.items():
+        if key not in targets:
+            report_unknown_parameter(calibration, value, targets, problems)
         elif "." in key:
-            root = set_instance_value(root, found[key], given.value)
+            root = set_instance_value(root, targets[key], value.value)
     return root
 
 
@@ -266,12 +268,14 @@ def _apply_effects(
         problems.raise_if_errors()
     root = without_keys(merged.root, "effects")
     for entry in entries(node):
-        found = Problems()
-        with found.collect_errors():
+        effect_problems = Problems()
+        with effect_problems.collect_errors():
             root = apply_effect(
-                root, read_effect_application(entry, project.read_effect_document, found), found
+                root,
+                read_effect_application(entry, project.read_effect_document, effect_problems),
+                effect_problems,
             )
-        problems.reported.extend(found.reported)
+        problems.reported.extend(effect_problems.reported)
     problems.raise_if_errors()
     return dataclasses.replace(merged, root=root)
 

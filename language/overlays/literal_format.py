@@ -33,8 +33,8 @@ def format_value_in_unit(parameter: Parameter, value: float, number_type: Number
         return parameter.values[int(value)]
     if parameter.type == "int":
         return str(int(value))
-    found, unit = _shortest_in_any_unit(parameter, value, number_type)
-    return _format_decimal(found) if unit.text == "1" else f"{_format_decimal(found)} {unit.text}"
+    number, unit = _shortest_in_any_unit(parameter, value, number_type)
+    return _format_decimal(number) if unit.text == "1" else f"{_format_decimal(number)} {unit.text}"
 
 
 def table_points(
@@ -50,11 +50,11 @@ def table_points(
     def rows(axes: Sequence[Axis]) -> MappingNode:
         """Return the nested mapping of the remaining axes; take its values from the iterator."""
         axis, *inner = axes
-        found = {}
+        entries = {}
         for key in axis.point_texts:
             node = rows(inner) if inner else ScalarNode(next(texts), span)
-            found[key] = Entry(key, span, node)
-        return MappingNode(found, span)
+            entries[key] = Entry(key, span, node)
+        return MappingNode(entries, span)
 
     return MappingNode({"points": Entry("points", span, rows(parameter.table.axes))}, span)
 
@@ -66,10 +66,10 @@ def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
     float32.
     """
     assert parameter.value is not None
-    found, unit = _shortest_in_any_unit(
+    number, unit = _shortest_in_any_unit(
         parameter, round_to_type(parameter.value, number_type), number_type
     )
-    return Fraction(found) * unit.factor + unit.offset == parameter.value
+    return Fraction(number) * unit.factor + unit.offset == parameter.value
 
 
 def format_calibration(
@@ -112,9 +112,9 @@ def _shortest_in_any_unit(
     """
     own, limits = parameter.unit, parameter.range
     for unit in (own, Unit(str(own.dimension), Fraction(1), own.dimension)):
-        found = _shortest_decimal(value, unit, number_type, limits)
-        if found is not None:
-            return found, unit
+        number = _shortest_decimal(value, unit, number_type, limits)
+        if number is not None:
+            return number, unit
     raise ValueError(f"{value!r} of `{parameter.name}` has no literal in {own.text}")
 
 
@@ -131,11 +131,11 @@ def _shortest_decimal(
         target = min(max(target, limits[0]), limits[1])
     exact = (target - unit.offset) / unit.factor
     for digits in range(1, MAX_DIGITS):
-        found = _round_to_digits(exact, digits)
-        again = Fraction(found) * unit.factor + unit.offset
-        is_inside = limits is None or limits[0] <= again <= limits[1]
-        if is_inside and round_to_type(again, number_type) == value:
-            return found if abs(found.adjusted()) < MAX_EXPONENT else None
+        rounded = _round_to_digits(exact, digits)
+        reread = Fraction(rounded) * unit.factor + unit.offset
+        is_inside = limits is None or limits[0] <= reread <= limits[1]
+        if is_inside and round_to_type(reread, number_type) == value:
+            return rounded if abs(rounded.adjusted()) < MAX_EXPONENT else None
     return None
 
 
@@ -151,5 +151,5 @@ def _format_decimal(number: Decimal) -> str:
     if exponent in PLAIN_EXPONENTS:
         return f"{number:f}"
     sign, figures, _ = number.as_tuple()
-    first, *rest = map(str, figures)
-    return f"{'-' if sign else ''}{first}.{''.join(rest) or '0'}e{exponent}"
+    first, *further = map(str, figures)
+    return f"{'-' if sign else ''}{first}.{''.join(further) or '0'}e{exponent}"

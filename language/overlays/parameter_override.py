@@ -36,8 +36,8 @@ def override_points(
         label = "the values of a table are `{points: {...}}`"
         problems.error("form", overrides.span, label)
     else:
-        found = _merge_points(own, points, reader)
-        return put_node(parameter, ("table", "points"), found)
+        merged = _merge_points(own, points, reader)
+        return put_node(parameter, ("table", "points"), merged)
     return parameter
 
 
@@ -88,16 +88,20 @@ def _find_point_key(own: MappingNode, entry: Entry, reader: Reader) -> str | Non
     """
     if entry.key in own.entries:
         return entry.key
-    given = reader.read_quantity(ScalarNode(entry.key, entry.span), entry.key, entry.span, None)
-    quiet = Reader(Problems())
+    point_value = reader.read_quantity(
+        ScalarNode(entry.key, entry.span), entry.key, entry.span, None
+    )
+    silent_reader = Reader(Problems())
     keys: Iterable[tuple[str, Quantity]] = (
         (
             known.key,
-            quiet.read_quantity(ScalarNode(known.key, known.span), known.key, known.span, None),
+            silent_reader.read_quantity(
+                ScalarNode(known.key, known.span), known.key, known.span, None
+            ),
         )
         for known in own
     )
-    return next((key for key, point in keys if _is_same_point(given, point)), None)
+    return next((key for key, point in keys if _is_same_point(point_value, point)), None)
 
 
 def _is_same_point(given: Quantity, point: Quantity) -> bool:

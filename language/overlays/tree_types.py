@@ -55,8 +55,8 @@ class TreeTypes:
         """
         if name not in self.types:
             self.types[name] = None
-            found = (self.type_of_formula(scalar) for scalar in self.equations.get(name, ()))
-            usable = [kind for kind in found if kind is not None]
+            kinds = (self.type_of_formula(scalar) for scalar in self.equations.get(name, ()))
+            usable = [kind for kind in kinds if kind is not None]
             exact = [kind for kind in usable if isinstance(kind, Dimension) and not kind.is_number]
             self.types[name] = next(iter(exact or usable), None)
         return self.types[name]

@@ -64,11 +64,11 @@ def _mode_mappings(owner: MappingNode) -> Iterator[MappingNode]:
 
 def _uses_chart_keys(mode: MappingNode) -> bool:
     """Tell whether a mode or one of its transitions uses a key of charts or a list of targets."""
-    ways = _child_mappings(mode.get("transitions"))
+    transitions = _child_mappings(mode.get("transitions"))
     return any(key in mode.entries for key in INNER_KEYS) or any(
-        any(key in way.entries for key in CHART_TRANSITION_KEYS)
-        or isinstance(way.get("to"), SequenceNode)
-        for way in ways
+        any(key in transition.entries for key in CHART_TRANSITION_KEYS)
+        or isinstance(transition.get("to"), SequenceNode)
+        for transition in transitions
     )
 
 
@@ -236,8 +236,10 @@ class ChartReader:
             for entry in self.mode_reader.named_entries(raw.table.get("modes"), f"{base}modes"):
                 inner = f"{base}modes.{entry.key}"
                 table = self.mode_reader.read_mapping(entry.node, inner)
-                where = f"{prefix}{entry.key}"
-                self._read_node(entry, table, index, where, raw.region, False, inner, parent_mode)
+                inner_path = f"{prefix}{entry.key}"
+                self._read_node(
+                    entry, table, index, inner_path, raw.region, False, inner, parent_mode
+                )
 
     def _node_kind(self, entry: Entry, table: MappingNode) -> NodeKind:
         """Return the kind of a node; a node with both `modes` and `regions` is reported."""
@@ -280,7 +282,7 @@ class ChartReader:
         if final == "true" and raw.kind != "atomic":
             label = "a final mode has no modes inside"
             self.problems.error("form", table.entries["final"].span, label)
-        kept = ("shallow", "deep")
+        history_kinds = ("shallow", "deep")
         return ChartNode(
             index=index,
             last_descendant=raw.last,
@@ -295,7 +297,8 @@ class ChartReader:
             number=raw.number,
             initial=raw.initial,
             history=cast(
-                HistoryKind, self.mode_reader.read_choice(table.get("history"), "history", kept, "")
+                HistoryKind,
+                self.mode_reader.read_choice(table.get("history"), "history", history_kinds, ""),
             ),
             is_final=final == "true",
             priority=self.mode_reader.read_integer(table.get("priority"), "priority", 0, 0, 1000),
@@ -303,12 +306,12 @@ class ChartReader:
 
     def _read_events(self) -> dict[str, ChartEvent]:
         """Return the declared events by name, numbered from 1."""
-        found: dict[str, ChartEvent] = {}
+        events: dict[str, ChartEvent] = {}
         for entry in self.mode_reader.named_entries(self.root.get("events"), "events"):
             table = self.mode_reader.read_mapping(entry.node, f"events.{entry.key}", ("from",))
-            comes = self.mode_reader.read_choice(table.get("from"), "from", ("input",), "")
-            found[entry.key] = ChartEvent(entry.key, len(found) + 1, comes == "input")
-        return found
+            origin = self.mode_reader.read_choice(table.get("from"), "from", ("input",), "")
+            events[entry.key] = ChartEvent(entry.key, len(events) + 1, origin == "input")
+        return events
 
     def _read_order(self) -> str:
         """Return `order`, by default `outer_first`."""
@@ -322,17 +325,17 @@ class ChartReader:
         are inputs, it is the number of innermost modes, from 2 to 255. A bound of 1 is reported if
         a transition raises an event.
         """
-        raised = any(way.raises for mode in modes for way in mode.transitions)
+        raised = any(transition.raises for mode in modes for transition in mode.transitions)
         several = raised or sum(signal.is_input for signal in events.values()) > 1
         count = max(2, sum(raw.number is not None for raw in self.raw_nodes))
         node = self.root.get("micro_steps")
-        given = self.mode_reader.read_integer(
+        bound = self.mode_reader.read_integer(
             node, "micro_steps", min(count, MAX_MICRO_STEPS) if several else 1, 1, MAX_MICRO_STEPS
         )
-        if node is not None and raised and given < 2:
+        if node is not None and raised and bound < 2:
             label = "an event that is raised is taken in the next micro-step: one is too few"
             self.problems.error("form", node.span, label)
-        return given
+        return bound
 
     def _build_region(self, chart: Chart, node: ChartNode) -> Region:
         """Return the region of a node with its innermost modes and its initial mode.

@@ -44,7 +44,7 @@ class ElementReader(Reader):
 
     def read_elements(self, node: YamlNode | None) -> dict[str, Element]:
         """Return the elements by name; one with an unknown kind is reported and left out."""
-        found = {}
+        elements = {}
         for entry in self.named_entries(node, "elements"):
             key = f"elements.{entry.key}"
             table = self.read_mapping(entry.node, key)
@@ -59,18 +59,18 @@ class ElementReader(Reader):
                     self.problems.error("missing", entry.span, f"`{key}.{part}` is missing")
             far = {item.text: item.span for item in self.read_list(table.get("far"), f"{key}.far")}
             parts = self.read_formulas(without_keys(table, "kind", "far", *TEXT_KEYS), key)
-            element = cast(Literal["elastic", "inertia"], kind)
-            found[entry.key] = Element(entry.key, element, parts, far, key, entry.span)
-        return found
+            element_kind = cast(Literal["elastic", "inertia"], kind)
+            elements[entry.key] = Element(entry.key, element_kind, parts, far, key, entry.span)
+        return elements
 
     def read_places(self, node: YamlNode | None) -> dict[str, Mapping[str, Formula]]:
         """Return the formulas that `places` declares, by state, input or output and by key."""
-        found: dict[str, Mapping[str, Formula]] = {}
+        places: dict[str, Mapping[str, Formula]] = {}
         for entry in self.named_entries(node, "places"):
             key = f"places.{entry.key}"
             table = self.read_mapping(entry.node, key, PLACE_KEYS)
-            found[entry.key] = self.read_formulas(without_keys(table, *TEXT_KEYS), key)
-        return found
+            places[entry.key] = self.read_formulas(without_keys(table, *TEXT_KEYS), key)
+        return places
 
     def read_outputs(self, node: YamlNode | None) -> OutputDeclarations:
         """Return the outputs of a list of names, or of a mapping from names to variables."""

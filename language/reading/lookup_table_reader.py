@@ -70,7 +70,7 @@ class LookupTableReader(Reader):
         first: dict[Fraction, TableRow] = {}
         second: Axis | None = None
         for entry in points:
-            outer, at = self._read_point(entry, outer, key, list(first))
+            outer, point = self._read_point(entry, outer, key, list(first))
             row, axis = self._read_row(
                 self.read_mapping(entry.node, f"{key}.{entry.key}"),
                 names[1],
@@ -82,7 +82,7 @@ class LookupTableReader(Reader):
                 label = f"this row has other points of `{names[1].text}` than the first one"
                 self.problems.error("table", entry.span, label)
             second = second or axis
-            first[at] = row
+            first[point] = row
         rows = tuple(value for row in first.values() for value in row.values())
         axis = Axis(names[0].text, outer or NO_UNIT, tuple(first), tuple(points.entries))
         return (axis, second or Axis(names[1].text, NO_UNIT, ())), rows
@@ -92,15 +92,15 @@ class LookupTableReader(Reader):
     ) -> tuple[TableRow, Axis]:
         """Return the values of one axis by point (SI), and the axis."""
         axis_unit = self._find_axis_unit(name)
-        found: TableRow = {}
+        row: TableRow = {}
         for entry in points:
-            axis_unit, at = self._read_point(entry, axis_unit, key, list(found))
+            axis_unit, point = self._read_point(entry, axis_unit, key, list(row))
             value, _ = self.read_quantity(entry.node, f"{key}.{entry.key}", entry.span, unit)
             if value_range and not value_range[0] <= value <= value_range[1]:
                 self.problems.error("range", entry.node.span, "this value is outside the range")
-            found[at] = value
-        axis = Axis(name.text, axis_unit or NO_UNIT, tuple(found), tuple(points.entries))
-        return found, axis
+            row[point] = value
+        axis = Axis(name.text, axis_unit or NO_UNIT, tuple(row), tuple(points.entries))
+        return row, axis
 
     def _read_point(
         self, entry: Entry, unit: Unit | None, key: str, previous_points: list[Fraction]
@@ -124,8 +124,8 @@ class LookupTableReader(Reader):
     def _find_axis_unit(self, name: ScalarNode) -> Unit | None:
         """Return the unit of the variable that an axis is named after, or None."""
         for section in self.axis_sections:
-            thing = section.get(name.text)
-            unit = thing.get("unit") if isinstance(thing, MappingNode) else None
+            declaration = section.get(name.text)
+            unit = declaration.get("unit") if isinstance(declaration, MappingNode) else None
             if isinstance(unit, ScalarNode):
                 try:
                     return parse_unit(unit.text)

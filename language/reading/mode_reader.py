@@ -49,9 +49,9 @@ class ModeReader(Reader):
         """
         entries = self.root_region_entries()
         chart = next((entry for entry in entries if entry.key == CHART), None)
-        beside = tuple(self._read_region(entry) for entry in entries if entry is not chart)
+        parallel = tuple(self._read_region(entry) for entry in entries if entry is not chart)
         if chart is not None:
-            return (self._read_region(chart), *beside)
+            return (self._read_region(chart), *parallel)
         modes = self._read_modes(self.root.get("modes"), CHART, "")
         if not modes:
             always = Entry(IMPLICIT_MODE, span, MappingNode({}, span))
@@ -60,7 +60,7 @@ class ModeReader(Reader):
                     always, ModeContext(f"modes.{IMPLICIT_MODE}", CHART, 0)
                 )
             }
-        return (Region(CHART, modes, self._read_initial(self.root, modes, span), span), *beside)
+        return (Region(CHART, modes, self._read_initial(self.root, modes, span), span), *parallel)
 
     def root_region_entries(self) -> list[Entry]:
         """Return the regions at the root; their names are checked.
@@ -133,10 +133,12 @@ class ModeReader(Reader):
 
     def read_mode(self, entry: Entry, context: ModeContext) -> Mode:
         """Return a mode with the dynamics that it inherits from its parent or from the root."""
-        key, above = context.key, context.parent
+        key, parent = context.key, context.parent
         table = self.read_mapping(entry.node, key, (*MODE_KEYS, *ACTION_KEYS, *INNER_KEYS))
         invariants = self._read_invariants(table.get("invariant"), f"{key}.invariant")
-        ways = self.transition_reader.read_transitions(table.get("transitions"), entry.key, context)
+        transitions = self.transition_reader.read_transitions(
+            table.get("transitions"), entry.key, context
+        )
         return Mode(
             name=entry.key,
             number=self.read_integer(table.get("number"), "number", context.position, -100, 100),
@@ -145,13 +147,13 @@ class ModeReader(Reader):
             update=self._read_updates(table, context),
             observer=self._read_observer(table.get("observer"), context),
             run=self._read_run(table.get("runs"), context),
-            transitions=tuple(ways),
+            transitions=tuple(transitions),
             key=key,
             span=entry.span,
             region=context.region,
             entry=self.read_formulas(table.get("entry"), f"{key}.entry"),
             exit=self.read_formulas(table.get("exit"), f"{key}.exit"),
-            invariants={**(above.invariants if above else {}), **invariants},
+            invariants={**(parent.invariants if parent else {}), **invariants},
         )
 
     def _root_sections(self, context: ModeContext) -> MappingNode:
@@ -164,16 +166,16 @@ class ModeReader(Reader):
 
     def _read_equations(self, table: MappingNode, context: ModeContext) -> dict[str, Formula]:
         """Return the inherited and own equations; equations that are given twice are reported."""
-        found = dict(context.parent.equations) if context.parent else {}
-        found |= self.read_formulas(self._root_sections(context).get("equations"), "equations")
+        inherited = dict(context.parent.equations) if context.parent else {}
+        inherited |= self.read_formulas(self._root_sections(context).get("equations"), "equations")
         own = self.read_formulas(table.get("equations"), f"{context.key}.equations")
-        return self._merge_formulas(found, own, "an equation for every mode")
+        return self._merge_formulas(inherited, own, "an equation for every mode")
 
     def _read_updates(self, table: MappingNode, context: ModeContext) -> dict[str, Formula]:
         """Return the inherited and own updates; updates that are given twice are reported."""
-        handed = dict(context.parent.update) if context.parent else {}
+        inherited = dict(context.parent.update) if context.parent else {}
         own = self.read_formulas(table.get("update"), f"{context.key}.update")
-        return self._merge_formulas(handed, own, "an update in a mode around this one")
+        return self._merge_formulas(inherited, own, "an update in a mode around this one")
 
     def _merge_formulas(
         self, inherited: dict[str, Formula], own: dict[str, Formula], what: str
@@ -192,24 +194,24 @@ class ModeReader(Reader):
         An own balance replaces an inherited one.
         """
         shared = self._root_sections(context)
-        found = dict(context.parent.flow) if context.parent else {}
-        found |= self._read_balances(shared.get("flow"), "flow")
-        found |= self._read_balances(table.get("flow"), f"{context.key}.flow")
-        self._add_terms(found, shared.get("terms"), "terms")
-        self._add_terms(found, table.get("terms"), f"{context.key}.terms")
-        return found
+        flow = dict(context.parent.flow) if context.parent else {}
+        flow |= self._read_balances(shared.get("flow"), "flow")
+        flow |= self._read_balances(table.get("flow"), f"{context.key}.flow")
+        self._add_terms(flow, shared.get("terms"), "terms")
+        self._add_terms(flow, table.get("terms"), f"{context.key}.terms")
+        return flow
 
     def _read_invariants(self, node: YamlNode | None, key: str) -> dict[str, Invariant]:
         """Return the invariants of a mode by name; one with a wrong condition is left out."""
-        found = {}
+        invariants = {}
         for entry in self.named_entries(node, key):
             table = self.read_mapping(entry.node, f"{key}.{entry.key}", ("that", "message"))
             that = self.read_expression(table.get("that"), f"{key}.{entry.key}.that", entry.span)
             message = table.get("message")
             text = self.read_string(message, "message", entry.span) if message else f"`{entry.key}`"
             if that:
-                found[entry.key] = Invariant(that, text)
-        return found
+                invariants[entry.key] = Invariant(that, text)
+        return invariants
 
     def _read_observer(self, node: YamlNode | None, context: ModeContext) -> Observer | None:
         """Return the observer of a mode, by default that of its parent."""
@@ -225,7 +227,7 @@ class ModeReader(Reader):
 
     def _read_balances(self, node: YamlNode | None, key: str) -> dict[str, Balance]:
         """Return the balances of a section by state; one that cannot be parsed has error nodes."""
-        found = {}
+        balances = {}
         for entry in self.named_entries(node, key):
             scalar = self.read_scalar(entry.node, f"{key}.{entry.key}", entry.span)
             if scalar is None:
@@ -234,8 +236,8 @@ class ModeReader(Reader):
             right: SyntaxTree = left
             with self.problems.collect_errors():
                 left, right = parse_balance(scalar)
-            found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
-        return found
+            balances[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
+        return balances
 
     def _add_terms(self, flow: dict[str, Balance], node: YamlNode | None, key: str) -> None:
         """Add named summands to the right sides of balances of `flow`, in the order of the file.

@@ -99,13 +99,13 @@ def _read_measurement_noise(
 
     If some measurements have noise, those without it are reported.
     """
-    given = table.entries.get("measurement_noise")
+    noise_entry = table.entries.get("measurement_noise")
     path = f"{key}.measurement_noise"
     noise = _read_vector(reader, table.get("measurement_noise"), path, set(measures))
     for name in measures:
-        if given and name not in noise:
+        if noise_entry and name not in noise:
             label = f"`{name}` has no measurement noise"
-            reader.problems.error("observer", given.span, label)
+            reader.problems.error("observer", noise_entry.span, label)
     return noise
 
 
@@ -119,10 +119,10 @@ def _check_unique_states(reader: Reader, states: Iterable[str], entry: Entry | N
 
 def _read_measures(reader: Reader, node: YamlNode | None, key: str) -> dict[str, str]:
     """Return the measured input by the name of each measurement."""
-    found = {}
+    measures = {}
     for entry in reader.named_entries(node, key):
-        found[entry.key] = reader.read_string(entry.node, f"measures.{entry.key}", entry.span)
-    return found
+        measures[entry.key] = reader.read_string(entry.node, f"measures.{entry.key}", entry.span)
+    return measures
 
 
 def _check_required_keys(reader: Reader, table: MappingNode, span: Span) -> None:
@@ -139,10 +139,10 @@ def _reject_covariance_keys(
 ) -> None:
     """Report the keys of a recursive covariance in an observer with a steady-state gain."""
     for name in ("covariance", "covariance_range", "unknown_instant"):
-        found = kalman.entries.get(name) or table.entries.get(name)
-        if found:
+        entry = kalman.entries.get(name) or table.entries.get(name)
+        if entry:
             label = f"`{name}` belongs to `gain: recursive`"
-            reader.problems.error("observer", found.span, label)
+            reader.problems.error("observer", entry.span, label)
     if runs:
         label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
         reader.problems.error("observer", table.entries["predict"].span, label)
@@ -150,12 +150,12 @@ def _reject_covariance_keys(
 
 def _read_unknown_instants(reader: Reader, node: YamlNode | None, key: str) -> dict[str, Formula]:
     """Return the time by input within which its new value was sampled: `{T_em: 10 ms}`."""
-    found = {}
+    times = {}
     for entry in reader.named_entries(node, key):
         formula = reader.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
         if formula:
-            found[entry.key] = formula
-    return found
+            times[entry.key] = formula
+    return times
 
 
 def _read_variance_limits(
@@ -165,7 +165,7 @@ def _read_variance_limits(
 
     They are in the square of the unit of the state.
     """
-    found = {}
+    limits = {}
     for entry in reader.read_mapping(node, key):
         if not _check_row_name(reader, entry, key, names):
             continue
@@ -173,10 +173,10 @@ def _read_variance_limits(
             reader.read_expression(n, key, n.span) for n in reader.read_list(entry.node, entry.key)
         ]
         if len(bounds) == 2 and bounds[0] and bounds[1]:
-            found[entry.key] = (bounds[0], bounds[1])
+            limits[entry.key] = (bounds[0], bounds[1])
         else:
             reader.problems.error("form", entry.span, "limits of a variance are `[low, high]`")
-    return found
+    return limits
 
 
 def _check_matrix_source(reader: Reader, table: MappingNode) -> None:
@@ -194,8 +194,8 @@ def read_run(reader: Reader, node: YamlNode, key: str, model: Automaton | None) 
     mode = _read_model_mode(reader, table.get("of"), "a run", node.span, model) or ""
     point: dict[str, Formula] = {}
     if "linearise" in table.entries:
-        where = reader.read_mapping(table.get("linearise"), f"{key}.linearise", ("at",))
-        point = _read_operating_point(reader, where.get("at"), f"{key}.linearise.at", model)
+        options = reader.read_mapping(table.get("linearise"), f"{key}.linearise", ("at",))
+        point = _read_operating_point(reader, options.get("at"), f"{key}.linearise.at", model)
     return ModelRun(
         mode=mode,
         method=reader.read_choice(table.get("method"), "method", METHODS, "rk4"),
@@ -215,14 +215,14 @@ def _read_model_mode(
 ) -> str | None:
     """Return the mode that `<model>.<mode>` names, or None with a problem reported."""
     of = reader.read_string(node, "of", span)
-    place = node.span if node else span
+    location = node.span if node else span
     name, _, mode = of.rpartition(".")
     if model is None:
-        reader.problems.error("run", place, f"{what} needs `model:` at the top of the automaton")
+        reader.problems.error("run", location, f"{what} needs `model:` at the top of the automaton")
     elif name != model.name or mode not in model.modes:
         known = [f"{model.name}.{known}" for known in model.modes]
         label = f"`{of}` is not a mode of the model"
-        reader.problems.error("name", place, label, suggest_name(of, known))
+        reader.problems.error("name", location, label, suggest_name(of, known))
     else:
         return mode
     return None
@@ -232,11 +232,11 @@ def _read_matrix(
     reader: Reader, node: YamlNode | None, key: str, rows: set[str], columns: set[str]
 ) -> FormulaMatrix:
     """Return the coefficients of a matrix by row and column name; unknown names are reported."""
-    found = {}
+    matrix = {}
     for entry in reader.read_mapping(node, key):
         if _check_row_name(reader, entry, key, rows):
-            found[entry.key] = _read_vector(reader, entry.node, f"{key}.{entry.key}", columns)
-    return found
+            matrix[entry.key] = _read_vector(reader, entry.node, f"{key}.{entry.key}", columns)
+    return matrix
 
 
 def _read_operating_point(
@@ -244,27 +244,27 @@ def _read_operating_point(
 ) -> dict[str, Formula]:
     """Return the values of `at` by state or input of the model; other names are reported."""
     names = {*model.states, *model.inputs} if model else set()
-    found = {}
+    point = {}
     for entry in reader.read_mapping(node, key):
         if entry.key not in names:
             label = f"`at` gives values of states and inputs of the model, `{entry.key}` is none"
             reader.problems.error("name", entry.span, label, suggest_name(entry.key, names))
         elif formula := reader.read_expression(entry.node, f"{key}.{entry.key}", entry.span):
-            found[entry.key] = formula
-    return found
+            point[entry.key] = formula
+    return point
 
 
 def _read_vector(
     reader: Reader, node: YamlNode | None, key: str, names: set[str]
 ) -> dict[str, Formula]:
     """Return the expressions of a mapping by row name; unknown names are reported."""
-    found = {}
+    vector = {}
     for entry in reader.read_mapping(node, key):
         if _check_row_name(reader, entry, key, names):
             formula = reader.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
             if formula:
-                found[entry.key] = formula
-    return found
+                vector[entry.key] = formula
+    return vector
 
 
 def _check_row_name(reader: Reader, entry: Entry, key: str, names: set[str]) -> bool:

@@ -64,15 +64,15 @@ class ParameterReader(Reader):
         limits = self.read_range(table.get("range"), unit)
         if unit is UNKNOWN_UNIT:
             limits = None  # reported as an unknown unit
-        given = table.get("value")
-        if limits and value is not None and given and not limits[0] <= value <= limits[1]:
+        value_node = table.get("value")
+        if limits and value is not None and value_node and not limits[0] <= value <= limits[1]:
             label = f"the value of `{entry.key}` is outside its range"
-            self.problems.error("range", given.span, label)
+            self.problems.error("range", value_node.span, label)
         if type_ == "int":
             limits = self.check_integer_range(limits, table.get("range"))
         fitting = self._read_fitting(table, unit, limits)
-        place = (entry.key, kind, unit, value, derived, limits, key, entry.span)
-        return Parameter(*place, fitting, type_, values, about=about_of(table))
+        common = (entry.key, kind, unit, value, derived, limits, key, entry.span)
+        return Parameter(*common, fitting, type_, values, about=about_of(table))
 
     def _read_derived(self, table: MappingNode, key: str, entry: Entry) -> Formula | None:
         """Return the expression of a derived parameter, or None if it is missing.
@@ -99,7 +99,7 @@ class ParameterReader(Reader):
         limits = self.read_range(table.get("range"), unit)
         reader = LookupTableReader(self.problems)
         reader.axis_sections = self.axis_sections
-        made = reader.read_lookup_table(body, f"{key}.table.points", limits)
+        lookup_table = reader.read_lookup_table(body, f"{key}.table.points", limits)
         return Parameter(
             entry.key,
             kind,
@@ -109,7 +109,7 @@ class ParameterReader(Reader):
             limits,
             key,
             entry.span,
-            table=made,
+            table=lookup_table,
             about=about_of(body),
         )
 

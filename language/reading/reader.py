@@ -58,15 +58,15 @@ class Reader:
                 self.problems.error("form", node.span, f"`{what}` is a mapping", hint)
             return MappingNode({}, node.span)
         known = None if known_keys is None else {*known_keys, *TEXT_KEYS}
-        kept: dict[str, Entry] = {}
+        entries: dict[str, Entry] = {}
         for entry in node:
             if known is None or entry.key in known:
-                kept[entry.key] = entry
+                entries[entry.key] = entry
                 if entry.key == "req" and known is not None:
                     self._check_requirement_names(entry)
             else:
                 self._report_unknown_key(entry, what, known)
-        return MappingNode(kept, node.span)
+        return MappingNode(entries, node.span)
 
     def _check_requirement_names(self, entry: Entry) -> None:
         """Report a value of `req` that is neither a name nor a list of names."""
@@ -122,13 +122,13 @@ class Reader:
         one kind must be given.
         """
         problem_count = len(self.problems.reported)
-        beside = {key for keys in alternatives.values() for key in keys}
-        table = self.read_mapping(entry.node, key, (*alternatives, *beside))
-        given = [key for key in table.entries if key in alternatives]
-        if len(given) == 1:
-            return given[0], self.read_mapping(table, given[0], (given[0], *alternatives[given[0]]))
+        other_keys = {key for keys in alternatives.values() for key in keys}
+        table = self.read_mapping(entry.node, key, (*alternatives, *other_keys))
+        kinds = [key for key in table.entries if key in alternatives]
+        if len(kinds) == 1:
+            return kinds[0], self.read_mapping(table, kinds[0], (kinds[0], *alternatives[kinds[0]]))
         if len(self.problems.reported) == problem_count:
-            place = table.entries[given[1]].span if given else entry.span
+            place = table.entries[kinds[1]].span if kinds else entry.span
             label = f"`{entry.key}` {verb} one thing"
             self.problems.error("form", place, label, f"one of {', '.join(alternatives)}")
         return None
@@ -216,12 +216,12 @@ class Reader:
 
     def read_formulas(self, node: YamlNode | None, key: str) -> dict[str, Formula]:
         """Return the expressions of a mapping by name; entries that are no scalars are left out."""
-        found = {}
+        formulas = {}
         for entry in self.named_entries(node, key):
             formula = self.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
             if formula:
-                found[entry.key] = formula
-        return found
+                formulas[entry.key] = formula
+        return formulas
 
     def read_quantity(
         self, node: YamlNode | None, what: str, span: Span, unit: Unit | None

@@ -67,7 +67,7 @@ class _TransitionTableReader(Reader):
         entry, modes = tree.entries.get(TABLE_KEY), tree.get("modes")
         if entry is None:
             return tree
-        kept = {key: other for key, other in tree.entries.items() if key != TABLE_KEY}
+        entries = {key: other for key, other in tree.entries.items() if key != TABLE_KEY}
         body = self.read_mapping(entry.node, TABLE_KEY, ("columns", "rows"))
         columns = {
             column.key: column for column in self.named_entries(body.get("columns"), "columns")
@@ -76,7 +76,7 @@ class _TransitionTableReader(Reader):
         if not isinstance(modes, MappingNode) or not columns:
             label = "a transition table is beside `modes` and has at least one column"
             self.problems.error("missing", entry.span, label)
-            return MappingNode(kept, tree.span)
+            return MappingNode(entries, tree.span)
         for column in columns.values():
             self.read_mapping(column.node, f"columns.{column.key}", COLUMN_KEYS)
         for key, row in rows.items():
@@ -86,8 +86,8 @@ class _TransitionTableReader(Reader):
         expanded_modes = {
             mode.key: self._expand_mode(mode, rows.get(mode.key), columns, entry) for mode in modes
         }
-        kept["modes"] = _replace_node(kept["modes"], MappingNode(expanded_modes, modes.span))
-        return MappingNode(kept, tree.span)
+        entries["modes"] = _replace_node(entries["modes"], MappingNode(expanded_modes, modes.span))
+        return MappingNode(entries, tree.span)
 
     def _expand_mode(
         self, mode: Entry, row: Entry | None, columns: Mapping[str, Entry], table: Entry
@@ -111,19 +111,21 @@ class _TransitionTableReader(Reader):
                 self.problems.error("name", cell.span, label, suggest_name(key, columns))
         body = mode.node if isinstance(mode.node, MappingNode) else MappingNode({}, mode.node.span)
         old = body.get("transitions")
-        ways = dict(old.entries) if isinstance(old, MappingNode) else {}
+        transitions = dict(old.entries) if isinstance(old, MappingNode) else {}
         for name, column in columns.items():
-            way = self._read_cell(row, cells.get(name), column)
-            if way and name in ways:
+            transition = self._read_cell(row, cells.get(name), column)
+            if transition and name in transitions:
                 label = f"`{name}` is a transition of `{mode.key}` and a column"
-                hint = f"the transition is at {ways[name].span}"
-                self.problems.error("duplicate", way.span, label, hint)
-            elif way:
-                ways[name] = way
-        if not ways:
+                hint = f"the transition is at {transitions[name].span}"
+                self.problems.error("duplicate", transition.span, label, hint)
+            elif transition:
+                transitions[name] = transition
+        if not transitions:
             return mode
-        made = Entry("transitions", row.span, MappingNode(ways, row.span))
-        return _replace_node(mode, MappingNode({**body.entries, "transitions": made}, body.span))
+        new_entry = Entry("transitions", row.span, MappingNode(transitions, row.span))
+        return _replace_node(
+            mode, MappingNode({**body.entries, "transitions": new_entry}, body.span)
+        )
 
     def _read_cell(self, row: Entry, cell: Entry | None, column: Entry) -> Entry | None:
         """Return the transition of a cell, or None for `stay`.

@@ -72,7 +72,7 @@ class VariableReader(Reader):
 
     def read_states(self, node: YamlNode | None) -> dict[str, State]:
         """Return the states by name; a state without a unit has that of the model's state, or 1."""
-        found = {}
+        states = {}
         for entry in self.named_entries(node, "states"):
             keys = ("unit", "initial", "range", *RANGE_POLICY_KEYS)
             table = self.read_mapping(entry.node, f"states.{entry.key}", keys)
@@ -87,7 +87,7 @@ class VariableReader(Reader):
             limits = self.read_range(table.get("range"), unit)
             start = initial or Formula(ErrorNode(entry.span), f"{key}.initial")
             outside = self.read_range_policy(table, unit, "real", (), limits)
-            found[entry.key] = State(
+            states[entry.key] = State(
                 entry.key,
                 unit,
                 start,
@@ -97,11 +97,11 @@ class VariableReader(Reader):
                 range_policy=outside,
                 about=about_of(table),
             )
-        return found
+        return states
 
     def read_discrete(self, node: YamlNode | None) -> dict[str, State]:
         """Return the discrete variables by name; one without `initial` is reported and left out."""
-        found = {}
+        variables = {}
         for entry in self.named_entries(node, "discrete"):
             key = f"discrete.{entry.key}"
             keys = ("type", "values", "unit", "initial", "range", *RANGE_POLICY_KEYS)
@@ -113,7 +113,7 @@ class VariableReader(Reader):
             if kind == "int":
                 limits = self.check_integer_range(limits, table.get("range"))
             if initial:
-                found[entry.key] = State(
+                variables[entry.key] = State(
                     entry.key,
                     unit,
                     initial,
@@ -125,7 +125,7 @@ class VariableReader(Reader):
                     self.read_range_policy(table, unit, kind, values, limits),
                     about_of(table),
                 )
-        return found
+        return variables
 
     def read_range_policy(
         self,
@@ -168,12 +168,12 @@ class VariableReader(Reader):
 
     def _read_faults(self, tree: MappingNode) -> dict[str, bool]:
         """Return the declared faults by name, and whether each one is latched."""
-        found = {}
+        faults = {}
         for entry in self.named_entries(tree.get("faults"), "faults"):
             table = self.read_mapping(entry.node, f"faults.{entry.key}", ("latched",))
             latched = self.read_choice(table.get("latched"), "latched", ("true", "false"), "true")
-            found[entry.key] = latched == "true"
+            faults[entry.key] = latched == "true"
             if entry.key in BUILTIN_FAULTS:
                 label = f"`{entry.key}` is a fault that modewright sets"
                 self.problems.error("name", entry.span, label)
-        return found
+        return faults

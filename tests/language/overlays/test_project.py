@@ -165,10 +165,10 @@ def test_a_document_of_another_kind_is_no_automaton() -> None:
     ]
 
 
-def test_a_variant_says_what_it_extends(tmp_path: Path) -> None:
+def test_a_variant_names_its_base(tmp_path: Path) -> None:
     project = project_of(tmp_path, v="language: 1\nvariant: v\n")
     assert problem_lines(lambda: extended(project, "v")) == [
-        "2:10 a variant says what it `extends`"
+        "2:10 a variant names its base in `extends`"
     ]
 
 
