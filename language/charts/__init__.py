@@ -1,1 +1,1 @@
-"""Lowering of charts: selection of transitions, exit, entry, micro-steps."""
+"""Lowering of charts: selection of transitions, exits, entries and micro-steps."""

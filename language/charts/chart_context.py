@@ -1,4 +1,4 @@
-"""Charting: what the parts of a micro-step of a chart share - names, numbers, variables."""
+"""Context of the lowering of a chart: transitions, name bindings, and names of variables."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from language.model.automaton import Automaton, Mode, Transition
 from language.model.statechart import Chart, ChartNode, ChartTransition
 
 NEVER_LEFT = -128
-"""What a history holds before its mode was left once."""
+"""The value of a history before its node was left for the first time."""
 IS_FIRST_STEP = Ref("work.is_first")
+"""The variable that a micro-step is the first of its tick."""
 IS_STEP_LIMIT_REACHED = Ref("work.is_over")
-"""Whether a micro-step is the first of its tick; whether no further one is allowed."""
+"""The variable that no further micro-step is allowed in this tick."""
 
 
 @dataclass(frozen=True)
 class ChartContext:
-    """A chart that is lowered; `now` are its names without equations, `everywhere` with them."""
+    """A chart to lower, with its transitions and name bindings.
+
+    `base_bindings` are the expressions of names without equations, `bindings` those with equations.
+    `transition_infos` are by the key path of a transition.
+    """
 
     automaton: Automaton
     chart: Chart
@@ -31,29 +36,29 @@ class ChartContext:
 
     @property
     def has_several_micro_steps(self) -> bool:
-        """Tell whether a tick may have more than one micro-step."""
+        """Whether a tick may have more than one micro-step."""
         return self.chart.micro_steps > 1
 
     @property
     def may_reach_limit(self) -> bool:
-        """Tell whether a tick may reach its bound."""
+        """Whether a tick may end before all events or transitions are processed."""
         return self.has_several_micro_steps or self.queue_capacity > 1
 
     def mode_of(self, node: ChartNode) -> Mode | None:
-        """Return what holds and happens in a node; None for regions of the root."""
+        """Return the mode of a node with its actions and transitions; None for a root region."""
         return self.automaton.modes_by_key.get(node.mode_key)
 
     def info_of(self, transition: Transition) -> TransitionInfo:
-        """Return the number and timer of a transition."""
+        """Return the number, timer and other data of a transition."""
         return self.transition_infos[transition.key]
 
     def transitions_of(self, node: ChartNode) -> tuple[Transition, ...]:
-        """Return the transitions of a node."""
+        """Return the transitions that leave a node; empty for a node without a mode."""
         mode = self.mode_of(node)
         return mode.transitions if mode else ()
 
     def transitions_in(self, region: str) -> list[tuple[Transition, ChartTransition]]:
-        """Return the transitions whose source is in a region."""
+        """Return the transitions whose source is in a region, each with its chart endpoints."""
         nodes = (node for node in self.chart.nodes if node.region == region)
         return [
             (way, self.chart.transitions[way.key])
@@ -63,14 +68,18 @@ class ChartContext:
 
     @cached_property
     def all_transitions(self) -> list[tuple[Transition, ChartTransition]]:
-        """All transitions, those of outer regions first."""
+        """The transitions of all regions, outer regions first."""
         return [
             pair for region in self.chart.regions for pair in self.transitions_in(region.region)
         ]
 
     @cached_property
     def history_nodes(self) -> frozenset[int]:
-        """The nodes of which something is kept when they are left."""
+        """The indices of the nodes whose active child is stored when they are left.
+
+        They have a history node or a transition with `history`; deep history adds the regions
+        inside.
+        """
         nodes = self.chart.nodes
         found = {node.parent for node in nodes if node.kind == "history"}
         deep = [node.parent for node in nodes if node.history == "deep"]
@@ -85,7 +94,10 @@ class ChartContext:
 
     @cached_property
     def timer_keeping_nodes(self) -> frozenset[int]:
-        """The nodes that some transition may enter with their wait counters as they were."""
+        """The indices of the nodes that a transition with `memory: continue` may enter.
+
+        Their wait counters are kept when they are left.
+        """
         found: set[int] = set()
         for transition, way in self.all_transitions:
             if transition.memory == "continue" and way.domain is not None:
@@ -97,12 +109,12 @@ class ChartContext:
 
 
 def to_identifier(text: str) -> str:
-    """Return a path as part of the name of a variable."""
+    """Return a path with underscores instead of dots, as part of a variable's name."""
     return text.replace(".", "_")
 
 
 def request_variable(region: str) -> str:
-    """Return the variable of the transition that a region wishes to take, 0 for none."""
+    """Return the variable of the transition that a region requests, 0 for none."""
     return f"work.wish_{to_identifier(region)}"
 
 
@@ -112,15 +124,15 @@ def selected_variable(region: str) -> str:
 
 
 def history_ref(node: ChartNode) -> Ref:
-    """Return the variable of what a node was left in."""
+    """Return the variable of the mode that was active in a node when it was left."""
     return Ref(f"memory.left_{to_identifier(node.path)}")
 
 
 def exit_flag(node: ChartNode) -> Ref:
-    """Return whether a node is left in this micro-step."""
+    """Return the variable that a node is left in this micro-step."""
     return Ref(f"work.exit_{to_identifier(node.path)}")
 
 
 def entry_flag(node: ChartNode) -> Ref:
-    """Return whether a node is entered in this micro-step."""
+    """Return the variable that a node is entered in this micro-step."""
     return Ref(f"work.enter_{to_identifier(node.path)}")

@@ -1,7 +1,7 @@
-"""Entering: which nodes of a chart a transition enters, from the outside in (SCXML's entry set).
+"""Entry sets of a chart: the nodes that a transition enters, outermost first (SCXML, entry set).
 
-A compound node is entered at its `initial` unless a target lies inside it or its history is asked
-for; a parallel one in all of its regions (rule 15b).
+A compound node is entered at its `initial` unless a target lies inside it or its history is used. A
+parallel node is entered in all of its regions (rule 15b).
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ from language.model.statechart import ChartNode, ChartTransition, HistoryKind
 def lower_entry_set(
     context: ChartContext, transition: Transition, chart_transition: ChartTransition
 ) -> Block:
-    """Return what enters the targets of a transition, once it has left what it leaves."""
+    """Return the operations that activate the entry set of a transition after its exits.
+
+    The regions inside the domain become inactive first. An internal transition has no operations.
+    """
     if chart_transition.domain is None:
         return ()
     chart = context.chart
@@ -42,14 +45,14 @@ def lower_entry_set(
 
 @dataclass(frozen=True)
 class _EntrySet:
-    """One transition that enters; `wanted` are always the targets that are not reached yet."""
+    """The entry set of one transition; `targets` of a method are the targets that remain."""
 
     context: ChartContext
     transition: Transition
     chart_transition: ChartTransition
 
     def enter_compound(self, node: ChartNode, targets: Iterable[int]) -> Block:
-        """Enter what is inside a compound node."""
+        """Return the operations that enter the children of a compound node."""
         inner = [target for target in targets if node.contains(target) and target != node.index]
         enters_history = (
             bool(self.transition.history) and node.index in self.chart_transition.targets
@@ -60,7 +63,7 @@ class _EntrySet:
         return self.enter_child(node, inner or node.initial)
 
     def enter_child(self, node: ChartNode, targets: Sequence[int]) -> Block:
-        """Enter the child of a compound node that holds what is wanted."""
+        """Return the operations that enter the child of a compound node that contains a target."""
         nodes = self.context.chart.nodes
         child = next(nodes[c] for c in node.children if nodes[c].contains(targets[0]))
         if child.kind == "history":
@@ -68,7 +71,7 @@ class _EntrySet:
         return self.enter_node(child, targets)
 
     def enter_node(self, node: ChartNode, targets: Iterable[int]) -> Block:
-        """Enter a node and what is inside it."""
+        """Return the operations that enter a node and its children."""
         if node.kind == "compound":
             return (*self.activate_node(node), *self.enter_compound(node, targets))
         if node.kind == "parallel":
@@ -76,7 +79,11 @@ class _EntrySet:
         return tuple(self.activate_node(node))
 
     def enter_parallel(self, node: ChartNode, targets: Iterable[int]) -> Block:
-        """Enter all regions of a parallel node; a history among its children tells where."""
+        """Return the operations that enter all regions of a parallel node.
+
+        A deep history of the transition or among the targets restores the regions as they were
+        left.
+        """
         nodes = self.context.chart.nodes
         targets = [target for target in targets if node.contains(target) and target != node.index]
         history = self.transition.history if node.index in self.chart_transition.targets else ""
@@ -97,7 +104,10 @@ class _EntrySet:
         return (Branch(Compare("==", history_ref(node), integer(NEVER_LEFT)), first, again),)
 
     def enter_history(self, node: ChartNode, history: HistoryKind, default: Block) -> Block:
-        """Enter what a compound node was left in, or what is usual where it never was."""
+        """Return the operations that enter the mode in which a compound node was left.
+
+        `default` is used if the node was never left. Shallow history enters the child only.
+        """
         chart = self.context.chart
         cases = []
         for leaf in chart.leaves_of(node):
@@ -112,7 +122,10 @@ class _EntrySet:
         return (Branch(never, default, (Switch(history_ref(node).name, tuple(cases)),)),)
 
     def enter_path(self, chain: Sequence[ChartNode]) -> Block:
-        """Enter the nodes down to an innermost one, with all that was active inside that."""
+        """Return the operations that enter nodes from the outermost to the innermost.
+
+        `chain` starts with the innermost node, whose regions are restored by deep history.
+        """
         ops: list[Op] = []
         for node in reversed(chain):
             ops += self.activate_node(node)
@@ -121,13 +134,16 @@ class _EntrySet:
         return tuple(ops)
 
     def enter_deep_history(self, region: ChartNode) -> Block:
-        """Enter a region as it was left."""
+        """Return the operations that enter a region as it was left."""
         if region.kind != "compound":
             return self.enter_path([region])
         return (*self.activate_node(region), *self.enter_history(region, "deep", ()))
 
     def activate_node(self, node: ChartNode) -> list[Op]:
-        """What entering one node means at once; its entry comes as a stage."""
+        """Return the operations that activate one node: mode variable, timers, run, entry flag.
+
+        Its entry action follows later as a stage.
+        """
         charting = self.context
         ops: list[Op] = []
         mode = charting.mode_of(node)

@@ -1,4 +1,4 @@
-"""Leaving: what a chart forgets, keeps and does when nodes are left, the innermost first."""
+"""Exit blocks of a chart: history, timers, edges and exit flags of left nodes, innermost first."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from language.model.statechart import ChartNode
 
 
 def exit_blocks(context: ChartContext) -> dict[str, Block]:
-    """Return `leave_<node>`: what is active inside a node that some transition leaves, and
-    `quit_<region>`: a region with what is active inside it.
+    """Return the blocks `leave_<node>` and `quit_<region>`, by name.
+
+    `leave_<node>` leaves the active nodes inside a node that some transition leaves;
+    `quit_<region>` leaves a nested region with its active nodes.
     """
     chart = context.chart
     blocks: dict[str, Block] = {}
@@ -25,16 +27,20 @@ def exit_blocks(context: ChartContext) -> dict[str, Block]:
 
 
 def run_exit_block(node: ChartNode) -> RunBlock:
-    """Return what leaves the inside of a node."""
+    """Return the operation that leaves the active nodes inside a node."""
     return RunBlock(f"leave_{to_identifier(node.path)}")
 
 
 def _run_region_exit(region: ChartNode) -> RunBlock:
+    """Return the operation that leaves a region and its active nodes."""
     return RunBlock(f"quit_{to_identifier(region.path)}")
 
 
 def _exit_active_nodes(context: ChartContext, node: ChartNode, stop_index: int | None) -> Block:
-    """What is active in a node, the innermost first, up to one that stays."""
+    """Return a Switch that leaves the active nodes in a node, innermost first.
+
+    The node with `stop_index` and those around it stay active.
+    """
     cases = []
     for leaf in context.chart.leaves_of(node):
         ops: list[Op] = [_run_region_exit(region) for region in context.chart.child_regions(leaf)]
@@ -48,7 +54,10 @@ def _exit_active_nodes(context: ChartContext, node: ChartNode, stop_index: int |
 
 
 def _exit_node(context: ChartContext, node: ChartNode) -> list[Op]:
-    """What leaving one node means at once; its exit comes as a stage."""
+    """Return the operations that leave one node: history, exit flag, timers and edges.
+
+    Its exit action follows later as a stage.
+    """
     ops: list[Op] = []
     mode = context.mode_of(node)
     if node.index in context.history_nodes:

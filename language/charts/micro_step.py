@@ -1,8 +1,8 @@
-"""Micro-step: what the jump of a tick does in a chart - select, leave, reset, enter, again.
+"""Micro-steps of a chart: the jump of a tick (rules 3, 6, 7 and 15).
 
-Rules 3, 6, 7 and 15. Exits run from the inside out, one stage for each depth, then the resets of
-all transitions as one stage, then entries from the outside in; each stage reads one snapshot. The
-first micro-step takes what has no event and what has the first one by priority alone.
+A micro-step selects transitions, resolves conflicts, and commits the selected transitions. Exits
+run from the inside out, one stage for each depth; then the resets of all transitions run as one
+stage; then entries run from the outside in. Each stage reads one snapshot.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from language.lowering.action_stages import commit_stage, lower_entry, read_stag
 from language.lowering.event_queue import (
     CURRENT_EVENT,
     HAS_WAITING_EVENT,
-    dequeue_event as take_event,
+    dequeue_event,
     enqueue_event,
     enqueue_input_events,
     event_queue_variables,
@@ -57,12 +57,18 @@ from language.model.declaration import MICRO_STEP_LIMIT_FAULT, Formula
 from language.model.statechart import ROOT, Chart, ChartNode
 
 HAS_NEXT_STEP = Ref("work.is_busy")
+"""The variable that another micro-step follows in this tick."""
 STEP_COUNT = Ref("work.steps")
+"""The number of micro-steps of this tick."""
 LOOP_INDEX = "work.turn"
+"""The index of the loop over micro-steps."""
 
 
 def chart_blocks(context: ChartContext, evaluate_equations: Op) -> dict[str, Block]:
-    """Return `jump` and what it runs; `evaluate_equations` evaluates the equations of the active modes."""
+    """Return the block `jump` and the blocks that it runs.
+
+    `evaluate_equations` is the operation that evaluates the equations of the active modes.
+    """
     blocks = {**selection_blocks(context), **exit_blocks(context)}
     blocks["commit"] = _commit_block(context, evaluate_equations)
     if not context.has_several_micro_steps:
@@ -75,7 +81,7 @@ def chart_blocks(context: ChartContext, evaluate_equations: Op) -> dict[str, Blo
 
 
 def chart_variables(context: ChartContext) -> list[Variable]:
-    """Return the variables of all of it; `finished` leaves out what is not used."""
+    """Return the variables of a chart; `finalise_program` removes the unused ones."""
     found = [*selection_variables(context), *event_queue_variables(context.queue_capacity)]
     for node in context.chart.nodes[ROOT + 1 :]:
         about = f"what `{node.path}` was left in"
@@ -94,13 +100,16 @@ def chart_variables(context: ChartContext) -> list[Variable]:
 
 
 def clear_histories(context: ChartContext) -> Block:
-    """Return what forgets the histories of before."""
+    """Return the assignments that mark all history nodes as never left."""
     nodes = (context.chart.nodes[index] for index in sorted(context.history_nodes))
     return tuple(Assign(history_ref(node).name, integer(NEVER_LEFT)) for node in nodes)
 
 
 def lower_initial_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -> Block:
-    """Return the entries of all nodes that are active at the start, one stage for each depth."""
+    """Return the entry actions of the initial configuration, one stage for each depth.
+
+    `now` are the bindings without equations.
+    """
     active = [
         (chart.depth(node), automaton.modes_by_key.get(node.mode_key))
         for node in chart.initial_configuration()
@@ -119,7 +128,10 @@ def lower_initial_entries(automaton: Automaton, chart: Chart, now: Mapping[str, 
 
 
 def _lower_single_micro_step(context: ChartContext) -> Block:
-    """The only micro-step of a tick; an event that it does not take is a fault if one waits."""
+    """Return the block `jump` of a chart with one micro-step in a tick.
+
+    An event that remains in the queue sets a fault bit.
+    """
     ops: list[Op] = []
     if context.queue_capacity:
         ops += enqueue_input_events(context.chart)
@@ -137,7 +149,10 @@ def _lower_single_micro_step(context: ChartContext) -> Block:
 
 
 def _lower_micro_step_loop(context: ChartContext) -> Block:
-    """Micro-steps until nothing is enabled and no event waits, or the bound is reached."""
+    """Return the block `jump` of a chart with several micro-steps in a tick.
+
+    The loop ends if no transition is enabled and no event waits, or at the bound.
+    """
     ops: list[Op] = [Assign(LOG_COUNT_VARIABLE, integer(0)), Assign(STEP_COUNT.name, integer(0))]
     if context.queue_capacity:
         ops += enqueue_input_events(context.chart)
@@ -154,7 +169,10 @@ def _lower_micro_step_loop(context: ChartContext) -> Block:
 
 
 def _lower_micro_step(context: ChartContext) -> Block:
-    """One turn: a micro-step, or the next event, or the end."""
+    """Return the block `micro_step`: commit the selection, or take the next event, or end the tick.
+
+    If the bound is reached and work remains, a fault bit is set.
+    """
     fired = _any_selected_condition(context, _selected_variable_name(context))
     over: Block = (FaultBit(MICRO_STEP_LIMIT_FAULT), Assign(HAS_NEXT_STEP.name, Value(False)))
     done: list[Op] = [
@@ -168,7 +186,7 @@ def _lower_micro_step(context: ChartContext) -> Block:
     done.append(Assign(IS_STEP_LIMIT_REACHED.name, reached))
     end: Block = (Assign(HAS_NEXT_STEP.name, Value(False)),)
     if context.queue_capacity:
-        late: Block = (Branch(IS_STEP_LIMIT_REACHED, over, take_event()),)
+        late: Block = (Branch(IS_STEP_LIMIT_REACHED, over, dequeue_event()),)
         end = (Branch(HAS_WAITING_EVENT, late, end),)
     ops: list[Op] = [RunBlock("select_transitions"), *_resolve_conflicts(context)]
     ops.append(Branch(fired, (Branch(IS_STEP_LIMIT_REACHED, over, tuple(done)),), end))
@@ -176,15 +194,20 @@ def _lower_micro_step(context: ChartContext) -> Block:
 
 
 def _resolve_conflicts(context: ChartContext) -> Block:
+    """Return the operation that resolves conflicts between regions; none for a single region."""
     return (RunBlock("hear"),) if len(context.chart.regions) > 1 else ()
 
 
 def _selected_variable_name(context: ChartContext) -> Callable[[str], str]:
-    """The variable of what a region takes: a single one always takes what it wishes for."""
+    """Return the function from a region to the variable of its selected transition.
+
+    A single region has no conflicts, so its request is its selection.
+    """
     return selected_variable if len(context.chart.regions) > 1 else request_variable
 
 
 def _any_selected_condition(context: ChartContext, variable_of: Callable[[str], str]) -> Expr:
+    """Return the condition that a region has selected a transition."""
     found: Expr | None = None
     for region in context.chart.regions:
         here = Compare("!=", Ref(variable_of(region.region)), integer(0))
@@ -194,7 +217,7 @@ def _any_selected_condition(context: ChartContext, variable_of: Callable[[str], 
 
 
 def _commit_block(context: ChartContext, evaluate_equations: Op) -> Block:
-    """What the transitions do that are taken."""
+    """Return the operations of the selected transitions: exits, resets, entries, equations."""
     ops: list[Op] = []
     leaving = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.exit]
     coming = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.entry]
@@ -214,7 +237,7 @@ def _commit_block(context: ChartContext, evaluate_equations: Op) -> Block:
 
 
 def _log_and_exit(context: ChartContext) -> Block:
-    """Note what fired, and leave what that leaves."""
+    """Return the operations that record the selected transitions and leave their sources."""
     ops: list[Op] = []
     for region in context.chart.regions:
         chosen = Ref(_selected_variable_name(context)(region.region))
@@ -235,12 +258,18 @@ def _log_and_exit(context: ChartContext) -> Block:
 
 
 def _log_size(context: ChartContext) -> int:
-    """Return how many entries a tick has at most: one of each region in a step, and its end."""
+    """Return the largest number of log entries in a tick.
+
+    Each micro-step has one entry for each region and an end mark.
+    """
     return context.chart.micro_steps * (len(context.chart.regions) + 1)
 
 
 def _append_log_entry(context: ChartContext, entry: Expr) -> Op:
-    """Write an entry. There is always room; the test says so to tools that follow ranges."""
+    """Return the operation that appends an entry to the log.
+
+    There is always room; the test makes this visible to tools that analyse value ranges.
+    """
     written = (
         Store(LOG_VARIABLE, Ref(LOG_COUNT_VARIABLE), entry),
         Assign(LOG_COUNT_VARIABLE, add(Ref(LOG_COUNT_VARIABLE), integer(1))),
@@ -251,7 +280,7 @@ def _append_log_entry(context: ChartContext, entry: Expr) -> Op:
 def _lower_flagged_stage(
     context: ChartContext, flagged: list[tuple[Ref, Mapping[str, Formula]]]
 ) -> Block:
-    """Assignments of the nodes that have their flag set: all read, then all commit."""
+    """Return one stage of the nodes whose flag is set: all read, then all commit."""
     automaton = context.automaton
     reads = [
         Branch(flag, tuple(read_stage(automaton, written, context.bindings)))
@@ -262,7 +291,7 @@ def _lower_flagged_stage(
 
 
 def _lower_resets(context: ChartContext) -> Block:
-    """The resets of all transitions as one stage, and the events that they raise."""
+    """Return the resets of all selected transitions as one stage, and the events they raise."""
     automaton = context.automaton
     reads: list[Op] = []
     commits: list[Op] = []
@@ -285,6 +314,7 @@ def _lower_resets(context: ChartContext) -> Block:
 
 
 def _enter_targets(context: ChartContext) -> Block:
+    """Return the operations that activate the entry sets of the selected transitions."""
     ops: list[Op] = []
     for region in context.chart.regions:
         cases = []
@@ -300,7 +330,10 @@ def _enter_targets(context: ChartContext) -> Block:
 def _lower_entries(
     context: ChartContext, entered_nodes: list[ChartNode], evaluate_equations: Op
 ) -> Block:
-    """Entries from the outside in; the equations that they read are evaluated before each stage."""
+    """Return the entry actions from the outside in, one stage for each depth.
+
+    The equations are evaluated before a stage that reads one.
+    """
     ops: list[Op] = []
     automaton = context.automaton
     for depth in sorted({context.chart.depth(node) for node in entered_nodes}):

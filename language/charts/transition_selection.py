@@ -1,9 +1,10 @@
-"""Selecting: which transitions of a chart a micro-step takes (rules 3 and 15).
+"""Selection of transitions in a chart and resolution of conflicts between regions (rules 3 and 15).
 
-Each region wishes for one: that of the outermost or of the innermost of its active modes that has
-one enabled, by `order`. Then the wishes are heard from the innermost regions on, as by SCXML (2015,
-`removeConflictingTransitions`): of two that leave the same mode the one from further inside stays,
-else the one heard first; regions side by side are heard in the order of their `priority`.
+Each region requests the enabled transition of its outermost or innermost active mode, by `order`.
+The requests are then resolved from the innermost regions on (SCXML 2015,
+`removeConflictingTransitions`). Of two transitions that leave the same mode, the one from further
+inside is taken, otherwise the one that is resolved first. Sibling regions are resolved in the order
+of their `priority`.
 """
 
 from __future__ import annotations
@@ -52,11 +53,14 @@ from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode
 
 EMPTY_SPAN = (1, 0)
-"""First and last node of an inside that is empty."""
+"""The first and the last index of an empty span of nodes."""
 
 
 def selection_blocks(context: ChartContext) -> dict[str, Block]:
-    """Return `count_<mode>`, `choose_<mode>` of modes, `select_transitions` and `hear`."""
+    """Return the blocks `count_<mode>`, `choose_<mode>`, `select_transitions` and `hear`.
+
+    `hear` resolves the requests of the regions; a single region has none.
+    """
     blocks: dict[str, Block] = {}
     for node in context.chart.nodes:
         mode = context.mode_of(node)
@@ -76,7 +80,7 @@ def selection_blocks(context: ChartContext) -> dict[str, Block]:
 
 
 def selection_variables(context: ChartContext) -> list[Variable]:
-    """Return the variables of wishes and of what is taken."""
+    """Return the variables of requests, selections and spans of nodes."""
     found = []
     for region in context.chart.regions:
         name = region.region
@@ -100,7 +104,12 @@ def selection_variables(context: ChartContext) -> list[Variable]:
 
 
 def _timers_and_choice(context: ChartContext, node: ChartNode, mode: Mode) -> tuple[Block, Block]:
-    """Return the counters and edges of a mode's transitions, and the choice among them."""
+    """Return the counters and edges of a mode's transitions, and the choice of a request.
+
+        choice    if guard_1: request = 1 else if guard_2: ...    (in the order of priority)
+
+    A transition with a wait is enabled when its counter is above the wait (rule 4b).
+    """
     automaton = context.automaton
     edges = tuple(detect_edges(automaton, mode, context.bindings))
     known = ChainMap(guard_memory_bindings(automaton, mode), dict(context.bindings))
@@ -128,7 +137,10 @@ def _timers_and_choice(context: ChartContext, node: ChartNode, mode: Mode) -> tu
 def _count_waits(
     context: ChartContext, mode: Mode, edges: Block, counts: Block, restarts: Block
 ) -> Block:
-    """A tick counts once; a wait that begins in a later micro-step begins there (rule 4)."""
+    """Return the operations that count waits once a tick (rule 4c).
+
+    A wait that begins in a later micro-step starts at 1 there, and a false guard clears it.
+    """
     if not context.has_several_micro_steps or not (edges or counts):
         return (*edges, *counts)
     found = edge_detectors_by_mode(context.automaton).get(mode.key, ())
@@ -145,6 +157,7 @@ def _count_waits(
 def _enabled_condition(
     context: ChartContext, node: ChartNode, transition: Transition, guard: Expr
 ) -> Expr:
+    """Return the condition of a transition: completion, guard, or event and guard."""
     event = event_condition(context.chart, transition)
     if transition.is_completion:
         return is_complete(context.chart, node, "memory.mode")
@@ -154,7 +167,10 @@ def _enabled_condition(
 
 
 def _request_in_region(context: ChartContext, region: ChartNode, blocks: dict[str, Block]) -> Block:
-    """What a region wishes for in each of its innermost modes."""
+    """Return the operations that set the request of a region, by its active leaf.
+
+    A region that a pending fault leaves makes no request then.
+    """
     cases = []
     for leaf in context.chart.leaves(region.region):
         assert leaf.number is not None
@@ -170,7 +186,7 @@ def _request_in_region(context: ChartContext, region: ChartNode, blocks: dict[st
 
 
 def _is_left_by_fault(context: ChartContext, region: ChartNode) -> bool:
-    """Tell whether a fault leaves a region: the mode of the chart that holds it has a way out."""
+    """Return whether the transition into the fault mode leaves a region."""
     holding = [leaf for leaf in context.chart.leaves(CHART) if leaf.contains(region.index)]
     return any(
         way.priority == FAULT_FIRST for leaf in holding for way in context.transitions_of(leaf)
@@ -178,6 +194,10 @@ def _is_left_by_fault(context: ChartContext, region: ChartNode) -> bool:
 
 
 def _request_in_leaf(context: ChartContext, leaf: ChartNode, blocks: dict[str, Block]) -> Block:
+    """Return the operations that set the request while a leaf is active.
+
+    They count the waits of the leaf and its ancestors, then try them in the declared order.
+    """
     chain = [n for n in context.chart.region_ancestors(leaf) if context.transitions_of(n)]
     names = [to_identifier(node.path) for node in chain]
     ops: list[Op] = [RunBlock(f"count_{name}") for name in names if f"count_{name}" in blocks]
@@ -195,7 +215,7 @@ def _request_in_leaf(context: ChartContext, leaf: ChartNode, blocks: dict[str, B
 
 
 def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
-    """Return `hear`, which makes of the wishes what is taken, and `hear_<region>`."""
+    """Return the block `hear`, which turns requests into selections, and `hear_<region>`."""
     regions = context.chart.regions
     pairs = {region.index: _conflicting_regions(context, region) for region in regions}
     conflicts = any(pairs.values())
@@ -216,7 +236,7 @@ def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
 
 
 def _conflicting_regions(context: ChartContext, region: ChartNode) -> list[ChartNode]:
-    """Return the regions with a transition that leaves something that one of this region leaves."""
+    """Return the other regions with a transition that may leave nodes that this region leaves."""
     chart = context.chart
     own = chart.exited_domains(way for _, way in context.transitions_in(region.region))
     found = []
@@ -228,7 +248,7 @@ def _conflicting_regions(context: ChartContext, region: ChartNode) -> list[Chart
 
 
 def _set_exit_span(context: ChartContext, region: ChartNode) -> Block:
-    """Set the first and last node of what the wish of a region leaves."""
+    """Return the operations that set the first and last node which a region's request leaves."""
     cases = []
     for transition, way in context.transitions_in(region.region):
         low, high = EMPTY_SPAN
@@ -246,7 +266,11 @@ def _set_exit_span(context: ChartContext, region: ChartNode) -> Block:
 def _resolve_request(
     context: ChartContext, region: ChartNode, conflicting: Sequence[ChartNode]
 ) -> Block:
-    """Take the wish of a region unless one that is taken already leaves the same."""
+    """Return the operations that take the request of a region unless it conflicts.
+
+    A conflict with a region around this one removes that region's selection; any other conflict
+    rejects the request.
+    """
     keeps = Ref("work.keeps")
     take: list[Op] = [
         Assign(selected_variable(region.region), Ref(request_variable(region.region)))
@@ -265,7 +289,7 @@ def _resolve_request(
 
 
 def _spans_overlap(left: ChartNode, right: ChartNode) -> Expr:
-    """Tell whether one of two insides begins in the other."""
+    """Return the condition that two nonempty spans of nodes overlap."""
 
     def begins(inner: ChartNode, outer: ChartNode) -> Expr:
         low = Ref(_span_first(inner))
@@ -281,7 +305,10 @@ def _spans_overlap(left: ChartNode, right: ChartNode) -> Expr:
 
 
 def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
-    """In its innermost modes without regions, a region is heard: its own wish or one around it."""
+    """Return the operations that resolve a region whose active leaf has no regions.
+
+    They resolve the first request of the region and those around it, by `order`.
+    """
     chart = context.chart
     plain = [leaf for leaf in chart.leaves(region.region) if leaf.kind == "atomic"]
     around = [region]
@@ -306,12 +333,15 @@ def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
 
 
 def _span_first(region: ChartNode) -> str:
+    """Return the variable of the first node that the request of a region leaves."""
     return f"work.low_{to_identifier(region.region)}"
 
 
 def _span_last(region: ChartNode) -> str:
+    """Return the variable of the last node that the request of a region leaves."""
     return f"work.high_{to_identifier(region.region)}"
 
 
 def _is_resolved_variable(region: ChartNode) -> str:
+    """Return the variable that the request of a region is resolved."""
     return f"work.heard_{to_identifier(region.region)}"

@@ -61,7 +61,11 @@ def input_change_variables(automaton: Automaton) -> list[Variable]:
 def input_change_matrices(
     automaton: Automaton, values: Mapping[str, Scalar], observer: Observer, problems: Problems
 ) -> dict[str, Matrix]:
-    """Return M_<input> (n, 1) and V_<input> (n, n): mean and covariance of a change by 1."""
+    """Return M_<input> (n, 1) and V_<input> (n, n), the moments of the effect of a change by 1.
+
+    M is the mean and V the covariance. An input without an entry in B, or with a time that is not
+    positive, is reported and left out.
+    """
     states, found = observer.states, {}
     a = numeric_matrix(automaton, values, observer.a, states, states, "A")
     for name, formula in observer.unknown_instant.items():

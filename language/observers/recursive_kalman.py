@@ -206,9 +206,12 @@ class _RecursiveObserverBuilder:
     def _steady_covariance(
         self, observer: Observer, prediction: PredictionMatrices, c: Matrix, r: Matrix
     ) -> tuple[Block, Block, tuple[Constant, ...]]:
-        """Return what sets the steady covariance: before a correction, and after one.
+        """Return the assignments of the steady P before and after a correction, and constants.
 
-        Densities that are not constant count here as they are while all inputs are 0.
+        The first block initialises P at the start; the second one sets P on entry and is empty
+        unless `covariance: steady`. Densities that are not constant have their value at rest.
+        Without a steady covariance a problem is reported, except for `covariance: keep` outside the
+        initial mode.
         """
         noise = prediction.matrices["Qd"]
         for name, formula in self.varying_densities.items():
@@ -308,7 +311,7 @@ class _RecursiveObserverBuilder:
     def _correct_input_change(
         self, observer: Observer, tag: str
     ) -> tuple[Block, tuple[Constant, ...]]:
-        """What inputs do that changed within this tick, at an instant that is not known."""
+        """Return the correction for inputs that changed at an unknown instant, and constants."""
         solved, known = SolvedNames(tag, observer), (self.before, self.now)
         ops, constants = correct_input_change(
             self.automaton, solved, known, self.values, self.problems

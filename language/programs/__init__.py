@@ -1,1 +1,1 @@
-"""Assembly of whole Programs: sampled and continuous automata, systems."""
+"""Assembly of whole Programs: sampled automata, continuous automata and systems."""

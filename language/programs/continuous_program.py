@@ -1,15 +1,22 @@
-"""Continuous: a continuous automaton as a Program that an engine moves from event to event.
+"""Lowering of a continuous automaton to a Program that advances from event to event.
 
-Entries: `step` is one major step (language/programs/major_step.py) and what the C has, after `init`. An engine
-runs its parts: `start` (start values from the inputs), `equations` (the values of now), `watch`
-(what each guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none),
-`flow` (states over `work.h`, up to the first change of a guard, after `work.elapsed`); and `dense`,
-`peek`: with the states as they were at its start, what they were `work.s` after it, on the method's
-own polynomial (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
+The block `step` is one major step (language/programs/major_step.py); with `init` and `derive` it is
+the C code. An engine runs its parts instead:
 
-The inputs that hold are `before.u`: `latch` takes those of now, at the end of a step.
-An input that varies inside a step is `before.u + s (work.rise_u + s work.bend_u)` at the time s of
-the step: a parabola through its values at the ends and the middle, the times of RK4's stages.
+    start        start values from the inputs
+    equations    the present values of the equations
+    watch        the present guards, stored
+    jump         one micro-step; `memory.fired` is the transition, 0 if none
+    flow         states over `work.h` or up to the first crossing, after `work.elapsed`
+    dense        the polynomial of the last flow
+    peek         with the states of the start of that flow: the states `work.s` after it
+
+`dense` and `peek` use the dense output of the method (Hairer, Norsett, Wanner, Solving Ordinary
+Differential Equations I, II.6).
+
+Inputs that are constant over a step are `before.u`; `latch` copies the present ones at its end. An
+input that varies inside a step is `before.u + s (work.rise_u + s work.bend_u)` at the time s of the
+step: a parabola through its values at the ends and the middle, which are the stage times of RK4.
 """
 
 from __future__ import annotations
@@ -95,13 +102,16 @@ ENGINE_BLOCKS = (
     "record",
     INVARIANTS,
 )
-"""What an engine runs one by one; of a Program with inputs that vary there is no `step`."""
+"""The blocks that an engine runs one by one.
+
+A Program with varying inputs has no `step`.
+"""
 
 
 def lower_continuous_automaton(
     automaton: Automaton, problems: Problems, varying_inputs: Collection[str] = ()
 ) -> Program:
-    """Return the Program of a checked continuous automaton. Raises SpecError.
+    """Return the Program of a checked continuous automaton; SpecError if a problem is reported.
 
     `varying_inputs` names the inputs that change inside a step.
     """
@@ -141,7 +151,10 @@ def lower_continuous_automaton(
 
 
 def stable_step_limits(automaton: Automaton) -> tuple[StabilityLimit, ...]:
-    """Return the largest stable step of each mode that has one, whatever the step is."""
+    """Return the largest stable step of each mode that has a limit.
+
+    A step above a limit is not reported.
+    """
     problems = Problems()
     histories = continuous_delays_of(automaton)
     field = _vector_field(automaton, _base_bindings(automaton, histories), (), bool(histories))
@@ -155,6 +168,7 @@ def stable_step_limits(automaton: Automaton) -> tuple[StabilityLimit, ...]:
 
 
 def _base_bindings(automaton: Automaton, delays: tuple[ContinuousDelay, ...]) -> NameBindings:
+    """Return the expressions of parameters, variables, modes and delayed values by name."""
     return {
         **constant_bindings(automaton),
         **variable_bindings(automaton, "before"),
@@ -166,6 +180,7 @@ def _base_bindings(automaton: Automaton, delays: tuple[ContinuousDelay, ...]) ->
 def _vector_field(
     automaton: Automaton, known: NameBindings, varying_inputs: Collection[str], has_history: bool
 ) -> VectorField:
+    """Return the vector field of the automaton; varying inputs are parabolas in `work.s`."""
     held = {name: known[name] for name in automaton.inputs}
     return VectorField(
         automaton,
@@ -181,7 +196,7 @@ def _vector_field(
 def _continuous_step(
     field: VectorField, method: IntegrationMethod, flows: Mapping[str, Block]
 ) -> dict[str, Block]:
-    """The flow of each mode up to the first change of a guard, by the method's steps."""
+    """Return the blocks of the method and of the steps up to the first crossing."""
     armed = {slot: f"memory.armed_{slot}" for slot in field.guard_slots}
     halvings = FLOW_BISECTIONS[field.automaton.numbers]
     merge, is_wait = Ref("work.merge"), Ref("work.is_wait")
@@ -197,7 +212,7 @@ def _mode_blocks(
     infos: tuple[TransitionInfo, ...],
     selection: TransitionSelection,
 ) -> dict[str, Block]:
-    """What each mode evaluates, and where it goes."""
+    """Return `equations_<mode>` and `jump_<mode>` of each mode, and those of parallel regions."""
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes.values():
         ops = lower_equations(mode, dict(known), "equation.", field.key_prefix)
@@ -209,16 +224,19 @@ def _mode_blocks(
 
 
 def _input_parabola(name: str) -> Expr:
+    """Return the value of a varying input at `work.s`."""
     s, bend = Ref("work.s"), Ref(f"work.bend_{name}")
     inner = add(Ref(f"work.rise_{name}"), multiply(s, bend))
     return add(Ref(f"before.{name}"), multiply(s, inner))
 
 
 def _parabola_variables(varying_inputs: Collection[str]) -> list[str]:
+    """Return the variables of the coefficients of the varying inputs."""
     return [f"work.{part}_{name}" for name in varying_inputs for part in ("rise", "bend")]
 
 
 def _variables(automaton: Automaton, field: VectorField) -> list[Variable]:
+    """Return the variables of the automaton and of its vector field."""
     return [
         *input_variables(automaton, "input"),
         *state_variables(automaton),
@@ -236,6 +254,10 @@ def _variables(automaton: Automaton, field: VectorField) -> list[Variable]:
 def _selection(
     automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: WaitTimers
 ) -> TransitionSelection:
+    """Return how a micro-step selects transitions; a wait must be over for its transition.
+
+    After a transition the timers and edges of the source are reset and those of the target start.
+    """
     by_key = {info.key: info for info in infos}
     begins, ends = begin_blocks(waits), end_blocks(waits)
 
@@ -265,6 +287,10 @@ def _jump_block(
     infos: tuple[TransitionInfo, ...],
     selection: TransitionSelection,
 ) -> Block:
+    """Return the micro-step of a mode of the chart: its guards, then at most one transition.
+
+    With parallel regions each region takes at most one transition.
+    """
     guards = RunBlock(f"guards_{mode.name}")
     if mode.parallel_regions:
         return (guards, *lower_parallel_step(field, mode, selection))
@@ -282,6 +308,6 @@ def _jump_block(
 
 
 def _guard_memory(automaton: Automaton) -> dict[str, NameBindings]:
-    """Return, by the key of a mode, what `after` and edges in its guards are."""
+    """Return the conditions of `after`, `every` and edges, by key path of mode, then memory key."""
     alarms, edges = alarm_bindings(automaton), edge_bindings(automaton)
     return {mode.key: {**alarms[mode.key], **edges[mode.key]} for mode in automaton.all_modes}

@@ -1,4 +1,4 @@
-"""Part: what an engine runs of a continuous automaton, block by block (continuous.py)."""
+"""Blocks of a continuous automaton that an engine runs one by one (continuous_program.py)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,11 @@ from language.programs.major_step import WaitTimers, begin_blocks, block_of_mode
 def engine_blocks(
     field: VectorField, known: NameBindings, waits: WaitTimers, delays: tuple[ContinuousDelay, ...]
 ) -> dict[str, Block]:
-    """What is run from outside."""
+    """Return the blocks that are run from outside, by name.
+
+    They are `derive`, `init`, `start`, `equations`, `watch`, `jump`, `flow`, `dense`, `peek` and,
+    with delays, `record`. `known` are the bindings without equations.
+    """
     automaton = field.automaton
     now = (*set_point_to_state(field), *set_point_time(field, real(0.0)))
     ends = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in field.states]
@@ -51,7 +55,7 @@ def engine_blocks(
     at_start = set_point_time(field, real(0.0))
     evaluate: Block = (*at_start, run_block_by_mode(field, "equations"))
     whole_known = {**known, **equation_bindings(automaton, "equation.")}
-    # A delayed quantity may read another one: each round fills one more from what is inside it.
+    # A delayed quantity may read another one, so each round completes at least one more delay.
     rounds = (*evaluate, *fill_block(delays, whole_known))
     fill: Block = (Loop(len(delays), "work.round", rounds),) if delays else ()
     keep: Block = (
@@ -91,7 +95,7 @@ def engine_blocks(
 def _start_block(
     field: VectorField, known: NameBindings, waits: WaitTimers, delays: tuple[ContinuousDelay, ...]
 ) -> Block:
-    """What a run begins with, at time 0 and in the initial mode (rule 16b)."""
+    """Return the block `start`: start values, initial modes, timers and entries (rule 16b)."""
     automaton = field.automaton
     begins = begin_blocks(waits)
     return (
@@ -110,19 +114,20 @@ def _start_block(
 
 
 def _clear_periodic_alarms(automaton: Automaton) -> Block:
-    """What repeats is true for one instant, which is over when guards are watched."""
+    """Return the assignments that clear the alarms of `every`, which last one instant."""
     repeating = [alarm for alarm in alarms_of(automaton) if alarm.repeats]
     return tuple(Assign(alarm.variable, Value(False)) for alarm in repeating)
 
 
 def _dense_output_block(mode: Mode) -> Block:
-    """The polynomial of the flow that was just done, where no crossing was looked for on it."""
+    """Return the operation that fills the series of the last flow, unless it was filled before."""
     run: Block = (RunBlock(f"series_{mode.name}"),)
     is_known = Binary("or", Ref("work.crossed"), Ref("work.is_wait"))
     return (Branch(Unary("not", is_known), run),) if guard_slots(mode) else run
 
 
 def _watch_block(automaton: Automaton, mode: Mode) -> Block:
+    """Return the operations that evaluate and store the guards and levels of a mode."""
     armed = [
         Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in guard_slots(mode)
     ]

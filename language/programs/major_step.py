@@ -1,13 +1,13 @@
-"""Stepping: a continuous automaton over one major step, from event to event (rules 1, 4, 7-12).
+"""The major step of a continuous automaton, from event to event (rules 1, 4d and 7 to 12).
 
-`step` is what X_Step is in C: the flow of the step under the inputs of the step before, then the
-inputs of now (`latch`) and what they make jump. An engine runs the same blocks one by one, so that
-it sees each event, and has the same bits:
+The block `step` is X_Step in C: it integrates over the step under the inputs of the previous step,
+then latches the present inputs and takes the transitions that they enable. The engine runs the same
+blocks one by one, so it observes each event and computes the same bits:
 
-    limit   the next segment: `work.h` is the rest of the step, or less where a wait ends before
-    flow    (continuous.py) over `work.h`, or up to the first change of a guard
-    elapse  time passes: `work.left` and the waits become shorter; `work.event` if something is due
-    settle  micro-steps until no transition is enabled
+    limit     set `work.h` to the rest of the step, or to the earliest end of a wait
+    flow      (continuous_program.py) integrate over `work.h` or up to the first crossing
+    elapse    subtract the elapsed time from `work.left` and the waits; set `work.event`
+    settle    run micro-steps until no transition is enabled
 """
 
 from __future__ import annotations
@@ -46,18 +46,23 @@ from language.lowering.program_builder import any_fired_condition, clear_fired
 from language.model.automaton import Mode
 
 MAX_EVENTS_PER_STEP = 100
-"""More located events than this within one major step are Zeno behaviour (rule 12)."""
+"""The largest number of located events in a major step; more are Zeno behaviour (rule 12)."""
 ZENO = "zeno"
+"""The fault bit of a major step with too many events."""
 LIVELOCK = "livelock"
+"""The fault bit of a cycle of transitions at one instant."""
 STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
-"""What an engine sets before these blocks and reads after them."""
+"""The variables that an engine writes before it runs these blocks, or reads afterwards."""
 
 
 @dataclass(frozen=True)
 class WaitTimer:
-    """Something that is due a time after it began, while a mode of a region is active.
+    """A timer that runs down while a mode of a region is active.
 
-    That of a transition begins when its guard turns true; `after` and `every` begin on entry.
+    The timer of a wait starts when the guard of its transition becomes true; those of `after` and
+    `every` start on entry. `duration` is in s. `is_running` is the condition under which it runs;
+    `on_begin` and `on_end` are the operations at its start and end. `is_restarted` marks a wait,
+    which returns to its start when its guard is false or its mode is left.
     """
 
     timer: str
@@ -71,7 +76,7 @@ class WaitTimer:
 
     @property
     def restart(self) -> Assign:
-        """What puts the timer at its start."""
+        """The assignment that sets the timer to its duration."""
         return Assign(self.timer, real(self.duration))
 
 
@@ -79,7 +84,7 @@ WaitTimers = tuple[WaitTimer, ...]
 
 
 def wait_timers_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> WaitTimers:
-    """Return the waits of transitions, and those of `after`."""
+    """Return the timers of transitions with a wait, then those of `after` and `every`."""
     found = []
     for info in infos:
         if info.timer:
@@ -87,22 +92,23 @@ def wait_timers_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...])
             place = (info.timer, info.wait, info.region, info.source)
             found.append(WaitTimer(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
     for number, alarm in enumerate(alarms, start=1):
-        rings, silent = Assign(alarm.variable, Value(True)), Assign(alarm.variable, Value(False))
+        set_alarm, clear_alarm = (Assign(alarm.variable, Value(value)) for value in (True, False))
         timer = f"timer.after_{number}"
-        end: Block = (rings,)
+        end: Block = (set_alarm,)
         if alarm.repeats:
-            end = (rings, Assign(timer, add(Ref(timer), real(alarm.time))))
+            end = (set_alarm, Assign(timer, add(Ref(timer), real(alarm.time))))
         place = (timer, alarm.time, alarm.region, alarm.mode)
-        found.append(WaitTimer(*place, Unary("not", Ref(alarm.variable)), end, (silent,), False))
+        is_running = Unary("not", Ref(alarm.variable))
+        found.append(WaitTimer(*place, is_running, end, (clear_alarm,), False))
     return tuple(found)
 
 
 BlocksByMode = Mapping[tuple[str, int], Block]
-"""Blocks by the region and the number of the mode."""
+"""Blocks by the name of a region and the number of a mode in it."""
 
 
 def begin_blocks(waits: WaitTimers) -> BlocksByMode:
-    """Return what begins when a mode is entered; waits of transitions are at their start."""
+    """Return the operations on entry of each mode that start its timers."""
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
         found.setdefault((wait.region, wait.mode), []).extend((*wait.on_begin, wait.restart))
@@ -110,7 +116,7 @@ def begin_blocks(waits: WaitTimers) -> BlocksByMode:
 
 
 def end_blocks(waits: WaitTimers) -> BlocksByMode:
-    """Return what puts the waits of a mode that is left back to their start (rule 4)."""
+    """Return the operations on exit of each mode that restart its waits (rule 4)."""
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
         if wait.is_restarted:
@@ -119,14 +125,19 @@ def end_blocks(waits: WaitTimers) -> BlocksByMode:
 
 
 def block_of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
-    """Return the block of a mode, empty where it has none."""
+    """Return the block of a mode; empty if it has none."""
     return blocks.get((mode.region, mode.number), ())
 
 
 def major_step_blocks(
     field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]
 ) -> dict[str, Block]:
-    """Return the blocks of the module's text; `age_variables` [s] are times since a major step's record."""
+    """Return the blocks `latch`, `limit`, `elapse`, `load`, `settle` and `segment`.
+
+    `load` restarts the waits whose guard is false. `segment` is limit, step, elapse and, if an
+    event happened inside the step, settle. `age_variables` [s] are the times since a record at a
+    major step.
+    """
     inputs = field.automaton.inputs
     return {
         "latch": tuple(Assign(f"before.{name}", Ref(f"input.{name}")) for name in inputs),
@@ -139,7 +150,7 @@ def major_step_blocks(
 
 
 def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable]:
-    """Return the variables of these blocks."""
+    """Return the variables of the blocks of a major step."""
     return [
         *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),
         Variable("memory.started", "truth", about="the first step is done"),
@@ -155,12 +166,16 @@ def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable
 
 
 def is_wait_over(info: TransitionInfo) -> Expr:
-    """Whether the wait of a transition is over."""
+    """Return the condition that the wait of a transition with a timer is over."""
     assert info.timer
     return Compare("<=", Ref(info.timer), real(0.0))
 
 
 def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
+    """Return the block that sets `work.h` to the rest of the step or to the end of a wait.
+
+    A wait that ends within `work.merge` after the rest of the step counts as ending with it.
+    """
     h = Ref("work.h")
 
     def shorter(wait: WaitTimer) -> Block:
@@ -179,7 +194,10 @@ def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
 
 
 def _merge_window(field: VectorField) -> Expr:
-    """What is one instant (language/integration/crossing_location.py): of a float32 it is a part of the step."""
+    """Return the time [s] within which events are one instant (rule 10).
+
+    In float64 it grows with the time since the start; in float32 it is a part of the step.
+    """
     step, numbers = field.automaton.step, field.automaton.numbers
     if numbers == "float32":
         return real(merge_time(numbers, step))
@@ -189,7 +207,10 @@ def _merge_window(field: VectorField) -> Expr:
 
 
 def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]) -> Block:
-    """Time passes; what is nearer than `work.merge` is at the same instant (rule 10)."""
+    """Return the block that advances time by `work.elapsed`.
+
+    Events within `work.merge` [s] of the end of the segment are at the same instant (rule 10).
+    """
     elapsed, left = Ref("work.elapsed"), Ref("work.left")
     h, merge = Ref("work.h"), Ref("work.merge")
     near = Binary("and", Ref("work.crossed"), Compare("<=", subtract(h, elapsed), merge))
@@ -213,11 +234,16 @@ def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[st
 
 
 def _restart_if_idle(wait: WaitTimer) -> Block:
-    """A wait is at its start while its guard is false (rule 4)."""
+    """Return the operation that restarts a wait while its guard is false (rule 4)."""
     return (Branch(wait.is_running, (), (wait.restart,)),)
 
 
 def _settle_block(field: VectorField) -> Block:
+    """Return the block that runs micro-steps until none fires.
+
+    As many micro-steps as the regions have modes may fire; one more sets the fault bit `livelock`
+    (rule 7).
+    """
     regions = field.automaton.all_regions
     bound = sum(len(region.modes) for region in regions)
     going = Ref("work.is_settling")
@@ -232,6 +258,7 @@ def _settle_block(field: VectorField) -> Block:
 
 
 def _segment_block(field: VectorField) -> Block:
+    """Return the block of one segment of a major step, up to an event or the end."""
     inside = Binary("and", Ref("work.event"), Compare(">", Ref("work.left"), real(0.0)))
     return (
         RunBlock("limit"),
@@ -242,7 +269,11 @@ def _segment_block(field: VectorField) -> Block:
 
 
 def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, Block]) -> Block:
-    """Return the block of one major step; `blocks` are those that it runs."""
+    """Return the block `step`; `blocks` are the blocks that it runs.
+
+    The first call latches the inputs and starts the automaton; later calls integrate first.
+    `has_record` tells whether delayed quantities are recorded.
+    """
     left, event = Ref("work.left"), Ref("work.event")
     is_left = Compare(">", left, real(0.0))
     segments = Loop(
@@ -266,8 +297,9 @@ def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, 
 
 
 def _detect_input_change(field: VectorField, event: Ref, blocks: Mapping[str, Block]) -> Block:
-    """Guards are read again if something happened at the end of the step, or if an input that is
-    read there is another one.
+    """Return the operation that requests `settle` if an input has changed that it reads.
+
+    It is empty if `settle` reads no input.
     """
     due: Expr = event
     read = names_used(blocks[name] for name in reachable_blocks("settle", blocks))
@@ -283,7 +315,10 @@ def _detect_input_change(field: VectorField, event: Ref, blocks: Mapping[str, Bl
 def _for_each_wait(
     field: VectorField, waits: WaitTimers, block_of: Callable[[WaitTimer], Block]
 ) -> tuple[Switch, ...]:
-    """Return a block for each wait of the active modes: one choice for each region that waits."""
+    """Return a Switch for each region with timers, which runs the blocks of its active mode.
+
+    `block_of` gives the block of one timer.
+    """
     found = []
     for region in field.automaton.all_regions:
         cases: dict[int, Block] = {}

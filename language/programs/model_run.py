@@ -1,7 +1,8 @@
-"""Run: a mode of the model inside a tick, following the model's own located transitions (rule 2c).
+"""Runs of the model inside a tick, which follow the model's located transitions (rule 2c).
 
-Blocks: those of the model's field and motion, `switch_<mode>` (one of its transitions), and for a
-mode of ours that runs, `run_<mode>`: the period, segment by segment, at most `events` jumps.
+Blocks: those of the model's vector field and method, `switch_<mode>` (one micro-step of the model)
+and, for each mode of the automaton with a run, `run_<mode>`: the period, segment by segment, with
+at most `events` jumps in each substep.
 """
 
 from __future__ import annotations
@@ -65,19 +66,27 @@ from language.programs.parallel_regions import (
 from language.text.diagnostic import Problems
 
 EVENT_LIMIT = "event_limit"
+"""The fault bit of a run with more events than allowed."""
 RUN_MODE = "memory.run_mode"
+"""The variable of the mode of the run."""
 SATURATION_BLOCK = "hold"
+"""The block that holds the states of a run in their ranges."""
 STEP_DIVIDING_METHODS = ("midpoint", "rk4")
-"""Methods with a polynomial that divides by the step: of a short one it may be of any size."""
+"""Methods whose polynomial divides by the step.
+
+A very short step would give coefficients of any size.
+"""
 MIN_REMAINDER = Fraction(1, 2**60)
-"""Periods. The rest after a crossing that is no end is at least 2^-25 of its step (`RUN_HALVINGS`):
-two crossings leave more than this, or nothing.
+"""The smallest rest of a substep that is integrated, in periods.
+
+The rest after a crossing is 0 or at least 2^-25 of its step (`RUN_BISECTIONS`), so after two
+crossings it is 0 or above this limit.
 """
 
 
 @dataclass(frozen=True)
 class RunStep:
-    """What the runs of an automaton share."""
+    """The blocks, variables, constants and method that all runs of an automaton share."""
 
     blocks: dict[str, Block]
     variables: tuple[Variable, ...]
@@ -88,7 +97,11 @@ class RunStep:
 def build_run_step(
     automaton: Automaton, runs: list[ModelRun], values: Mapping[str, Scalar], problems: Problems
 ) -> RunStep:
-    """Return the motion of the model inside a tick; `values` are those of the constants."""
+    """Return the integration of the model inside a tick; `values` are those of the constants.
+
+    Reported are runs with different settings, a model with memory, with actions, with discrete
+    variables or with waits, and inputs without a value.
+    """
     model = automaton.model
     assert model and automaton.period is not None
     held = tuple(saturate_written_states(automaton, written_states(model))[1])
@@ -114,22 +127,25 @@ def build_run_step(
     method, info = build_method(first.method, field, blocks, point, h, place, problems)
     events = max(run.events if run.follow else 0 for run in runs)
     merge = real(merge_time(automaton.numbers, automaton.period))
-    made = {
+    all_blocks = {
         **blocks,
         **method.blocks,
         **continuous_step_blocks(field, method, blocks, merge, RUN_BISECTIONS, lambda mode: None),
     }
-    made.update(_switch_blocks(field, problems))
-    made.update({SATURATION_BLOCK: held} if first.method in STEP_DIVIDING_METHODS and held else {})
+    all_blocks.update(_switch_blocks(field, problems))
+    if first.method in STEP_DIVIDING_METHODS and held:
+        all_blocks[SATURATION_BLOCK] = held
     variables = (
         *_run_variables(model),
         *field_variables(field),
         *continuous_step_variables(field, method),
     )
-    return RunStep(made, variables, method.constants, dataclasses.replace(info, max_events=events))
+    info = dataclasses.replace(info, max_events=events)
+    return RunStep(all_blocks, variables, method.constants, info)
 
 
 def _run_variables(model: Automaton) -> tuple[Variable, ...]:
+    """Return the variables of the modes and of the segments of a run."""
     return (
         *_mode_variables(model),
         Variable("work.left", "real", "s", about="rest of the tick, or of its substep"),
@@ -139,10 +155,11 @@ def _run_variables(model: Automaton) -> tuple[Variable, ...]:
 
 
 def _refuse_memory(model: Automaton, problems: Problems) -> None:
-    remembering = find_memory_call(model)
-    if remembering:
+    """Raise SpecError if the model uses a function with memory."""
+    call = find_memory_call(model)
+    if call:
         label = "a run inside a tick follows what has no memory"
-        problems.error("run", remembering.span, label)
+        problems.error("run", call.span, label)
         problems.raise_if_errors()
 
 
@@ -154,9 +171,11 @@ def _require_equal_settings(runs: list[ModelRun], problems: Problems) -> None:
 
 
 def run_block(automaton: Automaton, run: ModelRun, duration: Expr | None = None) -> Block:
-    """Return the advance of a mode that runs the model: the whole period, through its events.
+    """Return the advance of a mode that runs the model over a period, through its events.
 
-    Or `duration`, a part of the period [s]: then the run has one substep.
+    `duration`, a part of the period [s], replaces the period; the run should then have one substep.
+    States are held in their ranges at the end or, for methods that divide by the step, after each
+    segment.
     """
     model = automaton.model
     assert model and automaton.period is not None
@@ -177,8 +196,9 @@ def run_block(automaton: Automaton, run: ModelRun, duration: Expr | None = None)
 def saturate_moved_states(
     automaton: Automaton, method: str, names: Sequence[str]
 ) -> tuple[Block, Block]:
-    """Return what stands before and after operations that move some states of the model: they are
-    held in their ranges, by the block of all runs where there is one.
+    """Return the operations before and after code that integrates states of the model.
+
+    They hold the states in their ranges. Methods that divide by the step use the shared block.
     """
     assert automaton.model
     is_shared = method in STEP_DIVIDING_METHODS
@@ -191,7 +211,10 @@ def saturate_moved_states(
 def _substep_with_events(
     automaton: Automaton, field: VectorField, run: ModelRun, length: Expr, held: Block
 ) -> Block:
-    """One substep, segment by segment, at most `events` jumps; states are `held` after each."""
+    """Return one substep, segment by segment, with at most `events` jumps.
+
+    `held` follows each segment. The jump after that ends the substep and sets a fault bit.
+    """
     assert automaton.period is not None
     may_jump = Compare("<", Ref("work.piece"), integer(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
@@ -213,7 +236,7 @@ def _substep_with_events(
 
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
-    """A run starts with our states: what its model would do at its own start has no place."""
+    """Report a model with discrete variables, entry or exit actions, which a run cannot carry."""
     acting = any(mode.entry or mode.exit for mode in model.all_modes)
     if model.discrete or acting:
         what = "discrete variables" if model.discrete else "entry or exit actions"
@@ -222,7 +245,11 @@ def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) 
 
 
 def _input_bindings(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
-    """A run reads the inputs of the tick before; what is no input here has its default."""
+    """Return the expressions of the model's inputs.
+
+    They are the inputs of the previous tick, or the default of an input that the automaton lacks.
+    An input with neither is reported.
+    """
     model = automaton.model
     assert model
     found: dict[str, Expr] = {}
@@ -241,19 +268,20 @@ def _input_bindings(automaton: Automaton, problems: Problems) -> dict[str, Expr]
 def _substep_without_events(
     automaton: Automaton, field: VectorField, run: ModelRun, length: Expr
 ) -> Block:
-    """One substep in the flow of one mode: no guard of the model is looked at."""
+    """Return one substep by the flow of one mode, without a test of guards."""
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     step = RunBlock(f"step_{run.mode}")
     return (Assign("work.h", length, f"{automaton.name} {run.key}"), step, *ends)
 
 
 def _settings_key(run: ModelRun) -> tuple[object, ...]:
+    """Return the settings that all runs of an automaton must share, as a comparable key."""
     at = {name: structural_key(formula.tree) for name, formula in (run.linearise or {}).items()}
     return run.method, run.substeps, run.linearise is None, at
 
 
 def _switch_blocks(field: VectorField, problems: Problems) -> dict[str, Block]:
-    """Return `switch_<mode>`: one micro-step of the run's model."""
+    """Return `switch_<mode>`, one micro-step of the model; a transition with a wait is reported."""
     model = field.automaton
     for mode in model.all_modes:
         for transition in mode.transitions:
@@ -277,7 +305,11 @@ def _switch_blocks(field: VectorField, problems: Problems) -> dict[str, Block]:
 
 
 def _switch_block(field: VectorField, mode: Mode) -> Block:
-    """A crossing is located where a guard is true: if none of the others is, the last one is."""
+    """Return the micro-step of a mode of a model without parallel regions.
+
+    A located crossing has a true guard, so the guard of the last transition in the order of
+    priority is not tested.
+    """
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
     for k, _ in transitions_by_priority(mode)[-1:]:
         enabled[k] = ALWAYS
@@ -285,7 +317,7 @@ def _switch_block(field: VectorField, mode: Mode) -> Block:
 
 
 def _mode_variables(model: Automaton) -> list[Variable]:
-    """Return the variables of the modes of a run, and of what its regions take."""
+    """Return the variables of the mode and of the selected transition of each region."""
     found = []
     for region in model.all_regions:
         where = "" if region.name == CHART else f", region {region.name}"
@@ -296,8 +328,8 @@ def _mode_variables(model: Automaton) -> list[Variable]:
 
 
 def start_run_regions(model: Automaton) -> list[Op]:
-    """Return what puts the regions beside the chart of a run's model where they start.
+    """Return the assignments that set the parallel regions of a run's model to their initial modes.
 
-    A run enters a mode of the model's chart; the regions beside it go on from tick to tick.
+    A run enters a mode of the model's chart; its parallel regions continue from tick to tick.
     """
     return [op for op in enter_initial_modes(model, RUN_MODE) if op.target != RUN_MODE]

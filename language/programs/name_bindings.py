@@ -1,4 +1,4 @@
-"""Sampled variable: what a ticking automaton carries, and what it computes with."""
+"""Variables and name bindings of a sampled automaton."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ def sampled_variables(
     delays: tuple[SampledDelay, ...],
     chart_variables: list[Variable],
 ) -> list[Variable]:
-    """Return the variables of a sampled automaton; `finished` leaves out what is not used."""
+    """Return the variables of a sampled automaton, each once.
+
+    `finalise_program` removes the unused ones.
+    """
     found = input_variables(automaton, "input")
     measured = [m.observer.measures for m in automaton.modes.values() if m.observer]
     for name in dict.fromkeys(name for measures in measured for name in measures):
@@ -68,7 +71,10 @@ def sampled_variables(
 
 
 def base_bindings(automaton: Automaton, group: str) -> dict[str, Expr]:
-    """Return what names without equations are, inputs in a group: `input` or `before`."""
+    """Return the expressions of names without equations; `group` of inputs is `input` or `before`.
+
+    The modes of the model are those of the run.
+    """
     known = dict(constant_bindings(automaton))
     known.update(variable_bindings(automaton, group))
     known.update(mode_bindings(automaton, "memory.mode"))
@@ -82,7 +88,10 @@ def base_bindings(automaton: Automaton, group: str) -> dict[str, Expr]:
 
 
 def current_bindings(automaton: Automaton) -> tuple[dict[str, Expr], dict[str, Expr]]:
-    """Return what all names are, and what those without equations are."""
+    """Return the bindings of a tick with equations and without them, in this order.
+
+    Both contain the delayed values.
+    """
     names = equation_bindings(automaton, "equation.")
     everywhere = add_delay_bindings(
         sampled_delays_of(automaton), {**base_bindings(automaton, "input"), **names}
@@ -93,7 +102,7 @@ def current_bindings(automaton: Automaton) -> tuple[dict[str, Expr], dict[str, E
 def chart_context_of(
     automaton: Automaton, transitions: Iterable[TransitionInfo]
 ) -> ChartContext | None:
-    """Return the chart of an automaton as it is lowered; None where it has none."""
+    """Return the context of the lowering of the automaton's chart; None without nested modes."""
     if automaton.statechart is None:
         return None
     infos = {info.key.partition(" ")[2]: info for info in transitions}

@@ -1,7 +1,7 @@
-"""Parallel: a micro-step of regions side by side - all choose on one snapshot, then all act.
+"""Micro-steps of parallel regions: all select on one snapshot, then all act (rules 3 and 14).
 
-Semantics, rules 3 and 14. An automaton whose chart is its only region does without (`switch` in
-language/integration/vector_field.py): it resets and enters at once.
+An automaton without regions beside its chart uses `lower_single_region_step` of
+language/integration/vector_field.py instead, which resets and enters at once.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ from language.model.region_queries import transitions_by_priority
 
 @dataclass(frozen=True)
 class TransitionSelection:
-    """How a micro-step names what it takes: the variable of a region, and each transition's number.
+    """The names and conditions by which a micro-step selects transitions.
 
-    `enabled` is whether a transition may fire, given the ending of its guard's variables; `moved`
-    is what else happens when it has fired.
+    `selected_variable` gives the variable of a region, `number_of` the number of a transition.
+    `enabled_condition` gives the condition of a transition from the slot of its guard;
+    `after_switch` gives further operations after the transition has switched the mode.
     """
 
     block_prefix: str
@@ -41,9 +42,9 @@ class TransitionSelection:
 
 
 def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
-    """Return `<verb>_<region>_<mode>` of the regions beside the chart, and `commit_<verb>`.
+    """Return `<prefix>_<region>_<mode>` of the parallel regions, and `commit_<prefix>`.
 
-    `verb` keeps those of a run apart from those of the automaton that runs.
+    The prefix of the selection separates the blocks of a run from those of its automaton.
     """
     blocks: dict[str, Block] = {}
     for region in field.automaton.regions:
@@ -56,7 +57,7 @@ def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[
 
 
 def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
-    """Return one micro-step of all regions while a mode of the chart is active."""
+    """Return one micro-step of all regions while `mode` of the chart is active."""
     regions = field.automaton.all_regions
     ops: list[Op] = [
         Assign(selection.selected_variable(region.name), integer(0)) for region in regions
@@ -72,7 +73,7 @@ def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSel
 
 
 def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) -> Block:
-    """The enabled transition with the smallest priority."""
+    """Return the operations that select the enabled transition with the smallest priority."""
     ops: Block = ()
     for k, transition in reversed(transitions_by_priority(mode)):
         number = integer(selection.number_of(transition))
@@ -86,7 +87,10 @@ def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) 
 
 
 def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
-    """What the regions have chosen, stage by stage; `in(...)` is of the source up to the entry."""
+    """Return the actions of the selected transitions: exits, resets, mode changes, entries.
+
+    `in(...)` reads the source modes up to the entries.
+    """
     automaton = field.automaton
     before = _lower_stage(field, selection, lambda way: automaton.source_mode(way).exit)
     resets = _lower_stage(field, selection, lambda way: way.reset)
@@ -111,6 +115,7 @@ def _lower_stage(
     selection: TransitionSelection,
     assignments_of: Callable[[Transition], Mapping[str, Formula]],
 ) -> Block:
+    """Return one stage of the selected transitions of all regions."""
     known, number = all_bindings_at_point(field), selection.number_of
     return lower_stage_of_regions(
         field.automaton, selection.selected_variable, number, assignments_of, known
@@ -118,7 +123,7 @@ def _lower_stage(
 
 
 def _entry_equations(field: VectorField) -> Block:
-    """The equations that entries read, of the new modes and after the reset."""
+    """Return the equations that entries read, evaluated in the new modes after the reset."""
     automaton = field.automaton
     entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
     wanted = names_read(formula.tree for formula in entries)

@@ -1,11 +1,11 @@
-"""Rewind: a transition that comes late is made where its `until` turned true, then carried on.
+"""Transitions with `rewind`: the transition is made at the past crossing of its `until` condition.
 
-`back_<mode>_<place>` looks back from now for the latest tick at which `until` of a transition is
-false: the crossing lies in the tick after it, on the flow of the source from the states and inputs
-that were kept then, located by halvings. The micro-step is made there; the run of the target
-carries the states over the rest of that tick and over each later one. Where `until` was true as far
-back as is kept, or is false now, nothing is taken back and, unless it says otherwise, a fault bit
-is set.
+The block `back_<mode>_<index>` searches backwards for the latest tick at which `until` is false.
+The crossing lies in the tick after it, on the flow of the source from the recorded states and
+inputs, and is located by bisection. The micro-step is made there. The run of the target then
+carries the states over the rest of that tick and over each later tick. If `until` was true in all
+recorded ticks, or is false at present, nothing is rolled back and, unless the spec says otherwise,
+a fault bit is set.
 """
 
 from __future__ import annotations
@@ -56,24 +56,34 @@ from language.model.region_queries import equation_closure, equation_formulas
 from language.programs.model_run import run_block, saturate_moved_states
 
 REWIND_LIMIT = "rewind_limit"
+"""The fault bit of a rewind without a crossing."""
 TICKS_BACK = Ref("work.back", is_integer=True)
-"""How many ticks before now `until` was false, 0: not found."""
+"""The number of ticks since `until` was false; 0 if no such tick was found."""
 LOOKBACK_INDEX = Ref("work.look", is_integer=True)
+"""The index of the loops over recorded ticks."""
 IS_UNTIL_TRUE = Ref("work.until")
+"""The variable of the truth of `until`."""
 REMAINING_TIME = Ref("work.rest")
+"""The time from the crossing to the end of its tick [s]."""
 
 
 def rollback_blocks(automaton: Automaton, mode: Mode, now: NameBindings) -> dict[str, Block]:
-    """Return the blocks of the transitions of a mode that go back; `now` has no equations."""
-    found: dict[str, Block] = {}
-    for rewinding in rollbacks_from(automaton, mode):
-        found[f"until_{rewinding.block_suffix}"] = _until_block(rewinding, now)
-        found[f"back_{rewinding.block_suffix}"] = _rollback_block(rewinding, now)
-    return found
+    """Return the blocks `until_<...>` and `back_<...>` of a mode's transitions with `rewind`.
+
+    `now` are the bindings without equations.
+    """
+    blocks: dict[str, Block] = {}
+    for rollback in rollbacks_from(automaton, mode):
+        blocks[f"until_{rollback.block_suffix}"] = _until_block(rollback, now)
+        blocks[f"back_{rollback.block_suffix}"] = _rollback_block(rollback, now)
+    return blocks
 
 
 def advance_blocks(automaton: Automaton, mode: Mode) -> dict[str, Block]:
-    """Return `run_<mode>`: its period; of what a rewind enters also `rest_<mode>`, a part of it."""
+    """Return the block `run_<mode>` of a mode's run over a period; empty without a run.
+
+    A target of a rewind gets a block `rest_<mode>` too, a run over `work.rest`.
+    """
     if mode.run is None:
         return {}
     if mode.name not in rollback_targets(automaton):
@@ -87,7 +97,7 @@ def advance_blocks(automaton: Automaton, mode: Mode) -> dict[str, Block]:
 
 
 def rollback_bindings(automaton: Automaton, now: NameBindings) -> dict[str, Expr]:
-    """Return what names are where the micro-step is made, apart from equations."""
+    """Return the bindings at the crossing: recorded inputs replace the present ones."""
     return {
         **now,
         **{name: recorded_input_ref(automaton, name) for name in recorded_inputs(automaton)},
@@ -95,14 +105,17 @@ def rollback_bindings(automaton: Automaton, now: NameBindings) -> dict[str, Expr
 
 
 def rollback_equation_bindings(rollback: Rollback) -> dict[str, Expr]:
-    """Return the equations that exit and reset read, as they are there."""
+    """Return the variables of the equations at the crossing that exit and reset read."""
     known = equation_formulas(rollback.source)
     names = equation_closure(rollback.source, rollback.names_read_by_jump)
     return {name: Ref(f"work.past_{name}", known[name][0].is_integer) for name in names}
 
 
 def advance_from_crossing(rollback: Rollback) -> Block:
-    """Return what the target's run does from the crossing to now."""
+    """Return the operations that run the target from the crossing to the present.
+
+    If nothing was rolled back they do nothing.
+    """
     automaton = rollback.automaton
     target = automaton.target_mode(rollback.transition)
     ops: list[Op] = []
@@ -123,7 +136,7 @@ def advance_from_crossing(rollback: Rollback) -> Block:
 
 
 def rollback_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of all of it; `finished` leaves out what is not used."""
+    """Return the variables of rollbacks; `finalise_program` removes the unused ones."""
     return [
         *tick_history_variables(automaton),
         Variable(TICKS_BACK.name, "whole"),
@@ -137,7 +150,7 @@ def rollback_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _until_block(rollback: Rollback, now: NameBindings) -> Block:
-    """Whether `until` holds at `work.at_<state>` with the inputs `work.past_<input>`."""
+    """Return the block that evaluates `until` at `work.at_<state>` with `work.past_<input>`."""
     known = rollback_bindings(rollback.automaton, now)
     known.update({name: Ref(f"work.at_{name}") for name in rolled_back_states(rollback.automaton)})
     until, prefix = rollback.rewind.until, f"{rollback.automaton.name} "
@@ -149,7 +162,10 @@ def _until_block(rollback: Rollback, now: NameBindings) -> Block:
 
 
 def _rollback_block(rollback: Rollback, now: NameBindings) -> Block:
-    """Go back to where the micro-step is made, and evaluate what its exit and reset read there."""
+    """Return the block that moves the states to the crossing and evaluates equations there.
+
+    The equations are those that the exit and the reset of the transition read.
+    """
     automaton = rollback.automaton
     fault: Block = (FaultBit(REWIND_LIMIT),) if rollback.rewind.is_fault else ()
     limit: Block = (*fault, *load_current_inputs(automaton, "past"))
@@ -165,7 +181,10 @@ def _rollback_block(rollback: Rollback, now: NameBindings) -> Block:
 
 
 def _search_crossing_tick(rollback: Rollback) -> Block:
-    """From now backwards to the latest tick at which `until` is false."""
+    """Return the search from the present backwards for the latest tick with `until` false.
+
+    `work.back` becomes the number of ticks back, 0 if none is found or `until` is false at present.
+    """
     automaton, until = rollback.automaton, RunBlock(f"until_{rollback.block_suffix}")
     is_wanted = Binary(
         "and", Compare("==", TICKS_BACK, integer(0)), Compare("<", LOOKBACK_INDEX, HISTORY_LENGTH)
@@ -185,7 +204,7 @@ def _search_crossing_tick(rollback: Rollback) -> Block:
 
 
 def _locate_crossing(rollback: Rollback) -> Block:
-    """The point is at the tick before the crossing: put the states at the crossing."""
+    """Return the operations that set the states to the crossing after the tick found."""
     automaton = rollback.automaton
     ring = (
         *set_history_index(automaton, subtract(TICKS_BACK, integer(2))),
@@ -204,8 +223,10 @@ def _locate_crossing(rollback: Rollback) -> Block:
 
 
 def _saturate_at_crossing(rollback: Rollback, flow: str) -> tuple[Block, Block]:
-    """Return what stands before and after the states are put at the crossing: what moves there is
-    held as after a segment of a run (rule 18), what rests is what it was at a tick.
+    """Return the operations before and after the states are set to the crossing.
+
+    They hold the states that vary in the flow in their ranges, as after a segment of a run (rule
+    18).
     """
     automaton = rollback.automaton
     run = automaton.target_mode(rollback.transition).run
@@ -214,7 +235,10 @@ def _saturate_at_crossing(rollback: Rollback, flow: str) -> tuple[Block, Block]:
 
 
 def _use_tick_after(automaton: Automaton) -> list[Op]:
-    """The crossing is the tick itself: no flow leads to it, or a correction made it."""
+    """Return the operations that make the tick after the one found the crossing.
+
+    They apply if no flow leads to the crossing, or if a correction of the observer caused it.
+    """
     ops: list[Op] = [
         Assign(f"work.at_{name}", Ref(f"work.after_{name}"))
         for name in rolled_back_states(automaton)
@@ -230,7 +254,7 @@ def _use_tick_after(automaton: Automaton) -> list[Op]:
 
 
 def _flow_to_crossing(rollback: Rollback) -> list[Op]:
-    """One step of the flow of the source from the tick before; where it crosses, halve it."""
+    """Return one step of the flow of the source and, if `until` crosses in it, the bisection."""
     automaton = rollback.automaton
     assert automaton.period is not None
     names = rolled_back_states(automaton)
@@ -248,7 +272,10 @@ def _flow_to_crossing(rollback: Rollback) -> list[Op]:
 
 
 def _bisect_crossing(rollback: Rollback) -> list[Op]:
-    """Halve (low, high]: `until` holds at high, not at low; the upper end is kept."""
+    """Return the operations that halve (low, high]: `until` holds at high and not at low.
+
+    The upper end is taken; `work.rest` becomes the time from there to the end of the tick.
+    """
     low, high = Ref("work.low"), Ref("work.high")
     names = rolled_back_states(rollback.automaton)
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in names]
@@ -272,7 +299,7 @@ def _bisect_crossing(rollback: Rollback) -> list[Op]:
 
 
 def _set_run_inputs(automaton: Automaton) -> list[Op]:
-    """Put the inputs of the point where runs read those of the tick before."""
+    """Return the operations that copy the inputs at the crossing to `before.<name>` for runs."""
     return [
         Assign(f"before.{name}", recorded_input_ref(automaton, name))
         for name in run_inputs(automaton)

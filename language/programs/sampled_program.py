@@ -1,9 +1,9 @@
-"""Sampled: a ticking automaton as a Program - latch, advance, jump, update (rule 2).
+"""Lowering of a sampled automaton to a Program (rule 2).
 
-Blocks: `init` (before the first tick), `step` (one tick) and what they run:
-`start`, `predict_<mode>`, `correct_<mode>`, `run_<mode>` (the advance), `equations_<mode>`,
-`jump_<mode>`, `keep` (delayed values), `update_<mode>`, `remember`; the blocks of a run are those
-of its model's field.
+Blocks: `init` (before the first tick), `step` (one tick) and the blocks that these run: `latch`,
+`start`, `predict_<mode>`, `correct_<mode>` and `run_<mode>` (the advance), `equations_<mode>`,
+`decide` (truth tables), `jump_<mode>`, `keep` (delayed values and history), `update_<mode>` and
+`remember`. A run adds the blocks of the vector field of its model.
 """
 
 from __future__ import annotations
@@ -66,10 +66,11 @@ from language.programs.tick import reset_innovations, run_region_block_by_mode, 
 from language.text.diagnostic import Problems
 
 SET_STARTED = Assign("memory.started", Value(True))
+"""The assignment that marks the first tick as done."""
 
 
 def lower_sampled_automaton(automaton: Automaton, problems: Problems) -> Program:
-    """Return the Program of a checked sampled automaton. Raises SpecError."""
+    """Return the Program of a checked sampled automaton; SpecError if a problem is reported."""
     builder = _SampledLowering(automaton, problems)
     program = builder.build()
     problems.raise_if_errors()
@@ -77,7 +78,7 @@ def lower_sampled_automaton(automaton: Automaton, problems: Problems) -> Program
 
 
 class _SampledLowering:
-    """Builds the blocks; one method per phase of the tick."""
+    """Builder of the blocks of a sampled automaton, with one method for each phase of the tick."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
         automaton = add_fault_transitions(automaton)
@@ -103,6 +104,7 @@ class _SampledLowering:
             self.faults.append(MICRO_STEP_LIMIT_FAULT)
 
     def build(self) -> Program:
+        """Return the Program; SpecError if a problem was reported before its assembly."""
         automaton = self.automaton
         modes = automaton.modes.values()
         blocks: dict[str, Block] = {}
@@ -143,7 +145,7 @@ class _SampledLowering:
         )
 
     def _mode_blocks(self, mode: Mode) -> dict[str, Block]:
-        """Equations, jump and update of one mode."""
+        """Return the blocks of one mode: equations, rollbacks, jump, update and store."""
         found: dict[str, Block] = {}
         if mode.region == CHART:
             ops = lower_equations(mode, dict(self.base_bindings), "equation.", self.prefix)
@@ -161,7 +163,7 @@ class _SampledLowering:
         return found
 
     def _entry_point_blocks(self) -> dict[str, Block]:
-        """What is run from outside, and what these run whatever the mode."""
+        """Return the blocks that are run from outside or in every tick."""
         inputs = self.automaton.inputs
         stamps = calibration_stamps(self.automaton, self.constants, self.parameters, self.problems)
         self.constants += stamps
@@ -184,23 +186,24 @@ class _SampledLowering:
         }
 
     def _run_mode_infos(self) -> tuple[ModeInfo, ...]:
+        """Return the modes of the model with their numbers."""
         assert self.automaton.model
         return tuple(ModeInfo(m.name, m.number) for m in self.automaton.model.modes.values())
 
     def _advance_blocks(self, mode: Mode) -> dict[str, Block]:
-        """What carries the states from the tick before to this one."""
+        """Return the blocks of a mode's run and observer, which advance the states by a period."""
         found: dict[str, Block] = {}
         if mode.run:
             if mode.run.follow and EVENT_LIMIT not in self.faults:
                 self.faults.append(EVENT_LIMIT)
             found.update(advance_blocks(self.automaton, mode))
         if mode.observer:
-            make = (
+            lower_observer = (
                 lower_recursive_observer
                 if mode.observer.gain == "recursive"
                 else lower_steady_observer
             )
-            made = make(
+            observer = lower_observer(
                 self.automaton,
                 mode,
                 self.previous_bindings,
@@ -208,31 +211,34 @@ class _SampledLowering:
                 self.values,
                 self.problems,
             )
-            if made is None:
+            if observer is None:
                 return {}
-            self.observers[mode.name] = made
-            self.constants += made.constants
-            found.update(made.covariance_blocks)
-            found[f"predict_{mode.name}"] = made.predict
-            found[f"correct_{mode.name}"] = made.correct
-            if made.entry_covariance:
-                found[f"cover_{mode.name}"] = made.entry_covariance
+            self.observers[mode.name] = observer
+            self.constants += observer.constants
+            found.update(observer.covariance_blocks)
+            found[f"predict_{mode.name}"] = observer.predict
+            found[f"correct_{mode.name}"] = observer.correct
+            if observer.entry_covariance:
+                found[f"cover_{mode.name}"] = observer.entry_covariance
             if mode.observer.variance_limits and COVARIANCE_RANGE not in self.faults:
                 self.faults.append(COVARIANCE_RANGE)
         return found
 
     def _update_block(self, mode: Mode) -> Block:
-        """The assignments of an update read the values of before this tick's updates."""
+        """Return the update of a mode, which reads the values before this tick's updates (rule 2b).
+
+        With parallel regions the values are stored by the block `store_<mode>`.
+        """
         known = {**self.base_bindings, **equation_bindings(self.automaton, "equation.")}
         ops = read_stage(self.automaton, mode.update, known, "next")
         return (*ops, *(() if self.automaton.regions else self._store_block(mode)))
 
     def _store_block(self, mode: Mode) -> Block:
-        """What an update computed, committed together."""
+        """Return the operations that store the results of a mode's update."""
         return tuple(commit_stage(self.automaton, mode.update, "next"))
 
     def _start_block(self) -> Block:
-        """The first tick: start values, the initial mode, no advance, only the correction."""
+        """Return the first tick: start values, initial modes, entries, correction (rule 2b)."""
         initial = self.automaton.modes[self.automaton.initial]
         ops = lower_initial_values(self.automaton, self.base_bindings, self.prefix)
         ops += enter_initial_modes(self.automaton, "memory.mode")
@@ -259,6 +265,7 @@ class _SampledLowering:
         return tuple(ops)
 
     def _initial_entries(self, initial: Mode) -> Block:
+        """Return the entry actions of the initial modes."""
         automaton = self.automaton
         if automaton.statechart:
             return lower_initial_entries(automaton, automaton.statechart, self.base_bindings)
@@ -267,7 +274,7 @@ class _SampledLowering:
         )
 
     def _init_block(self, has_stamps: bool) -> Block:
-        """Before the first tick: nothing has started (rule 16a)."""
+        """Return the block `init`, which states that nothing has started (rule 16a)."""
         ops: list[Op] = [
             *((Assign("memory.started", Value(False)),) if self._has_start_block() else ()),
             *enter_initial_modes(self.automaton, "memory.mode"),
@@ -278,24 +285,26 @@ class _SampledLowering:
         return (*ops, RunBlock(COMPARE_STAMPS)) if has_stamps else tuple(ops)
 
     def _step_block(self) -> Block:
+        """Return the block `step`."""
         carried = {mode.name: self._advance_of_mode(mode) for mode in self.automaton.modes.values()}
         silent = {name: reset_innovations(self.observers, name) for name in self.automaton.modes}
         keeps = bool(self._keep_block())
         return tick_block(self.automaton, carried, silent, keeps, self._has_start_block())
 
     def _has_start_block(self) -> bool:
-        """Tell whether the first tick does more than `init` has done, or later ones advance."""
+        """Return whether the first tick differs from `init` or later ticks have an advance."""
         entered = (*enter_initial_modes(self.automaton, "memory.mode"), SET_STARTED)
         return self._start_block() != entered or any(
             map(self._advance_of_mode, self.automaton.modes.values())
         )
 
     def _keep_block(self) -> Block:
-        """What is kept of a tick once it has jumped."""
+        """Return the operations that record delays, timers and history after the jump."""
         delayed = record_delays_block(self.automaton, self.delays, self.bindings)
         return (*delayed, *count_ticks(self.automaton), *record_tick_history(self.automaton))
 
     def _advance_of_mode(self, mode: Mode) -> Block:
+        """Return the operations that run the advance of a mode; empty without observer and run."""
         if mode.name in self.observers:
             return (RunBlock(f"predict_{mode.name}"), RunBlock(f"correct_{mode.name}"))
         return (RunBlock(f"run_{mode.name}"),) if mode.run else ()

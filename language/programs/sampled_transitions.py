@@ -41,10 +41,11 @@ def lower_sampled_jump(
     infos: tuple[TransitionInfo, ...],
     now: Mapping[str, Expr],
 ) -> Block:
-    """Return the jump of a tick: wait counters, then one transition (rules 3 and 4).
+    """Return the jump of a mode: edges, wait counters, then at most one transition (rules 3 and 4).
 
-    The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
-    run in parallel, it only chooses: what that does is left to `sampled_commit` (rule 14).
+    The first tick with a true guard counts 1, so a wait of N ticks is over when the counter exceeds
+    N. With parallel regions the jump selects only; `lower_sampled_commit` performs the actions
+    (rule 14).
     """
     everywhere = {**now, **equation_bindings(automaton, "equation.")}
     edges = detect_edges(automaton, mode, everywhere)
@@ -73,27 +74,29 @@ def _lower_transition(
     bindings: tuple[Mapping[str, Expr], Mapping[str, Expr]],
     fired_ops: list[Op],
 ) -> list[Op]:
-    """Return what a transition does that nothing else fires beside; it may go back for that.
+    """Return the actions of a transition in an automaton without parallel regions (rule 6).
 
-    `bindings` are those of now, without equations and with them.
+    A transition with `rewind` goes back to the crossing first and advances to the present
+    afterwards. `bindings` are the present ones, without equations and with them.
     """
     source, target = automaton.source_mode(transition), automaton.target_mode(transition)
     now, known = bindings
-    back: list[Op] = []
-    on: Block = ()
+    go_back: list[Op] = []
+    advance: Block = ()
     if transition.rewind:
-        rewinding = Rollback(automaton, source, transition, transition.rewind)
+        rollback = Rollback(automaton, source, transition, transition.rewind)
         now = rollback_bindings(automaton, now)
-        known = {**now, **rollback_equation_bindings(rewinding)}
-        back, on = [RunBlock(f"back_{rewinding.block_suffix}")], advance_from_crossing(rewinding)
+        known = {**now, **rollback_equation_bindings(rollback)}
+        go_back = [RunBlock(f"back_{rollback.block_suffix}")]
+        advance = advance_from_crossing(rollback)
     return [
-        *back,
+        *go_back,
         *_lower_exit_and_reset(automaton, source, transition, known),
         *_switch_mode(automaton, transition, infos),
         *fired_ops,
         *start_run(automaton, target),
         *lower_entry(automaton, target, target.entry, now),
-        *on,
+        *advance,
     ]
 
 
@@ -103,9 +106,10 @@ def lower_sampled_commit(
     now: Mapping[str, Expr],
     evaluate_equations: Op,
 ) -> Block:
-    """Return what the transitions do that the regions have chosen, stage by stage (rule 6).
+    """Return the actions of the transitions that the regions have selected (rule 6).
 
-    Each stage of all regions reads one snapshot; `evaluate_equations` evaluates the equations of the new modes.
+    Each stage of all regions reads one snapshot. `evaluate_equations` evaluates the equations of
+    the new modes; it runs before the entries if one of them reads an equation.
     """
     numbers = {info.key: info.number for info in infos}
 
@@ -135,6 +139,7 @@ def lower_sampled_commit(
 def _enter_target(
     automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
 ) -> Block:
+    """Return the operations of a transition that switch the mode and start a run."""
     return (
         *_switch_mode(automaton, transition, infos),
         *start_run(automaton, automaton.target_mode(transition)),
@@ -142,6 +147,7 @@ def _enter_target(
 
 
 def _do_entries_read_equations(automaton: Automaton) -> bool:
+    """Return whether an entry action of any mode reads an equation."""
     named = equation_bindings(automaton, "equation.")
     entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
     return any(name in named for name in names_read(formula.tree for formula in entries))
@@ -150,7 +156,7 @@ def _do_entries_read_equations(automaton: Automaton) -> bool:
 def _lower_exit_and_reset(
     automaton: Automaton, mode: Mode, transition: Transition, known: Mapping[str, Expr]
 ) -> list[Op]:
-    """Exit, then reset (rule 6), each committed before the next reads."""
+    """Return the exit and then the reset of a transition, each as a stage (rule 6)."""
     return [
         *lower_stage(automaton, mode.exit, known),
         *lower_stage(automaton, transition.reset, known),
@@ -160,10 +166,10 @@ def _lower_exit_and_reset(
 def _switch_mode(
     automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
 ) -> list[Op]:
-    """The counters of the source end; the target is entered.
+    """Return the operations that clear counters, reset the activation memory and set the mode.
 
-    Those of a mode that some transition enters with `memory: continue` outlive it, and end where
-    another one enters it (rule 4).
+    A mode that some transition enters with `memory: continue` keeps its counters when it is left;
+    they are cleared when another transition enters it (rule 4b).
     """
     source, target = automaton.source_mode(transition), automaton.target_mode(transition)
     ending = [] if _keeps_timers(automaton, source) else [*infos_of_mode(automaton, source, infos)]
@@ -177,11 +183,12 @@ def _switch_mode(
 
 
 def _keeps_timers(automaton: Automaton, mode: Mode) -> bool:
-    """Tell whether some transition enters a mode with its counters as they were."""
+    """Return whether some transition enters a mode with `memory: continue`."""
     return (mode.region, mode.name) in _timer_keeping_targets(automaton)
 
 
 @cache_on_owner
 def _timer_keeping_targets(automaton: Automaton) -> frozenset[tuple[str, str]]:
+    """Return the (region, mode) pairs that transitions with `memory: continue` enter."""
     ways = [way for mode in automaton.all_modes for way in mode.transitions]
     return frozenset((way.region, way.target) for way in ways if way.memory == "continue")

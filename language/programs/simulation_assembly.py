@@ -1,6 +1,6 @@
-"""Assembly: the instances of a system with all that is between them, as one thing to compile.
+"""Assembly of a system for compilation: the Programs of its instances and their connections.
 
-What is known before a run is not in it: instants, inputs, noise (engine/batch/run_plan.py).
+Instants, inputs and noise of a run are not part of it (engine/batch/run_plan.py).
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ from language.ir.program import Constant, Program, Variable, unqualified_name
 from language.model.system import Sensor
 
 RANGE_TOLERANCE = 1e-9
-"""Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
-on that bound is located within, over ten digits above the rounding of a double."""
+"""The part of a range's width by which a state may pass a bound without an event (rule 18c).
+
+A crossing of a guard at that bound is located within it, and it is more than ten digits above the
+rounding of a double.
+"""
 
 
 @dataclass(frozen=True)
 class InputSource:
-    """What sets an input of an instance: a signal, a number, or a block of the wires.
+    """The source of an input of an instance: a signal, a number or a block of the wires Program.
 
-    `is_limited`: a value that is not finite is held in the range of the input.
+    `has_saturation` tells whether a value that is not finite is held in the range of the input.
+    `sensors` are the sensors whose samples the input depends on.
     """
 
     variable: Variable
@@ -35,7 +39,7 @@ class InputSource:
 
 @dataclass(frozen=True)
 class RecordedSignal:
-    """A recorded signal, or a block of the wires."""
+    """A column of the recording: a signal or the value of a block of the wires Program."""
 
     name: str
     source: str
@@ -44,9 +48,9 @@ class RecordedSignal:
 
 @dataclass(frozen=True)
 class InputTrajectory:
-    """An input that changes between the instants, `delay` [s] late where it is a delayed one.
+    """An input that changes between instants; `delay` [s] is that of a delayed input.
 
-    `formulas` are the pieces that are formulas of time, by number, with their block of the wires.
+    `formulas` are the pieces that are formulas of time, as pairs of number and block of the wires.
     """
 
     name: str
@@ -56,10 +60,11 @@ class InputTrajectory:
 
 @dataclass(frozen=True)
 class SimulationAssembly:
-    """Instances with their Programs, `order` of all that ticks or samples, and what they read.
+    """The instances of a system with their Programs, connections, sensors and recorded columns.
 
-    `inputs` are the system's, delayed ones among them; `controlled` are the continuous instances
-    whose first inputs are those after tick 0; `slots` are the signals that rows are made of.
+    `order` is the order of all instances and sensors that act at instants. `inputs` are those of
+    the system, delayed ones included. `row_signals` are the signals from which rows are computed.
+    `controlled` are the continuous instances whose first inputs are those after tick 0.
     """
 
     programs: Mapping[str, Program]
@@ -75,12 +80,12 @@ class SimulationAssembly:
 
     @property
     def continuous_instances(self) -> tuple[str, ...]:
-        """The continuous instances."""
+        """The names of the continuous instances."""
         return tuple(name for name, program in self.programs.items() if program.period is None)
 
     @property
     def instant_actions(self) -> tuple[str, ...]:
-        """What happens at an instant, by bit: ticks, samples, captures of sensors."""
+        """The actions at an instant, by bit: ticks, sensor samples, captures of delayed sensors."""
         ticks = [
             name
             for name in self.order
@@ -90,7 +95,7 @@ class SimulationAssembly:
         return (*ticks, *self.sensors, *late)
 
     def digest(self) -> str:
-        """Return a digest of all that is printed of it."""
+        """Return the SHA-256 digest of everything that determines the printed code."""
         programs = [(name, digest(program)) for name, program in self.programs.items()]
         rest = (self.order, self.inputs, self.input_sources, self.row_signals, self.columns)
         more = (sorted(self.controlled), list(self.sensors.items()), digest(self.wires))
@@ -98,15 +103,20 @@ class SimulationAssembly:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def tunables(self) -> Iterator[tuple[str, Constant]]:
-        """Yield the numbers that a variant may change, in the order of its values."""
+        """Yield the instance and the constant of each real tunable scalar.
+
+        Their order is that of the values of a variant.
+        """
         for name, program in self.programs.items():
             for constant in program.constants:
                 if constant.kind == "tunable" and constant.type == "real" and not constant.items:
                     yield name, constant
 
     def first_event_numbers(self) -> dict[str, int]:
-        """Return where the events of each instance begin: its transitions, then its ranges,
-        then its invariants."""
+        """Return the number of the first event of each instance.
+
+        The events of an instance are its transitions, then its ranges, then its invariants.
+        """
         found, count = {}, 0
         for name, program in self.programs.items():
             found[name] = count
@@ -119,15 +129,15 @@ class SimulationAssembly:
 
 
 def range_event_variables(program: Program) -> tuple[Variable, ...]:
-    """Return the variables whose leaving of a range is an event: those of a continuous Program."""
+    """Return the variables with a range whose violation is an event (rule 18c)."""
     return tuple(v for v in program.variables if v.range is not None)
 
 
 def output_variables(program: Program) -> dict[str, str]:
-    """Return the variable that holds each output."""
+    """Return the variable of each output by the name of the output."""
     return {wire.name: wire.source for wire in program.outputs}
 
 
 def input_name(source: InputSource) -> str:
-    """Return the name of the input that a feed sets."""
+    """Return the name of the input that a source sets."""
     return unqualified_name(source.variable.name)

@@ -1,4 +1,4 @@
-"""Numbers text: what was solved or bounded for a Program - its method, its limits, its gains."""
+"""Report of the solved numbers of a Program: integration method, stability limits, observers."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from language.ir.operation_count import max_operations
 from language.ir.program import IntegrationInfo, ObserverInfo, Program
 
 MATRIX_COLUMNS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
-"""Matrices of an observer that are shown, and what their columns are."""
+"""The matrices of an observer in the report, and the attribute that names their columns."""
 
 
 def format_solved_numbers(program: Program) -> str:
-    """Return the method of a run or flow with K, |A h|, limits, work; matrices of observers."""
+    """Return the text of the report.
+
+    It gives the method, |A h|, stability limits and the bound of work of a run or flow, the longest
+    tick, and the matrices of the observers.
+    """
     lines = [f"program {program.name}"]
     if program.integration:
         lines += format_method_lines(program.integration)
@@ -29,7 +33,7 @@ def format_solved_numbers(program: Program) -> str:
 
 
 def format_method_lines(motion: IntegrationInfo) -> Iterator[str]:
-    """Yield the method, |A h| of each mode and the largest stable step of each mode."""
+    """Yield lines for the method, |A h| of each mode and the largest stable step of each mode."""
     yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.series_terms}"
     for mode, norm in motion.norms.items():
         yield f"  mode {mode}: |A h| = {norm:.4g}, at most 4"
@@ -43,19 +47,23 @@ def format_method_lines(motion: IntegrationInfo) -> Iterator[str]:
 
 
 def _format_work_lines(program: Program, motion: IntegrationInfo) -> Iterator[str]:
-    """K products by A, then halvings that evaluate the polynomials: once for each event."""
+    """Yield the bound of work for the events of a run inside a tick; nothing without events.
+
+    Each event takes a Taylor sum of K products by A, then bisections that evaluate K terms.
+    """
     if program.period is None or not motion.max_events:
         return
     n = motion.state_count
     once = motion.series_terms * n * n + RUN_BISECTIONS * motion.series_terms * n
     yield (
-        f"  work: at most {motion.max_events} events per substep, {motion.max_events * once} products and "
+        f"  work: at most {motion.max_events} events per substep, "
+        f"{motion.max_events * once} products and "
         f"{motion.max_events * RUN_BISECTIONS} looks at the guards"
     )
 
 
 def _format_rewind_lines(program: Program) -> Iterator[str]:
-    """What a transition that goes back does at most in its tick."""
+    """Yield the bound of work of each transition with `rewind` in its tick."""
     for info in program.transitions:
         if info.rewind_ticks:
             way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
@@ -67,6 +75,7 @@ def _format_rewind_lines(program: Program) -> Iterator[str]:
 
 
 def _format_observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:
+    """Yield the matrices of an observer, one line for each row; matrices of zeros are left out."""
     yield f"observer of mode {observer.mode}: gain {observer.gain}"
     values = {constant.name: constant.value for constant in program.constants}
     for letter, what in MATRIX_COLUMNS.items():

@@ -1,4 +1,4 @@
-"""Tick: what a sampled automaton does at once - latch, advance, jump, update (rule 2)."""
+"""The tick of a sampled automaton: latch, advance, jump, update (rule 2)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ def tick_block(
     has_keep_block: bool,
     has_start_block: bool,
 ) -> Block:
-    """Return `step`: `advance_blocks` is the advance of each mode of the chart, `innovation_resets` what is set
-    before it: innovations that it does not set are 0. `has_keep_block` tells whether delays do, `has_start_block`
-    whether the first tick is another one than those after it.
+    """Return the block `step`.
+
+    `advance_blocks` are the advances by mode of the chart; `innovation_resets` set the innovations
+    to 0 that an advance may leave unset. `has_keep_block` tells whether a block `keep` records
+    delays and history, `has_start_block` whether the first tick runs `start` instead of an advance.
     """
     ops: list[Op] = clear_fired(automaton)
     ops += [
@@ -45,19 +47,22 @@ def tick_block(
 
 
 def reset_innovations(observers: Mapping[str, LoweredObserver], mode: str) -> Block:
-    """Return what sets the innovations to 0 that a mode does not set whenever it corrects."""
-    found = dict.fromkeys(name for one in observers.values() for name in one.info.measures)
+    """Return the assignments of 0 to the innovations that the correction of a mode may not set."""
+    measures = dict.fromkeys(name for each in observers.values() for name in each.info.measures)
     correct = observers[mode].correct if mode in observers else ()
-    sure = {op.target for op in correct if isinstance(op, Assign)}
-    names = (f"innovation.{name}" for name in found)
-    return tuple(Assign(name, real(0.0)) for name in names if name not in sure)
+    always_set = {op.target for op in correct if isinstance(op, Assign)}
+    names = (f"innovation.{name}" for name in measures)
+    return tuple(Assign(name, real(0.0)) for name in names if name not in always_set)
 
 
 def run_region_block_by_mode(region: Region, block_prefix: str) -> Switch:
-    """Return the choice of a block by the mode of a region."""
+    """Return a Switch over the mode of a region that runs `<block_prefix>_<mode>`.
+
+    For `update` and `store`, modes without an update are left out.
+    """
     modes = region.modes.values()
-    wanted = [mode for mode in modes if block_prefix not in ("update", "store") or mode.update]
-    cases = tuple((mode.number, (RunBlock(f"{block_prefix}_{mode.label}"),)) for mode in wanted)
+    targets = [mode for mode in modes if block_prefix not in ("update", "store") or mode.update]
+    cases = tuple((mode.number, (RunBlock(f"{block_prefix}_{mode.label}"),)) for mode in targets)
     return Switch(mode_variable("memory.mode", region.name), cases)
 
 
@@ -66,6 +71,7 @@ def _advance_block(
     advance_blocks: Mapping[str, Block],
     innovation_resets: Mapping[str, Block],
 ) -> Block:
+    """Return a Switch over the mode that resets innovations and advances; empty without any."""
     done = {
         m.number: (*innovation_resets[m.name], *advance_blocks[m.name])
         for m in automaton.modes.values()
@@ -75,7 +81,10 @@ def _advance_block(
 
 
 def _jump_block(automaton: Automaton) -> Block:
-    """Guards read the equations after the advance; a transition makes them anew."""
+    """Return the jump: equations, truth tables, fault request, transitions.
+
+    Guards read the equations after the advance; a fired transition evaluates them again.
+    """
     equations = run_region_block_by_mode(automaton.root_region, "equations")
     ops: list[Op] = [equations]
     if automaton.tables:
@@ -93,6 +102,10 @@ def _jump_block(automaton: Automaton) -> Block:
 
 
 def _update_block(automaton: Automaton) -> Block:
+    """Return the updates of all regions.
+
+    With parallel regions all updates are evaluated before the first one is stored.
+    """
     regions = automaton.all_regions
     updated = [r for r in regions if any(mode.update for mode in r.modes.values())]
     ops: list[Op] = [run_region_block_by_mode(region, "update") for region in updated]
