@@ -1,1 +1,1 @@
-"""Interprets a Program: micro-steps, crossings, scenarios, trajectories."""
+"""Engine: interprets Programs and simulates systems, with located events and recordings."""

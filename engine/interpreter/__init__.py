@@ -1,1 +1,1 @@
-"""Interpretation of a Program: blocks, statements and expressions as closures."""
+"""Interpreter: executes Programs by closures for blocks, statements and expressions."""

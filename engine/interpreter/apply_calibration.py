@@ -1,4 +1,4 @@
-"""Page: a change of the calibration of one running Program."""
+"""Calibration during a run: sets tunable parameters of one running Program."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from language.ir.number_type import round_to_type
 from language.ir.program import Program
 
 DERIVE_BLOCKS = ("derive", "compare_stamps")
-"""What runs after a change, as `X_Calibrate` does in C."""
+"""Blocks that run after a change of parameters, as in `X_Calibrate` of the C code."""
 
 
 def calibrate(stepper: Stepper, program: Program, values: Mapping[str, Fraction]) -> bool:
-    """Set tunable parameters, derive what follows, compare stamps; tell whether one is used."""
-    used = {f"calibration.{name}": value for name, value in values.items()}
+    """Set tunable parameters and run the derive blocks; return whether the Program has any of them.
+
+    Values are rounded to the number type; parameters that the Program lacks are ignored.
+    """
     known = {constant.name for constant in program.constants}
+    used = {f"calibration.{name}": value for name, value in values.items()}
     used = {name: value for name, value in used.items() if name in known}
     for name, value in used.items():
         stepper.set(name, round_to_type(value, program.number_type))

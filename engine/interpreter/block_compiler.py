@@ -1,4 +1,7 @@
-"""Closures: the blocks of a Program as Python functions over one frame of values."""
+"""Block compiler: compiles the blocks of a Program to Python closures over one frame.
+
+Constant subexpressions are evaluated once, with the arithmetic of the number type.
+"""
 
 from __future__ import annotations
 
@@ -32,24 +35,33 @@ from language.ir.ops import (
     Value,
 )
 from language.ir.program import Function, Program
-from language.ir.traversal import expr_names, substitute_variable
+from language.ir.traversal import (
+    block_names,
+    expr_names,
+    subexpressions,
+    substitute_variable,
+)
 from language.numerics.evaluate import BINARY_OPERATIONS
 
 MAX_FUSED_ASSIGNMENTS = 4
-"""Most assignments in one function (engine/interpreter/statement_closures.py)."""
+"""Largest number of assignments in one closure (engine/interpreter/statement_closures.py)."""
 MAX_UNROLLED_TURNS = 8
-"""Loops of at most so many turns have a copy of their body for each: indices become constants."""
+"""Largest number of turns of a loop that is unrolled, so that its indices become constants."""
 
 
 class _InnerOperation(NamedTuple):
-    """An operation inside another: both operators, and its slots."""
+    """Operation on two slots inside another one: outer and inner operator, and the slots."""
 
     operators: tuple[str, str]
     slots: tuple[int, int]
 
 
 class BlockCompiler:
-    """From operations to closures; constant parts are evaluated once, with the same operations."""
+    """Compiler of the blocks and functions of one Program.
+
+    `blocks` has the closures by name, `scope` the layout of the frame, `reals` the names of real
+    variables and constants.
+    """
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -70,7 +82,10 @@ class BlockCompiler:
         self.blocks = {name: self._compile_named_block(name) for name in program.blocks}
 
     def _compile_function(self, function: Function) -> Callable[..., Any]:
-        """Return a function of Python: its frame is its arguments, then its own variables."""
+        """Return a Python function of a function of the Program.
+
+        Its frame has the arguments, then `work.y` for the result, then its local variables.
+        """
         names = _local_names(function)
         outer = self.scope
         self.scope = FrameLayout(
@@ -89,11 +104,13 @@ class BlockCompiler:
         return call
 
     def _compile_named_block(self, name: str) -> StatementClosure:
+        """Return the closure of a block of the Program, compiled once."""
         if name not in self._done:
             self._done[name] = self._compile_block(self.program.blocks[name])
         return self._done[name]
 
     def _compile_block(self, block: Block) -> StatementClosure:
+        """Return the closure of operations; consecutive assignments are fused."""
         statements: list[StatementClosure] = []
         pending: list[Assign] = []
         for op in block:
@@ -109,13 +126,17 @@ class BlockCompiler:
         )
 
     def _can_fuse(self, pending: Sequence[Assign], op: Assign) -> bool:
-        """Tell whether an assignment is done in one function with those before it."""
+        """Return whether an assignment joins the previous ones in one closure.
+
+        Copies of slots and other assignments are not mixed.
+        """
         alike = (self._operand_slot(pending[-1].value) is None) == (
             self._operand_slot(op.value) is None
         )
         return alike and len(pending) < MAX_FUSED_ASSIGNMENTS
 
     def _compile_assignments(self, assignments: Sequence[Assign]) -> StatementClosure:
+        """Return the closure of some assignments; copies of slots have a faster form."""
         targets = [self.scope.slots[op.target] for op in assignments]
         sources = [self._operand_slot(op.value) for op in assignments]
         if None not in sources:
@@ -123,6 +144,7 @@ class BlockCompiler:
         return actions.assign(targets, [self._compile_expression(op.value) for op in assignments])
 
     def _compile_operation(self, op: Op) -> StatementClosure:
+        """Return the closure of one operation."""
         slots = self.scope.slots
         match op:
             case Assign():
@@ -162,11 +184,14 @@ class BlockCompiler:
                 return self._compile_named_block(name)
 
     def _operand_slot(self, expr: Expr) -> int | None:
-        """Return the slot of an operand that is read without a function of its own."""
+        """Return the slot of an operand that a closure reads directly; None if there is none.
+
+        A subclass that returns None disables the fusion of operations.
+        """
         return self._find_slot(expr)
 
     def _find_slot(self, expr: Expr) -> int | None:
-        """Return where a value stands that needs no operation."""
+        """Return the slot of a variable or constant expression; None for other expressions."""
         if isinstance(expr, Ref) and expr.name in self.scope.slots:
             return self.scope.slots[expr.name]
         if _is_constant(expr, self.fixed):
@@ -174,6 +199,7 @@ class BlockCompiler:
         return None
 
     def _compile_expression(self, expr: Expr) -> ExpressionClosure:
+        """Return the closure of an expression. Raises TypeError for an unknown node."""
         place = self._find_slot(expr)
         if place is not None:
             return shapes.load_slot(place)
@@ -204,12 +230,17 @@ class BlockCompiler:
                 raise TypeError(f"not an expression: {expr!r}")
 
     def _compile_range_test(self, *parts: Expr) -> ExpressionClosure | None:
+        """Return the closure of a range test if all four operands have slots, else None."""
         slots = [self._operand_slot(part) for part in parts]
-        found = [slot for slot in slots if slot is not None]
-        return shapes.range_test(*found) if len(found) == len(slots) else None
+        known = [slot for slot in slots if slot is not None]
+        return shapes.range_test(*known) if len(known) == len(slots) else None
 
     def _compile_binary(self, operator: str, left: Expr, right: Expr) -> ExpressionClosure:
-        """Return the function of two operands; an inner operation of two slots is part of it."""
+        """Return the closure of a binary operation.
+
+        An operand that is an operation on two slots is fused if there is a closure for both
+        operators.
+        """
         a, b = self._operand_slot(left), self._operand_slot(right)
         if a is not None and b is not None:
             return shapes.SLOT_SLOT[operator](a, b)
@@ -231,7 +262,7 @@ class BlockCompiler:
         )
 
     def _match_inner_operation(self, outer_operator: str, expr: Expr) -> _InnerOperation | None:
-        """Return the operation of two slots that an operand is, if there is a shape for it."""
+        """Return an operand as an operation on two slots; None if it cannot be fused."""
         if not isinstance(expr, Binary) or (outer_operator, expr.operator) not in shapes.FUSED_LEFT:
             return None
         a, b = self._operand_slot(expr.left), self._operand_slot(expr.right)
@@ -240,6 +271,7 @@ class BlockCompiler:
         return _InnerOperation((outer_operator, expr.operator), (a, b))
 
     def _fold_constant(self, expr: Expr) -> Any:
+        """Return the value of a constant expression. Raises TypeError for other expressions."""
         match expr:
             case Value(value):
                 return self.arithmetic.to_frame_value(value)
@@ -258,6 +290,7 @@ class BlockCompiler:
 
 
 def _is_constant(expr: Expr, constants: Mapping[str, float]) -> bool:
+    """Return whether an expression consists of literals, constants, `-` and binary operations."""
     match expr:
         case Value():
             return True
@@ -272,18 +305,31 @@ def _is_constant(expr: Expr, constants: Mapping[str, float]) -> bool:
 
 
 def _is_indexed(body: Block) -> bool:
-    """Tell whether a loop reads or sets elements, and nothing in it has a body of its own."""
-    return all(isinstance(op, Assign | Store) for op in body) and "Item(" in repr(body)
+    """Return whether a body has only assignments and stores and reads an array element."""
+    expressions: list[Expr] = []
+    for op in body:
+        match op:
+            case Assign(_, value):
+                expressions.append(value)
+            case Store(_, index, value):
+                expressions += [index, value]
+            case _:
+                return False
+    return any(isinstance(part, Item) for expr in expressions for part in subexpressions(expr))
 
 
 def _local_names(function: Function) -> list[str]:
+    """Return the parameters, `work.y` and the assigned variables of a function, in this order."""
     targets = [op.target for op in function.body if isinstance(op, Assign)]
     parameters = [f"work.{name}" for name in function.parameters]
     return list(dict.fromkeys([*parameters, "work.y", *targets]))
 
 
 def _call_depth(function: Function, functions: tuple[Function, ...]) -> int:
-    """How many functions a function calls, directly or through others: callees come first."""
-    text = repr(function.body)
-    called = [f for f in functions if f is not function and f"function='{f.name}'" in text]
+    """Return how many calls a function makes, directly or through others.
+
+    Callees have smaller numbers.
+    """
+    names = block_names(function.body)
+    called = [f for f in functions if f is not function and f"call {f.name}" in names]
     return sum(1 + _call_depth(f, functions) for f in called)

@@ -1,7 +1,8 @@
-"""Shapes: expressions as Python functions over one frame; those of few operands as one.
+"""Expression closures: expressions of a Program as Python functions of one frame.
 
-A call costs more than the operation inside it: so an operand that stands in the frame is read by
-its slot, and two operations on three slots are one function. The order of operations is kept.
+A Python call costs more than an arithmetic operation. Therefore operands in the frame are read by
+their slots, and two operations on three slots are fused to one function. The order of operations is
+kept (rule C2).
 """
 
 from __future__ import annotations
@@ -12,9 +13,13 @@ from typing import Any
 from language.numerics.evaluate import divide
 
 Frame = list[Any]
+"""Values of a Program by slot."""
 ExpressionClosure = Callable[[Frame], Any]
+"""Function that returns the value of an expression in a frame."""
 BinaryFactory = Callable[[Any, Any], ExpressionClosure]
+"""Function that returns the closure of an operation on two operands (slots or closures)."""
 FusedFactory = Callable[[Any, int, int], ExpressionClosure]
+"""Function that returns the closure of two operations: an operand and two slots, or three slots."""
 
 SLOT_SLOT: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: v[a] + v[b],
@@ -30,7 +35,7 @@ SLOT_SLOT: Mapping[str, BinaryFactory] = {
     "==": lambda a, b: lambda v: v[a] == v[b],
     "!=": lambda a, b: lambda v: v[a] != v[b],
 }
-"""Of two slots."""
+"""Operations on two slots."""
 SLOT_EXPRESSION: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: v[a] + b(v),
     "-": lambda a, b: lambda v: v[a] - b(v),
@@ -45,7 +50,7 @@ SLOT_EXPRESSION: Mapping[str, BinaryFactory] = {
     "==": lambda a, b: lambda v: v[a] == b(v),
     "!=": lambda a, b: lambda v: v[a] != b(v),
 }
-"""Of a slot and an expression."""
+"""Operations on a slot and an expression."""
 EXPRESSION_SLOT: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: a(v) + v[b],
     "-": lambda a, b: lambda v: a(v) - v[b],
@@ -60,7 +65,7 @@ EXPRESSION_SLOT: Mapping[str, BinaryFactory] = {
     "==": lambda a, b: lambda v: a(v) == v[b],
     "!=": lambda a, b: lambda v: a(v) != v[b],
 }
-"""Of an expression and a slot."""
+"""Operations on an expression and a slot."""
 EXPRESSION_EXPRESSION: Mapping[str, BinaryFactory] = {
     "+": lambda a, b: lambda v: a(v) + b(v),
     "-": lambda a, b: lambda v: a(v) - b(v),
@@ -75,7 +80,7 @@ EXPRESSION_EXPRESSION: Mapping[str, BinaryFactory] = {
     "==": lambda a, b: lambda v: a(v) == b(v),
     "!=": lambda a, b: lambda v: a(v) != b(v),
 }
-"""Of two expressions."""
+"""Operations on two expressions."""
 FUSED_LEFT: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: v[a] + v[b] + v[c],
     ("+", "-"): lambda a, b, c: lambda v: v[a] - v[b] + v[c],
@@ -87,7 +92,7 @@ FUSED_LEFT: Mapping[tuple[str, str], FusedFactory] = {
     ("*", "-"): lambda a, b, c: lambda v: (v[a] - v[b]) * v[c],
     ("*", "*"): lambda a, b, c: lambda v: v[a] * v[b] * v[c],
 }
-"""(a inner b) outer c, by outer and inner."""
+"""`(a inner b) outer c` on three slots, by outer and inner operator."""
 FUSED_RIGHT: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: v[a] + (v[b] + v[c]),
     ("+", "-"): lambda a, b, c: lambda v: v[a] + (v[b] - v[c]),
@@ -99,7 +104,7 @@ FUSED_RIGHT: Mapping[tuple[str, str], FusedFactory] = {
     ("*", "-"): lambda a, b, c: lambda v: v[a] * (v[b] - v[c]),
     ("*", "*"): lambda a, b, c: lambda v: v[a] * (v[b] * v[c]),
 }
-"""a outer (b inner c), by outer and inner."""
+"""`a outer (b inner c)` on three slots, by outer and inner operator."""
 EXPRESSION_FUSED: Mapping[tuple[str, str], FusedFactory] = {
     ("+", "+"): lambda a, b, c: lambda v: a(v) + (v[b] + v[c]),
     ("+", "-"): lambda a, b, c: lambda v: a(v) + (v[b] - v[c]),
@@ -111,50 +116,50 @@ EXPRESSION_FUSED: Mapping[tuple[str, str], FusedFactory] = {
     ("*", "-"): lambda a, b, c: lambda v: a(v) * (v[b] - v[c]),
     ("*", "*"): lambda a, b, c: lambda v: a(v) * (v[b] * v[c]),
 }
-"""As RIGHT, of an expression and two slots."""
+"""`a outer (b inner c)` on an expression and two slots, by outer and inner operator."""
 
 
 def range_test(a: int, low: int, b: int, high: int) -> ExpressionClosure:
-    """Return whether one variable is at least another, and one at most another: a range."""
+    """Return the closure of `v[a] >= v[low] and v[b] <= v[high]`."""
     return lambda v: (v[a] >= v[low]) & (v[b] <= v[high])
 
 
 def load_slot(slot: int) -> ExpressionClosure:
-    """Return what reads a variable."""
+    """Return the closure that reads a slot."""
     return lambda v: v[slot]
 
 
 def load_element(slot: int, index: int) -> ExpressionClosure:
-    """Return what reads an element whose index never changes."""
+    """Return the closure that reads an array element of constant index."""
     return lambda v: v[slot][index]
 
 
 def load_item(slot: int, index: ExpressionClosure) -> ExpressionClosure:
-    """Return what reads an element of an array."""
+    """Return the closure that reads an array element of computed index."""
     return lambda v: v[slot][index(v)]
 
 
 def negate(a: ExpressionClosure) -> ExpressionClosure:
-    """Return the negative of an expression."""
+    """Return the closure of the negative of an expression."""
     return lambda v: -a(v)
 
 
 def logical_not(a: ExpressionClosure) -> ExpressionClosure:
-    """Return what is true where an expression is not."""
+    """Return the closure of the logical negation of an expression."""
     return lambda v: not a(v)
 
 
 def select(
     condition: ExpressionClosure, if_true: ExpressionClosure, if_false: ExpressionClosure
 ) -> ExpressionClosure:
-    """Return one of two expressions; the other one is not evaluated."""
+    """Return the closure of a conditional expression; only the selected branch is evaluated."""
     return lambda v: if_true(v) if condition(v) else if_false(v)
 
 
 def call_function(
     function: Callable[..., Any], arguments: Sequence[ExpressionClosure]
 ) -> ExpressionClosure:
-    """Return a function of some expressions."""
+    """Return the closure of a function call; arguments are evaluated from left to right."""
     match arguments:
         case [a]:
             return lambda v: function(a(v))

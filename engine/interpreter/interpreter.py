@@ -1,4 +1,7 @@
-"""Interpreter: runs the blocks of a Program, each operation as a closure over one frame."""
+"""Interpreter: executes the blocks of a Program as closures over one frame of values.
+
+The closures are compiled once for each Program and shared by its interpreters.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from language.ir.program import Program
 
 
 class Stepper(Protocol):
-    """What the engine needs of something that runs a Program."""
+    """Protocol of an executor of a Program: the interpreter, scipy or compiled C."""
 
     def get(self, name: str) -> Any:
         """Return the value of a variable."""
@@ -27,24 +30,27 @@ class Stepper(Protocol):
         """Run a block of the Program."""
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables."""
+        """Return a function that returns the values of some variables, in their order."""
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return the signals that left their range since this was asked last."""
+        """Return the signals that left their range since the last call, and clear the record."""
 
 
 class Interpreter:
-    """A Program with its frame of values. Variables start at 0 or false, `init` has run."""
+    """Executor of a Program with its own frame of values."""
 
     def __init__(self, program: Program) -> None:
-        """Take the closures. `X_Derive` and `X_Init` of the C code are run here too."""
+        """Create a frame and run `derive` and `init`, as `X_Derive` and `X_Init` of the C code.
+
+        Variables are 0 or false before.
+        """
         self.program = program
         compiler = _compile_program(_ProgramIdentity(program))
         self._slots = compiler.scope.slots
         self._blocks = compiler.blocks
         self._real = compiler.reals
         self._arithmetic = ARITHMETIC_OF_TYPE[program.number_type]
-        self._is_plain = program.number_type == "float64"
+        self._is_float64 = program.number_type == "float64"
         self._frame: Frame = compiler.scope.new_frame()
         for entry in ("derive", "init"):
             if entry in self._blocks:
@@ -53,12 +59,12 @@ class Interpreter:
     def get(self, name: str) -> Any:
         """Return the value of a variable or constant, `group.name`."""
         value = self._frame[self._slots[name]]
-        return value if self._is_plain else self._arithmetic.to_python(value)
+        return value if self._is_float64 else self._arithmetic.to_python(value)
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable; a real is rounded to the number type, once."""
+        """Set a variable; a real is rounded to the number type."""
         if name in self._real:
-            if self._is_plain:
+            if self._is_float64:
                 value = float(value)
             else:
                 with self._arithmetic.suppress_warnings():
@@ -66,36 +72,39 @@ class Interpreter:
         self._frame[self._slots[name]] = value
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return the signals that left their range since this was asked last."""
+        """Return the signals that left their range since the last call, and clear the record."""
         violations = self._frame[self._slots[RANGE_VIOLATIONS]]
         names = tuple(violations)
         violations.clear()
         return names
 
     def has(self, name: str) -> bool:
-        """Tell whether the Program has a variable or constant."""
+        """Return whether the Program has a variable or constant."""
         return name in self._slots
 
     def run(self, block: str) -> None:
         """Run a block."""
-        if self._is_plain:
+        if self._is_float64:
             self._blocks[block](self._frame)
         else:
             with self._arithmetic.suppress_warnings():
                 self._blocks[block](self._frame)
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables."""
+        """Return a function that returns the values of some variables, in their order."""
         slots = [self._slots[name] for name in names]
-        frame, plain = self._frame, self._arithmetic.to_python
-        if self._is_plain and len(slots) > 1:
-            together = itemgetter(*slots)
-            return lambda: together(frame)
-        return lambda: tuple([plain(frame[slot]) for slot in slots])
+        frame, to_python = self._frame, self._arithmetic.to_python
+        if self._is_float64 and len(slots) > 1:
+            pick = itemgetter(*slots)
+            return lambda: pick(frame)
+        return lambda: tuple([to_python(frame[slot]) for slot in slots])
 
 
 class _ProgramIdentity:
-    """A Program that equals itself alone: to tell whether two are equal takes longer than a run."""
+    """Cache key of a Program that compares by identity.
+
+    A comparison of contents takes longer than a run.
+    """
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -109,6 +118,6 @@ class _ProgramIdentity:
 
 @lru_cache(maxsize=64)
 def _compile_program(key: _ProgramIdentity) -> BlockCompiler:
-    """Return the closures of a Program: all interpreters of one Program share them."""
+    """Return the closures of a Program; all interpreters of the Program share them."""
     with ARITHMETIC_OF_TYPE[key.program.number_type].suppress_warnings():
         return BlockCompiler(key.program)

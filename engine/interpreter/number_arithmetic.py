@@ -1,7 +1,7 @@
-"""Arithmetic: how the interpreter holds a real of each number type, and operates on it (rule 17a).
+"""Number arithmetic: representation and operations of reals of each number type (rule 17a).
 
-A float64 is a Python float. A float32 is a numpy.float32, whose `+ - * /` and comparisons are the
-processor's own; the two are never mixed, and no numpy scalar leaves the interpreter.
+A float64 is a Python float. A float32 is a numpy.float32, whose `+ - * /` and comparisons are those
+of the processor. The two are never mixed, and no numpy scalar leaves the interpreter.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from language.numerics.evaluate import ELEMENTARY_BY_TYPE, divide
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """One number type: `real` rounds to it, once; `plain` gives a value of a frame to Python.
+    """Operations of one number type.
 
-    `quiet` is the context in which blocks run.
+    `real` rounds a number to the type. `divide` and `elementary` are its division and functions.
+    `suppress_warnings` is the context in which blocks run. `to_python` converts a value of a frame
+    to a Python number.
     """
 
     real: Callable[[Any], Any]
@@ -31,17 +33,20 @@ class Arithmetic:
     to_python: Callable[[Any], Any]
 
     def to_frame_value(self, value: float | int | bool) -> Any:
-        """Return a value as it stands in a frame: reals in the type, the others as they are."""
+        """Return a value as it is stored in a frame: a float rounded to the type, others as is."""
         return self.real(value) if isinstance(value, float) else value
 
 
 def _round_to_single(function: Callable[..., Any]) -> Callable[..., Any]:
-    """An operation of doubles whose result is exact or rounded once, as one of float32."""
+    """Return an operation on doubles with its result rounded to float32.
+
+    It equals the float32 operation if the result is exact or rounded once.
+    """
     return lambda *arguments: np.float32(function(*arguments))
 
 
 def _ignore_float_errors() -> AbstractContextManager[None]:
-    """Overflow, division by zero and NaN are values, not warnings."""
+    """Return a context without numpy warnings: overflow and NaN are values (rule C7)."""
     return np.errstate(all="ignore")
 
 
@@ -60,3 +65,4 @@ ARITHMETIC_OF_TYPE: Mapping[NumberType, Arithmetic] = {
         lambda value: value.item() if isinstance(value, np.generic) else value,
     ),
 }
+"""Arithmetic of each number type."""

@@ -1,4 +1,8 @@
-"""Actions: what operations do, as Python functions over one frame; several in a row as one."""
+"""Statement closures: operations of a Program as Python functions of one frame.
+
+Short sequences of statements and assignments are single functions, because a Python call is
+expensive.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from engine.interpreter.expression_closures import ExpressionClosure, Frame
 
 StatementClosure = Callable[[Frame], None]
+"""Function that executes a statement in a frame."""
 
 
 def no_op(v: Frame) -> None:
@@ -14,7 +19,7 @@ def no_op(v: Frame) -> None:
 
 
 def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
-    """Return what does some actions one after the other."""
+    """Return the closure of statements in order; statements without effect are dropped."""
     match [action for action in statements if action is not no_op]:
         case []:
             return no_op
@@ -45,7 +50,10 @@ def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
 
 
 def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> StatementClosure:
-    """Return what sets one to four variables, one after the other."""
+    """Return the closure of one to four assignments in order.
+
+    Raises ValueError for another number.
+    """
     match targets, values:
         case [s], [a]:
 
@@ -81,7 +89,10 @@ def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> State
 
 
 def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
-    """Return what copies one to four variables, one after the other."""
+    """Return the closure of one to four copies between slots, in order.
+
+    Raises ValueError for another number.
+    """
     match targets, sources:
         case [s], [a]:
 
@@ -117,7 +128,7 @@ def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
 
 
 def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> StatementClosure:
-    """Return what sets one element of an array."""
+    """Return the closure that sets an array element; the value is evaluated before the index."""
 
     def act(v: Frame) -> None:
         v[slot][index(v)] = value(v)
@@ -128,7 +139,10 @@ def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> Stat
 def branch(
     condition: ExpressionClosure, if_true: StatementClosure, if_false: StatementClosure
 ) -> StatementClosure:
-    """Return what does one of two actions; a condition changes nothing."""
+    """Return the closure of an if statement.
+
+    Without statements it is `no_op`, since conditions have no effect.
+    """
     if if_true is no_op and if_false is no_op:
         return no_op
     if if_false is no_op:
@@ -149,7 +163,10 @@ def branch(
 
 
 def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementClosure:
-    """Return what does the action of the number that a variable has."""
+    """Return the closure that runs the statement of the number in a slot.
+
+    Other numbers do nothing.
+    """
     if all(action is no_op for action in table.values()):
         return no_op
 
@@ -160,7 +177,7 @@ def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementCl
 
 
 def loop(count: int, slot: int, body: StatementClosure) -> StatementClosure:
-    """Return what does an action a number of times."""
+    """Return the closure of a loop of `count` turns; the slot has the index of the turn."""
 
     def act(v: Frame) -> None:
         for index in range(count):
@@ -173,9 +190,9 @@ def loop(count: int, slot: int, body: StatementClosure) -> StatementClosure:
 def loop_while(
     count: int, slot: int, condition: ExpressionClosure, body: StatementClosure
 ) -> StatementClosure:
-    """Return what does an action a number of times, but no longer than a condition holds.
+    """Return the closure of a loop of at most `count` turns that ends when a condition is false.
 
-    Once that is false it stays so: nothing else is done in the loop.
+    The condition does not depend on the index, so it would remain false in the remaining turns.
     """
 
     def act(v: Frame) -> None:
@@ -189,7 +206,10 @@ def loop_while(
 
 
 def count_while(slot: int, condition: ExpressionClosure, limit: int) -> StatementClosure:
-    """Return what counts up to a limit while a condition holds, else back to 0."""
+    """Return the closure that counts up to a limit while a condition holds.
+
+    The counter is set to 0 if the condition is false.
+    """
 
     def act(v: Frame) -> None:
         if condition(v):
@@ -202,7 +222,10 @@ def count_while(slot: int, condition: ExpressionClosure, limit: int) -> Statemen
 
 
 def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> StatementClosure:
-    """Return what sets a fault bit, and notes the signal that left its range."""
+    """Return the closure that sets a fault bit.
+
+    It records `signal` as having left its range, unless the name is empty.
+    """
 
     def act(v: Frame) -> None:
         v[slot] |= bit
@@ -213,7 +236,7 @@ def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> Stateme
 
 
 def clear_fault(slot: int, bit: int) -> StatementClosure:
-    """Return what clears a fault bit."""
+    """Return the closure that clears a fault bit."""
 
     def act(v: Frame) -> None:
         v[slot] &= ~bit

@@ -1,4 +1,4 @@
-"""Frame: the values of a Program in one list, and where each of them stands in it."""
+"""Value frame: the values of a Program in one list, and the slot of each name in it."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
 from language.ir.program import Constant, Program
 
 INITIAL_VALUES = {"real": 0.0, "truth": False, "whole": 0}
+"""Initial value of a variable of each type."""
 RANGE_VIOLATIONS = "left range"
-"""Place of the signals that left their range, as keys of a dict."""
+"""Name of the slot with the signals that left their range, as keys of a dict."""
 
 
 @dataclass
 class FrameLayout:
-    """Where names stand in a frame, and the values that stand there from the start."""
+    """Slots of names and literals in a frame, and the initial value of every slot."""
 
     slots: dict[str, int]
     values: Frame
     literals: dict[str, int] = field(default_factory=dict)
 
     def slot_of_literal(self, value: Any) -> int:
-        """Return the slot of a value that never changes."""
-        key = f"{type(value).__name__} {value!r}"  # 0, 0.0, -0.0 and False are four values
+        """Return the slot of a literal; a new literal is appended to the frame."""
+        key = f"{type(value).__name__} {value!r}"  # 0, 0.0, -0.0 and False are different literals
         if key not in self.literals:
             self.literals[key] = len(self.values)
             self.values.append(value)
         return self.literals[key]
 
     def new_frame(self) -> Frame:
-        """Return a frame in which every variable has its first value."""
+        """Return a frame with the initial values; arrays and dicts are copied."""
         return [list(v) if type(v) is list else {} if type(v) is dict else v for v in self.values]
 
 
 def frame_layout_of(program: Program) -> FrameLayout:
-    """Return where the variables and constants of a Program stand, in this order."""
+    """Return the layout of a Program: variables, then constants, then the range violations."""
     value = ARITHMETIC_OF_TYPE[program.number_type].to_frame_value
     names = [v.name for v in program.variables] + [c.name for c in program.constants]
     initial = {kind: value(number) for kind, number in INITIAL_VALUES.items()}
@@ -50,6 +51,7 @@ def frame_layout_of(program: Program) -> FrameLayout:
 
 
 def _constant_value(program: Program, constant: Constant) -> Any:
+    """Return a constant in the number type; a table is a tuple."""
     value = ARITHMETIC_OF_TYPE[program.number_type].to_frame_value
     if constant.items:
         return tuple(value(item) for item in constant.items)

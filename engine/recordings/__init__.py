@@ -1,1 +1,1 @@
-"""Readers of recordings: CSV, Parquet, MF4 and CAN logs."""
+"""Recordings: readers of CSV, Parquet, MF4 and CAN logs."""

@@ -1,4 +1,4 @@
-"""Recorded CAN: frames of a log (candump, ASC, BLF), decoded by the DBC files of the map."""
+"""CAN reader: decodes the frames of a log (candump, ASC, BLF) with the DBC files of the map."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ from language.text.diagnostic import MissingToolError, Problems, Source, Span, S
 from language.text.project_files import path_exists, project_root_of, require_inside_project
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
-"""Endings of files that say what CAN frames mean; DBC is the usual one."""
+"""Suffixes of files that describe CAN messages; the first is suggested."""
 CanFrame = tuple[float, bytes]
+"""Time stamp [s] and data of a frame."""
 FrameKey = tuple[int, bool]
-"""Number of a frame, and whether it is an extended one."""
+"""Identifier of a frame, and whether it is an extended one."""
 
 
 def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
-    """Read a log of CAN frames. Raises SpecError, ToolMissing (no python-can, cantools)."""
+    """Read a log of CAN frames.
+
+    Raises SpecError, and MissingToolError without python-can or cantools.
+    """
     source = Source(display_path(path))
     require_size(path, source)
     try:
@@ -48,6 +52,11 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
 
 
 def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]:
+    """Return the messages of the databases of a map by frame key. Raises SpecError.
+
+    A database is searched relative to the map, then to the working directory, and has to lie inside
+    the project.
+    """
     problems = Problems()
     found: dict[FrameKey, Any] = {}
     for written in mapping.databases:
@@ -69,7 +78,7 @@ def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]
             try:
                 database = cantools.database.load_file(paths[0])
                 found |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
-            except Exception as error:  # of a broken file the library raises whatever it meets
+            except Exception as error:  # the library raises errors of any type for a broken file
                 label = f"`{written.text}` cannot be understood: {_first_line(error)}"
                 problems.error("unreadable", written.span, label)
     problems.raise_if_errors()
@@ -77,6 +86,10 @@ def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]
 
 
 def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[CanFrame]]:
+    """Return the data frames of a log by frame key; error and remote frames are skipped.
+
+    Raises SpecError if the log cannot be understood.
+    """
     readers = {".blf": can.BLFReader, ".asc": can.ASCReader, ".log": can.CanutilsLogReader}
     found: dict[FrameKey, list[CanFrame]] = {}
     try:
@@ -85,7 +98,7 @@ def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[Ca
                 if not (frame.is_error_frame or frame.is_remote_frame):
                     key = (frame.arbitration_id, frame.is_extended_id)
                     found.setdefault(key, []).append((frame.timestamp, bytes(frame.data)))
-    except Exception as error:  # of a broken file the library raises whatever it meets
+    except Exception as error:  # the library raises errors of any type for a broken file
         raise unreadable_error(
             source, f"understood as a log of CAN frames: {_first_line(error)}"
         ) from None
@@ -93,7 +106,7 @@ def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[Ca
 
 
 class _CanLog:
-    """The frames of a log by the messages of its databases."""
+    """Frames of a log with the messages that decode them."""
 
     def __init__(
         self, source: Source, messages: dict[FrameKey, Any], frames: dict[FrameKey, list[CanFrame]]
@@ -109,7 +122,7 @@ class _CanLog:
                 self.places.setdefault(f"{message.name}.{signal.name}", []).append((key, signal))
 
     def to_recorded_file(self) -> RecordedFile:
-        """Return the signals whose messages are in the log."""
+        """Return the log as a recorded file of the signals whose messages occur in it."""
         names = [
             name for name, found in self.places.items() for key, _ in found if key in self.frames
         ]
@@ -125,7 +138,7 @@ class _CanLog:
         )
 
     def explain_missing(self, name: str) -> str:
-        """Say why a signal is not there."""
+        """Return the reason why a signal is missing; an empty text if none is known."""
         for key, _ in self.places.get(name, []):
             message = self.messages[key]
             return f"its message `{message.name}` ({key[0]:#x}) is not in the log"
@@ -134,7 +147,10 @@ class _CanLog:
         return ""
 
     def samples(self, name: str) -> Samples:
-        """Return the values of a signal."""
+        """Return the values of a signal, named by itself or as `message.signal`.
+
+        ValueError: the name stands for signals of several messages in the log.
+        """
         ((key, signal),) = [place for place in self.places[name] if place[0] in self.frames]
         decoded = self._decode(key)
         frames = self.frames[key]
@@ -148,11 +164,15 @@ class _CanLog:
         )
 
     def _decode(self, key: FrameKey) -> Sequence[dict[str, Any]]:
+        """Return the decoded values of each frame of a message, cached.
+
+        Raises SpecError if a frame does not fit the database.
+        """
         if key not in self.decoded:
-            message, found = self.messages[key], []
+            message, decoded = self.messages[key], []
             for k, (time, data) in enumerate(self.frames[key], start=1):
                 try:
-                    found.append(message.decode(data, decode_choices=False))
+                    decoded.append(message.decode(data, decode_choices=False))
                 except Exception as error:
                     label = f"frame {k} of message `{message.name}`, at {time:.6g} s, has "
                     label += (
@@ -161,14 +181,16 @@ class _CanLog:
                     problems = Problems()
                     problems.error("value", Span(self.source, k, 1), label)
                     raise SpecError(problems.reported) from None
-            self.decoded[key] = found
+            self.decoded[key] = decoded
         return self.decoded[key]
 
 
 def _to_float(value: Any) -> float | None:
+    """Return a value as float; None remains None."""
     return None if value is None else float(value)
 
 
 def _first_line(error: Exception) -> str:
+    """Return the first line of an error message, or the name of the error."""
     text = str(error).strip().splitlines()
     return text[0].rstrip(".") if text else type(error).__name__

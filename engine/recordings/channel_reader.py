@@ -1,4 +1,8 @@
-"""Channel reader: the values of a recorded file in SI, each with its time, by the map's columns."""
+"""Channel reader: converts the columns of a recorded file to SI values with exact time stamps.
+
+A recording map names the columns, their units, scales and delays. The input is a `RecordedFile` of
+any format, the output the samples of a `Channel`.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +22,17 @@ from language.model.system import ColumnMapping, RecordingMap
 from language.text.diagnostic import Problems, Span, suggest_name
 
 MAX_STAMP_LENGTH = 40
+"""Largest number of characters of a time stamp."""
 TIME_LIMIT = 10**12
-"""Time stamps are below this, in their unit."""
+"""Bound on the magnitude of time stamps, in their unit."""
 STAMP_PATTERN = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+"""Pattern of a decimal number without an exponent."""
 STAMP_LINES = re.compile(rf"(?:{STAMP_PATTERN}\n)*+{STAMP_PATTERN}", re.ASCII)
-"""Numbers without an exponent alone, one a line: most columns of time are such."""
+"""Pattern of decimal numbers without exponents, one on each line, as in most time columns."""
 STAMP_CACHE_SIZE = 2**16
-"""Time stamps that are kept: recordings of one logger have the same ones."""
+"""Number of cached time stamps; recordings of one logger often share their stamps."""
 POWERS_OF_TEN = [10**k for k in range(MAX_STAMP_LENGTH + 1)]
+"""10**k by index k."""
 LOGGER_UNITS = {
     "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
     "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
@@ -36,7 +43,7 @@ LOGGER_UNITS = {
 def require_names(
     file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
 ) -> None:
-    """Report names that a map reads and a file lacks or has twice, and a file without values."""
+    """Report columns that a map reads and a file lacks or has twice, and a file without rows."""
     for name in dict.fromkeys(names):
         count = list(file.names).count(name)
         if not count:
@@ -53,10 +60,13 @@ def require_names(
 
 
 class ChannelReader:
-    """Reads channels of a file by a map, with exact time stamps."""
+    """Reader of channels of a file by a map, with exact time stamps."""
 
     def __init__(self, file: RecordedFile, mapping: RecordingMap, problems: Problems) -> None:
-        """Read the time that the rows share; what is wrong is reported into `problems`."""
+        """Read the time column that all rows share, if the format has one.
+
+        Problems are reported.
+        """
         self.file = file
         self.mapping = mapping
         self.problems = problems
@@ -64,22 +74,26 @@ class ChannelReader:
 
     @cached_property
     def shared_times(self) -> tuple[Fraction, ...]:
-        """The time stamps that the rows share; empty where one is blank."""
+        """Time stamps [s] of all rows; empty if one is blank or invalid."""
         known = tuple(time for time in self.clock if time is not None)
         return known if len(known) == len(self.clock) else ()
 
     @property
     def has_max_problems(self) -> bool:
-        """Tell whether so many problems were found that the rest is not looked at."""
+        """Return whether `MAX_PROBLEMS` problems are reported, so that reading can stop."""
         return len(self.problems.reported) >= MAX_PROBLEMS
 
     def times(self, name: str) -> list[Fraction | None]:
-        """Return the time stamps of a column [s]; None where it is blank."""
+        """Return the time stamps of a column [s]; None for a blank or invalid cell.
+
+        Invalid stamps are reported, and stamps that do not increase. Blank cells of the main time
+        column are reported too. Reading stops after `MAX_PROBLEMS` problems.
+        """
         samples = self.file.read(name)
         factor = self.mapping.time_unit.factor
-        plain = None if self.has_max_problems else _parse_plain_stamps(samples)
-        if plain is not None:
-            return [value * factor for value in plain] if factor != 1 else [*plain]
+        stamps = None if self.has_max_problems else _parse_plain_stamps(samples)
+        if stamps is not None:
+            return [value * factor for value in stamps] if factor != 1 else [*stamps]
         found: list[Fraction | None] = []
         last: Fraction | None = None
         rounded = -math.inf
@@ -102,6 +116,7 @@ class ChannelReader:
         return found
 
     def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
+        """Report a time stamp that is not above the previous one."""
         label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
         hint = "sort the recording, and remove repeated rows"
         self.problems.error("time", place, label, hint)
@@ -109,7 +124,10 @@ class ChannelReader:
     def _own_stamps(
         self, column: ColumnMapping, parts: Sequence[Samples]
     ) -> Sequence[Fraction | None]:
-        """Return the stamps that the parts of a column carry themselves."""
+        """Return the time stamps [s] of the channels that a map column averages.
+
+        Channels with different stamps, and stamps that do not increase, are reported.
+        """
         stamps = parts[0].stamps or ()
         if any(part.stamps != stamps for part in parts[1:]):
             label = f"the {self.file.noun}s of `{column.name}` do not have the same time stamps"
@@ -121,7 +139,12 @@ class ChannelReader:
         return stamps
 
     def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
-        """Return time stamps [s] and values in SI of a column of the map."""
+        """Return the time stamps [s] and SI values of a column of the map.
+
+        Several columns of the file are averaged, then scaled, and the delay is added to the stamps.
+        Rows without a value are skipped. Values without a time stamp, values that are not finite
+        and a column without values are reported.
+        """
         parts = [self.file.read(name) for name in column.columns]
         if self.file.is_stamped:
             stamps = self._own_stamps(column, parts)
@@ -159,11 +182,15 @@ class ChannelReader:
         return tuple(times), tuple(values_si)
 
     def _values(self, name: str, samples: Samples, column: ColumnMapping) -> list[float | None]:
+        """Return the values of a file column in SI; None for empty or invalid cells.
+
+        Cells that are not finite numbers are reported, and empty cells if the map refuses them.
+        """
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
-        plain = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
-        if plain is not None:
-            return [*plain]
+        scaled = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
+        if scaled is not None:
+            return [*scaled]
         found: list[float | None] = []
         for k, value in enumerate(samples.values):
             if self.has_max_problems:
@@ -180,7 +207,7 @@ class ChannelReader:
         return found
 
     def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
-        """A unit that the file itself gives, where we know it, is that of the map."""
+        """Report a known unit of the file that differs from the unit of the map."""
         unit = file_unit(written)
         if unit is None:
             return
@@ -192,7 +219,7 @@ class ChannelReader:
 
 
 def file_unit(written: str) -> Unit | None:
-    """Return the unit that a logger or a DBC file writes, where we know it."""
+    """Return the unit that a logger or a DBC file writes; None if it is unknown."""
     try:
         return parse_unit(LOGGER_UNITS.get(written, written))
     except UnitError:
@@ -202,15 +229,18 @@ def file_unit(written: str) -> Unit | None:
 def _scale_all(
     values: Sequence[float | None], factor: float, offset: float | None = None
 ) -> list[float] | None:
-    """Return values scaled, all at once; None where there is one that is none or is not finite."""
+    """Return `values * factor + offset` in one vectorised operation.
+
+    The result is None if a value is missing, or a value or result is not finite.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         known = np.array(values, dtype=np.float64)
-        found = known * factor if offset is None else known * factor + offset
-    return found.tolist() if np.isfinite(known).all() and np.isfinite(found).all() else None
+        scaled = known * factor if offset is None else known * factor + offset
+    return scaled.tolist() if np.isfinite(known).all() and np.isfinite(scaled).all() else None
 
 
 def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
-    """Return the mean of each row; None where one has no value."""
+    """Return the mean of each row over columns of equal length; None if a cell has no value."""
     found: list[float | None] = []
     for row in zip(*columns, strict=False):
         total = 0.0
@@ -221,7 +251,11 @@ def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
 
 
 def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
-    """Return time stamps that grow and have no exponent, all at once; None for any others."""
+    """Return increasing time stamps without exponents in one pass.
+
+    The result is None if some stamp is blank, has an exponent, is not above its predecessor or is
+    out of range.
+    """
     numbers = [value for value in samples.values if value is not None]
     is_growing = all(after > before for before, after in itertools.pairwise(numbers))
     if not numbers or len(numbers) < len(samples.values) or not is_growing:
@@ -235,11 +269,13 @@ def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
 
 @lru_cache(STAMP_CACHE_SIZE)
 def _parse_plain_stamp(text: str) -> Fraction:
+    """Return a decimal number without an exponent exactly; results are cached."""
     whole, _, part = text.partition(".")
     return Fraction(int(whole + part), POWERS_OF_TEN[len(part)])
 
 
 def _parse_stamp(text: str) -> Fraction | None:
+    """Return a decimal number exactly; None if it is no number, too long or beyond `TIME_LIMIT`."""
     if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
         return None
     whole, _, part = text.partition(".")

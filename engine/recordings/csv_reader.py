@@ -1,4 +1,4 @@
-"""Recorded CSV: a text with a head line, also gzipped; every cell knows its line and column."""
+"""CSV reader: reads a text table with a header line, also gzipped, with the place of every cell."""
 
 from __future__ import annotations
 
@@ -17,16 +17,19 @@ from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span
 
 DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-"""A number: longer ones, and words such as `nan`, are none."""
+"""Pattern of a number; words such as `nan` and exponents of more than three digits do not match."""
 
 DECIMAL_BYTES = b"+-.0123456789"
-"""What most numbers are made of: where `float` takes such a text, it is a number."""
+"""Characters of most numbers: a text of these alone that `float` accepts is a number."""
 MAX_PLAIN_LINE = 100_000
-"""A line that is shorter has no cell that is too long for a CSV reader."""
+"""Length below which no cell exceeds the field limit of the csv module."""
 
 
 def read_csv(path: Path, problems: Problems) -> RecordedFile:
-    """Read a CSV file; rows that do not fit the head line are reported. Raises SpecError."""
+    """Read a CSV file; rows whose length differs from the header are reported. Raises SpecError.
+
+    Reading of rows stops after `MAX_PROBLEMS` problems.
+    """
     source = Source(display_path(path))
     lines = _read_lines(path, source)
     source = Source(source.name, tuple(lines))
@@ -35,6 +38,7 @@ def read_csv(path: Path, problems: Problems) -> RecordedFile:
 
 
 def _read_lines(path: Path, source: Source) -> list[str]:
+    """Return the lines of a CSV or gzipped CSV file. Raises SpecError."""
     problems = Problems()
     place = Span(source, 1, 1)
     text = ""
@@ -66,7 +70,7 @@ def _read_lines(path: Path, source: Source) -> list[str]:
 
 
 class _CsvRows:
-    """The cells of a CSV text, each with its place."""
+    """Cells of a CSV text with their places."""
 
     def __init__(self, source: Source, problems: Problems) -> None:
         self.source = source
@@ -77,7 +81,10 @@ class _CsvRows:
             self._parse_each_row(problems)
 
     def _split_all_rows(self) -> bool:
-        """Take all rows at once where none has quotes and all as many cells; tell whether so."""
+        """Split all lines at commas.
+
+        Return False if quotes, long lines or unequal rows prevent it.
+        """
         lines = self.source.lines
         if '"' in "".join(lines) or max(map(len, lines)) >= MAX_PLAIN_LINE:
             return False
@@ -90,6 +97,7 @@ class _CsvRows:
         return True
 
     def _parse_each_row(self, problems: Problems) -> None:
+        """Parse line by line and report rows whose length differs from the header."""
         for number, line in enumerate(self.source.lines, start=1):
             if not line.strip():
                 continue
@@ -107,6 +115,7 @@ class _CsvRows:
                 break
 
     def _parse_row(self, number: int, line: str, problems: Problems) -> list[str]:
+        """Return the cells of a line; a malformed line is reported and gives empty cells."""
         if '"' not in line and len(line) < MAX_PLAIN_LINE:
             return line.split(",")
         try:
@@ -117,11 +126,11 @@ class _CsvRows:
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
-        """The cells of each column."""
+        """Cells of each column, in the order of the header."""
         return list(zip(*self.rows, strict=True)) or [()] * len(self.head)
 
     def samples(self, name: str) -> Samples:
-        """Return the cells of a column."""
+        """Return the samples of the first column of a name."""
         position = self.head.index(name)
         texts = list(map(str.strip, self.columns[position]))
 
@@ -134,7 +143,7 @@ class _CsvRows:
 
 
 def _parse_numbers(texts: list[str]) -> list[float | None]:
-    """Return the number of each cell, None for an empty one, NaN for what is none."""
+    """Return the number of each cell; None for an empty cell, NaN for any other text."""
     with suppress(ValueError):
         if not "".join(texts).encode().translate(None, DECIMAL_BYTES):
             return list(map(float, texts))
@@ -142,6 +151,7 @@ def _parse_numbers(texts: list[str]) -> list[float | None]:
 
 
 def _parse_number(text: str) -> float | None:
+    """Return the number of a cell; None for an empty cell, NaN for any other text."""
     if not text:
         return None
     return float(text) if DECIMAL.fullmatch(text) else math.nan

@@ -1,4 +1,4 @@
-"""Recorded MDF: channels of an MF4 file, each with the time stamps of its group."""
+"""MDF reader: reads the channels of an MDF file, each with the time stamps of its group."""
 
 from __future__ import annotations
 
@@ -23,14 +23,18 @@ from language.overlays.expand_document import display_path
 from language.text.diagnostic import MissingToolError, Source, Span
 
 MASTER_CHANNELS = ("time", "t", "timestamps")
-"""Names of channels that are the clock of their group."""
+"""Names of channels that hold the time of their group."""
 MAGIC = (b"MDF     ", b"UnFinMF ")
+"""First bytes of a finished and of an unfinished MDF file."""
 MIN_SIZE = 168
-"""Bytes of the first two blocks of an MF4 file."""
+"""Size of the first two blocks of an MF4 file in bytes."""
 
 
 def read_mdf(path: Path) -> RecordedFile:
-    """Read an MDF file, version 3 or 4. Raises SpecError, ToolMissing (no asammdf)."""
+    """Open an MDF file of version 3 or 4.
+
+    Raises SpecError, and MissingToolError without asammdf.
+    """
     source = Source(display_path(path))
     require_size(path, source)
     try:
@@ -58,20 +62,27 @@ def read_mdf(path: Path) -> RecordedFile:
 
 
 def _open_mdf(asammdf: Any, path: Path, source: Source) -> Any:
-    """Open a file; of a broken one the library raises whatever it meets, twice over."""
+    """Return the file as an asammdf object. Raises SpecError.
+
+    Errors that the library raises during garbage collection of a broken file are suppressed.
+    """
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             return asammdf.MDF(path)
     except Exception as error:
-        said = _first_line(error)
+        message = _first_line(error)
     finally:
-        gc.collect()  # what is left goes now, while its complaints are not heard
+        gc.collect()  # destructors of broken objects run while their errors are suppressed
         sys.unraisablehook = hook
-    raise unreadable_error(source, f"understood as MDF: {said}")
+    raise unreadable_error(source, f"understood as MDF: {message}")
 
 
 def _read_samples(mdf: Any, name: str, source: Source) -> Samples:
+    """Return the samples of a channel; values marked invalid are None, texts and arrays NaN.
+
+    Raises SpecError if the channel cannot be read.
+    """
     try:
         signal = mdf.get(name, ignore_invalidation_bits=True)
         values = np.asarray(signal.samples)
@@ -96,5 +107,6 @@ def _read_samples(mdf: Any, name: str, source: Source) -> Samples:
 
 
 def _first_line(error: Exception) -> str:
+    """Return the first line of an error message, or the name of the error."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

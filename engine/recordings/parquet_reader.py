@@ -1,4 +1,4 @@
-"""Recorded Parquet: a table of numbers; places are rows, counted from 1."""
+"""Parquet reader: reads a table of numbers; the place of a value is its row, counted from 1."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from language.text.diagnostic import Source, Span
 
 
 def read_parquet(path: Path) -> RecordedFile:
-    """Read a Parquet file. Raises SpecError, ToolMissing (no pyarrow)."""
+    """Read a Parquet file. Raises SpecError, and MissingToolError without pyarrow."""
     source = Source(display_path(path))
     require_size(path, source)
     arrow = import_pyarrow("a Parquet file")
@@ -35,6 +35,7 @@ def read_parquet(path: Path) -> RecordedFile:
 
 
 def _to_float(cell: Any) -> float | None:
+    """Return a cell as float; None remains None, other types give NaN."""
     if cell is None:
         return None
     return float(cell) if isinstance(cell, int | float) else math.nan

@@ -1,4 +1,7 @@
-"""Recording: a measured file as channels, each value with its own exact time stamp."""
+"""Recording: the channels of a measured file, each with its own exact time stamps (decision 0038).
+
+`read_recording` reads a file by a recording map; the format follows from the name.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ from language.text.diagnostic import Problems, Source
 
 @dataclass(frozen=True)
 class Channel:
-    """One signal: time stamps [s], exact and increasing, and values in SI, both (n_samples,)."""
+    """Signal with exact, increasing time stamps [s] and values in SI, both (n_samples,)."""
 
     column: ColumnMapping
     times: tuple[Fraction, ...]
@@ -41,17 +44,18 @@ class Channel:
         return np.array(self.values)
 
     def slice_samples(self, selection: slice) -> Channel:
-        """Return a stretch of the samples."""
-        found = Channel(self.column, self.times[selection], self.values[selection])
-        vars(found).update(seconds=self.seconds[selection], array=self.array[selection])
-        return found
+        """Return the channel with a slice of its samples."""
+        part = Channel(self.column, self.times[selection], self.values[selection])
+        vars(part).update(seconds=self.seconds[selection], array=self.array[selection])
+        return part
 
 
 @dataclass(frozen=True)
 class Recording:
-    """The channels that a map takes from a file, by the name in the map.
+    """Channels that a map takes from a file, by their names in the map.
 
-    `windows` [s] are the times to use, in order; where there is none, all is used.
+    `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
+    empty means all.
     """
 
     name: str
@@ -61,17 +65,20 @@ class Recording:
     windows: tuple[Window, ...] = ()
 
     def is_used(self, time: Fraction) -> bool:
-        """Tell whether a time [s] is in one of the windows."""
+        """Return whether a time [s] lies in a window; True if there are no windows."""
         return not self.windows or any(start <= time <= end for start, end in self.windows)
 
 
 def split_by_windows(recording: Recording) -> list[Recording]:
-    """Return a recording as one for each of its windows."""
+    """Return one recording for each window; the recording itself if it has no windows."""
     return [crop(recording, window) for window in recording.windows] or [recording]
 
 
 def crop(recording: Recording, window: Window) -> Recording:
-    """Return what a recording has in a window; a channel without a value there is left out."""
+    """Return the samples of a recording within a window [s], ends included.
+
+    Channels without a sample in the window are left out.
+    """
     channels = {}
     for name, channel in recording.channels.items():
         first = bisect_left(channel.times, window[0])
@@ -83,23 +90,23 @@ def crop(recording: Recording, window: Window) -> Recording:
 
 
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
-    """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a log of CAN frames.
+    """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a CAN log.
 
-    `run.csv@0..12.5` is the part of a file from 0 s to 12.5 s.
-
-    Raises SpecError with all problems, ToolMissing.
+    `used` are names of columns of the map. A path `run.csv@0..12.5` selects the window from 0 s to
+    12.5 s. The result is cropped to the windows of the map and the path. Raises SpecError with all
+    problems, and MissingToolError if a library is not installed.
     """
     problems = Problems()
     file = open_recording(path, mapping, problems)
     columns = [mapping.columns[name] for name in used]
-    wanted = [name for column in columns for name in column.columns]
+    names = [name for column in columns for name in column.columns]
     if not file.is_stamped:
         if not mapping.time:
             label = f"map `{mapping.name}` names no column of time, which this file needs"
             problems.error("missing", mapping.span, label, "`time: {column: t_s, unit: s}`")
             problems.raise_if_errors()
-        wanted = [mapping.time, *wanted, *[column.time for column in columns if column.time]]
-    require_names(file, wanted, mapping, problems)
+        names = [mapping.time, *names, *[column.time for column in columns if column.time]]
+    require_names(file, names, mapping, problems)
     problems.raise_if_errors()
     reader = ChannelReader(file, mapping, problems)
     channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
@@ -115,15 +122,18 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
 
 
 def _share_seconds(channels: Iterable[Channel]) -> None:
-    """Let channels that were sampled together have the same array of seconds."""
+    """Let channels with the same tuple of stamps share one array of seconds."""
     first: dict[int, Channel] = {}
     for channel in channels:
-        together = first.setdefault(id(channel.times), channel)
-        vars(channel)["seconds"] = together.seconds
+        sampled_together = first.setdefault(id(channel.times), channel)
+        vars(channel)["seconds"] = sampled_together.seconds
 
 
 def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
-    """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
+    """Open a file by its suffix: Parquet, MDF, CAN log, or CSV for any other suffix.
+
+    Raises SpecError and MissingToolError.
+    """
     path = file_of(path)
     require_regular_file(path, Source(display_path(path)))
     ending = path.suffix.lower()
@@ -143,7 +153,7 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
 
 
 def _is_mdf(path: Path) -> bool:
-    """Tell whether a file starts as MDF does; `.dat` may be anything."""
+    """Return whether a file starts with the bytes of MDF, because `.dat` has several meanings."""
     try:
         with path.open("rb") as file:
             return file.read(3) == b"MDF"
@@ -154,7 +164,7 @@ def _is_mdf(path: Path) -> bool:
 def crop_to_windows(recording: Recording, mapping: RecordingMap) -> Recording:
     """Return a recording from the start of its first window to the end of its last one.
 
-    Raises SpecError for a window in which a channel has no value.
+    Raises SpecError if a channel has no value in one of the windows.
     """
     if not recording.windows:
         return recording

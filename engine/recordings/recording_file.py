@@ -1,4 +1,4 @@
-"""Recorded file: what a file of measurements holds under each name, whatever its format."""
+"""Recorded file: the common interface of all recording formats, a set of named sample sequences."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from pathlib import Path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 
 MAX_BYTES = 512 * 1024 * 1024
-"""Largest recording read, unpacked."""
+"""Largest size of a recording, after decompression."""
 MAX_PROBLEMS = 20
-"""After so many problems of values the rest is not looked at."""
+"""Number of reported problems after which values are not checked further."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """What stands under one name, in the order of the file.
+    """Samples under one name, in the order of the file.
 
-    `values` are None where there is none, and not finite where the `text` is no finite number;
-    `place` is that of one value: in a text its line, else the number of the row or sample as line.
-    `stamps` [s] are its own; None where the rows share columns of time. `unit` is the file's word.
+    `values` are None for an empty cell, and not finite if `text` is no finite number. `text` and
+    `place` give the text and the place of a sample by index; in a binary format the row or sample
+    number stands for the line. `stamps` [s] are the time stamps of the samples; None if the rows
+    share a time column. `unit` is the unit text of the file.
     """
 
     values: Sequence[float | None]
@@ -34,9 +35,11 @@ class Samples:
 
 @dataclass(frozen=True)
 class RecordedFile:
-    """A file of measurements: `noun` is what it calls that which has a name.
+    """File of measurements with named columns, channels or signals.
 
-    `lacking` says more about a name that is not there, where the format knows more.
+    `noun` is the word for these in messages. `read` returns the samples of a name. `is_stamped`
+    tells whether each name has its own time stamps. `explain_missing` returns a hint for a missing
+    name, or an empty text.
     """
 
     source: Source
@@ -49,13 +52,13 @@ class RecordedFile:
 
     @property
     def head(self) -> Span:
-        """The place of the names."""
+        """Place of the names: the first line of the file."""
         lines = self.source.lines
         return Span(self.source, 1, 1, max(1, len(lines[0])) if lines else 1)
 
 
 def require_size(path: Path, source: Source) -> None:
-    """Raise SpecError for a file that cannot be read or is too large."""
+    """Raise SpecError if a file cannot be read, is empty or is larger than `MAX_BYTES`."""
     try:
         size = path.stat().st_size
         with path.open("rb"):
@@ -75,11 +78,14 @@ def require_size(path: Path, source: Source) -> None:
 
 
 def require_regular_file(path: Path, source: Source) -> None:
-    """Raise SpecError for a pipe or a device: it may never end, and can be read only once."""
+    """Raise SpecError for a pipe or a device, which may be endless and can be read only once.
+
+    A missing file passes; the reader reports it.
+    """
     try:
         mode = path.stat().st_mode
     except OSError:
-        return  # what is wrong is told where it is read
+        return  # the reader reports it
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise unreadable_error(
             source, "read: it is a pipe or a device", "write it into a file first"
@@ -94,5 +100,5 @@ def unreadable_error(source: Source, action: str, help: str = "") -> SpecError:
 
 
 def exact_fraction(value: float) -> Fraction:
-    """Return the shortest decimal that stands for a floating-point number, exactly."""
+    """Return the shortest decimal that reads back as a floating-point number, as a fraction."""
     return Fraction(repr(float(value)))

@@ -1,4 +1,4 @@
-"""Recorded part: a file named with the time [s] to use of it, like `run.csv@0..12.5`."""
+"""Recording window: parses paths that name a time window [s] of a file, like `run.csv@0..12.5`."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from language.model.system import RecordingMap, Window
 from language.text.diagnostic import Problems
 
 PART_PATTERN = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+(?:\.\d+)?)")
+"""Pattern of a file name with a window: name, start and end."""
 
 
 def file_of(path: Path) -> Path:
-    """Return the file of a path that may name a part of it."""
+    """Return the path without its time window."""
     return part_of(path)[0]
 
 
 def part_of(path: Path) -> tuple[Path, Window | None]:
-    """Return the file of a path and the part of it [s] that is named, None if it is all of it.
+    """Return the file of a path and its time window [s]; None if the path names no window.
 
-    A file that is itself called like that is taken as it is.
+    An existing file whose own name has this form is taken as a whole.
     """
     match = PART_PATTERN.fullmatch(path.name)
     if not match or path.exists():
@@ -31,7 +32,10 @@ def part_of(path: Path) -> tuple[Path, Window | None]:
 
 
 def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[Window, ...]:
-    """Return the times to use of a path: those of the map, as far as they lie in its part."""
+    """Return the time windows [s] of a path: those of the map, intersected with that of the path.
+
+    An empty tuple means the whole recording. An empty intersection is reported.
+    """
     file, part = part_of(path)
     windows = mapping.windows_of(file.name)
     if part is None:
@@ -39,28 +43,29 @@ def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[W
     if not windows:
         windows = (part,)
     both = tuple((max(start, part[0]), min(end, part[1])) for start, end in windows)
-    found = tuple((start, end) for start, end in both if start < end)
-    if not found:
+    result = tuple((start, end) for start, end in both if start < end)
+    if not result:
         label = f"nothing of `{path.name}` is in a window of this map"
         problems.error("range", mapping.span, label, "`FILE@0..12.5` is from 0 s to 12.5 s")
-    return found
+    return result
 
 
 def overlap(first: Path, second: Path, compare_contents: bool = True) -> bool:
-    """Tell whether two paths name the same values: the same file or a copy, with a common time.
+    """Return whether two paths have values in common.
 
-    Where they may not be `compare_contents` yet, a copy is taken for another file.
+    They have if they name the same file, or copies of it, and their time windows overlap. Copies
+    are recognised only if `compare_contents` is true.
     """
-    (one, a), (other, b) = part_of(first), part_of(second)
-    if os.path.realpath(one) != os.path.realpath(other) and not (
-        compare_contents and is_copy(one, other)
+    (first_file, a), (second_file, b) = part_of(first), part_of(second)
+    if os.path.realpath(first_file) != os.path.realpath(second_file) and not (
+        compare_contents and is_copy(first_file, second_file)
     ):
         return False
     return a is None or b is None or max(a[0], b[0]) < min(a[1], b[1])
 
 
 def is_copy(first: Path, second: Path) -> bool:
-    """Tell whether two files hold the same bytes; one that cannot be read is no copy."""
+    """Return whether two files have the same bytes; False if one cannot be read."""
     try:
         return filecmp.cmp(first, second, shallow=False)
     except OSError:

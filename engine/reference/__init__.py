@@ -1,1 +1,1 @@
-"""Reference simulations by solvers of scipy, to check the engine against."""
+"""Reference simulations by scipy and filterpy, for comparison with the engine."""

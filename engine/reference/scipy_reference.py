@@ -1,9 +1,9 @@
-"""Reference: the same system through scipy and filterpy instead of our own numerics.
+"""Reference simulation: runs a system with the numerics of scipy and filterpy.
 
-Of a continuous Program only its field and its instants are kept, scipy integrates: see
-engine/reference/scipy_stepper.py. Of a sampled Program the numbers of its observers are computed anew; what
-a mode `runs` inside a tick stays ours. The loop over instants is the engine's, through the Stepper
-protocol.
+Continuous instances are integrated by scipy (engine/reference/scipy_stepper.py). For sampled
+instances the solved numbers of observers are recomputed; models that a mode `runs` inside a tick
+keep the methods of the Program. The loop over instants is that of the engine, which accepts other
+steppers by the `Stepper` protocol.
 """
 
 from __future__ import annotations
@@ -26,36 +26,40 @@ from language.model.system import Scenario, System
 Reals = NDArray[np.float64]
 
 NEGLIGIBLE_RATIO = 1e-9
-"""Most that a number taken as 0 may be of its matrix: the agreement promised (rule 17f)."""
+"""Largest ratio to its matrix of an entry that the Program omits as 0 (rule 17f)."""
 
 
 def simulate_reference(
     system: System, scenario: Scenario, method: ScipyMethod = "DOP853"
 ) -> Trajectory:
-    """Return the trajectory of a system through a scenario, by independent libraries."""
+    """Return the trajectory of a system through a scenario by scipy and filterpy."""
     return simulate(system, scenario, partial(reference_stepper, method=method))
 
 
 def simulate_with_scipy(system: System, scenario: Scenario, method: ScipyMethod) -> Trajectory:
-    """Return a trajectory for which scipy integrates; sampled automata keep our numbers."""
+    """Return the trajectory with continuous instances integrated by scipy.
+
+    Sampled instances use the solved numbers of the Program.
+    """
     return simulate(system, scenario, partial(_scipy_integrated_stepper, method=method))
 
 
 def reference_stepper(program: Program, method: ScipyMethod = "DOP853") -> Stepper:
-    """Return what runs a Program with the numerics of scipy and filterpy."""
+    """Return a stepper of a Program with the numerics of scipy and filterpy."""
     if program.period is None:
         return ScipyStepper(program, method)
     return Interpreter(with_reference_numbers(program))
 
 
 def _scipy_integrated_stepper(program: Program, method: ScipyMethod) -> Stepper:
+    """Return a scipy stepper for a continuous Program, else the interpreter."""
     return ScipyStepper(program, method) if program.period is None else Interpreter(program)
 
 
 def with_reference_numbers(program: Program) -> Program:
-    """Return a sampled Program with the solved numbers of its observers by scipy and filterpy.
+    """Return a sampled Program with the numbers of its steady-gain observers recomputed.
 
-    ValueError: a number that is not negligible was taken as 0, so that nothing can be replaced.
+    ValueError: the Program omits an entry as 0 that is not negligible.
     """
     numbers: dict[str, float] = {}
     for info in program.observers:
@@ -69,9 +73,11 @@ def with_reference_numbers(program: Program) -> Program:
 
 
 def reference_numbers(info: ObserverInfo) -> dict[str, float]:
-    """Return an observer's solved numbers by the name of their constant; its zeros have none.
+    """Return the solved numbers of an observer by the names of their constants.
 
-    Phi, G (n, n), Gamma (n, inputs), L (n, measures), C (measures, n).
+    Phi, G (n, n), Gamma (n, inputs), L (n, measures), C (measures, n). Entries that the Program
+    omits as 0 have no name. ValueError: such an entry is above `NEGLIGIBLE_RATIO` times the largest
+    entry of its matrix; G is not checked.
     """
     states, measures = info.states, info.measures
     sides = {
@@ -81,7 +87,7 @@ def reference_numbers(info: ObserverInfo) -> dict[str, float]:
         "L": (states, measures),
         "C": (measures, states),
     }
-    found = {}
+    numbers = {}
     for letter, matrix in _observer_matrices(info).items():
         rows, columns = sides[letter]
         largest = float(np.max(np.abs(matrix), initial=0.0))
@@ -89,17 +95,19 @@ def reference_numbers(info: ObserverInfo) -> dict[str, float]:
             for j, column in enumerate(columns):
                 name, value = f"solved.{info.mode}_{letter}.{row}.{column}", float(matrix[i, j])
                 if name in info.solved:
-                    found[name] = value
+                    numbers[name] = value
                 elif letter != "G" and abs(value) > NEGLIGIBLE_RATIO * largest:
                     raise ValueError(f"{name} is 0 in the Program, {value!r} by the libraries")
-    return found
+    return numbers
 
 
 def _observer_matrices(info: ObserverInfo) -> dict[str, Reals]:
-    """Return the matrices of an observer; G = integral of e^(A s) over a period T [s].
+    """Return the matrices of an observer; G is the integral of e^(A s) over a period T [s].
 
-    Noise enters van_loan_discretization as G G' (n, n): the root of the diagonal spectral density.
-    L = P C'(C P C' + R)^-1 with P before the correction: scipy's equation for (Phi', C').
+    Phi and the noise covariance follow from Van Loan (1978); `van_loan_discretization` takes the
+    noise as a factor, here the square root of the diagonal spectral density. L = P C' (C P C' +
+    R)^-1, where P is the covariance before the correction and solves the discrete algebraic Riccati
+    equation of (Phi', C').
     """
     n = len(info.states)
     a, c = np.array(info.a, dtype=float), np.array(info.c, dtype=float)
@@ -108,7 +116,7 @@ def _observer_matrices(info: ObserverInfo) -> dict[str, Reals]:
     density = np.diag(np.array(info.process_noise, dtype=float))
     phi, noise = van_loan_discretization(a, np.diag(np.sqrt(density)), info.period)
     augmented = np.block([[a, np.eye(n)], [np.zeros((n, 2 * n))]])
-    held = linalg.expm(augmented * info.period)[:n, n:]
+    integral = linalg.expm(augmented * info.period)[:n, n:]
     p = linalg.solve_discrete_are(phi.T, c.T, noise, r)
     gain = linalg.solve(c @ p @ c.T + r, c @ p).T
-    return {"Phi": phi, "Gamma": held @ b, "G": held, "L": gain, "C": c}
+    return {"Phi": phi, "Gamma": integral @ b, "G": integral, "L": gain, "C": c}

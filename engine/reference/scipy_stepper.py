@@ -1,7 +1,8 @@
-"""Library stepper: a continuous Program whose flow is integrated by scipy.
+"""Scipy stepper: integrates the flow of a continuous Program with scipy.
 
-Of the Program only its field (`rates_<mode>`, `guards_<mode>`) and its instants (`init`,
-`equations`, `watch`, `jump`) are kept; crossings are halved on the library's dense output.
+Of the Program, the vector field (`rates_<mode>`, `guards_<mode>`) and the blocks of instants
+(`init`, `equations`, `watch`, `jump`) are interpreted. Crossings are located by bisection on the
+dense output of scipy.
 """
 
 from __future__ import annotations
@@ -21,12 +22,18 @@ from language.ir.program import ModeInfo, Program, unqualified_name
 from language.ir.regions import CHART
 
 ScipyMethod = Literal["DOP853", "Radau", "LSODA"]
-"""Explicit of order 8 and implicit of order 5 (Hairer, Norsett, Wanner, Solving Ordinary
-Differential Equations I, II.5, and II, IV.8); switching between stiff and not (Petzold 1983)."""
+"""Methods of scipy.
+
+DOP853 is explicit of order 8, Radau implicit of order 5 (Hairer, Norsett, Wanner, Solving Ordinary
+Differential Equations I, II.5, and II, IV.8); LSODA switches between stiff and nonstiff methods
+(Petzold 1983).
+"""
 SCIPY_METHODS: tuple[ScipyMethod, ...] = ("DOP853", "Radau", "LSODA")
+"""All methods of scipy that are supported."""
 StateVector = list[float]
+"""States in SI, in the order of the Program."""
 Solution = Callable[[float], StateVector]
-"""The states in SI at a time [s] since the start of a flow."""
+"""States in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
 INTEGRATION_BLOCKS = (
@@ -42,21 +49,33 @@ INTEGRATION_BLOCKS = (
     "segment",
     "settle",
 )
-"""What the blocks that integrate or locate are named, or how their names begin."""
+"""Names, or prefixes of names, of the blocks that integrate or locate."""
 RTOL = 1e-11
-"""Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
+"""Relative local error of a step: 2^-53 with five digits left for the sum of steps."""
 MIN_SCALE = 1e-9
-"""Size in SI [unit of the state] below which a state counts as 0: keeps rounding out of steps."""
+"""Size [SI unit of the state] below which a state counts as 0.
+
+It prevents step sizes that are limited by rounding.
+"""
 MAX_EVALUATIONS = 100_000
-"""Rates evaluated in one flow: 6000 steps of DOP853 within a major step are no progress."""
+"""Evaluations of the rates in one flow, 6000 steps of DOP853.
+
+More mean that it does not advance.
+"""
 GUARD_CHECKS = 4
-"""Looks at the guards per flow, evenly spread: shorter pulses than a quarter step may be missed."""
+"""Evenly spaced guard evaluations in a flow.
+
+Shorter pulses than a quarter of a step may be missed.
+"""
 BISECTIONS = 52
-"""Halvings of the bracket of a crossing: 1 ms / 4 / 2^52 = 6e-20 s, below one ULP of any time."""
+"""Bisections of a crossing.
+
+1 ms / 4 / 2^52 = 6e-20 s is below one unit in the last place of any time.
+"""
 
 
 def without_integration(program: Program) -> Program:
-    """Return a continuous Program without its blocks that integrate or locate."""
+    """Return a continuous Program without the blocks that integrate or locate."""
     blocks = {
         n: block for n, block in program.blocks.items() if not n.startswith(INTEGRATION_BLOCKS)
     }
@@ -64,17 +83,23 @@ def without_integration(program: Program) -> Program:
 
 
 def evaluated_guards(program: Program, mode: ModeInfo) -> tuple[str, ...]:
-    """Return the endings of the guard variables that are evaluated in a mode of the chart."""
+    """Return the slots of the guards that are evaluated in a mode of the chart, each once.
+
+    These are the guards of transitions from the mode and those of all parallel regions.
+    """
     infos = program.transitions
     found = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
     return tuple(dict.fromkeys(found))
 
 
 class ScipyStepper:
-    """A continuous Program whose `flow` is scipy's; every other block is interpreted."""
+    """Stepper of a continuous Program whose block `flow` is executed by scipy.
+
+    The interpreter executes all other blocks.
+    """
 
     def __init__(self, program: Program, method: ScipyMethod = "DOP853") -> None:
-        """Take the Program; its own motion is left out, so it cannot be run by mistake."""
+        """Create an interpreter of the Program without its integration blocks."""
         self.program = program
         self.method = method
         self._inner = Interpreter(without_integration(program))
@@ -107,15 +132,18 @@ class ScipyStepper:
         self._inner.set(name, value)
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables."""
+        """Return a function that returns the values of some variables, in their order."""
         return self._inner.make_reader(names)
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return nothing: a continuous automaton is never held in a range."""
+        """Return an empty tuple: a continuous automaton has no saturation."""
         return ()
 
     def run(self, block: str) -> None:
-        """Run a block, `flow` by scipy."""
+        """Run a block: `flow` and `peek` by scipy, all others by the interpreter.
+
+        `dense` does nothing, because `peek` integrates again.
+        """
         if block == "flow":
             self._flow(self.get("work.h"))
         elif block == "peek":
@@ -126,7 +154,10 @@ class ScipyStepper:
             self._inner.run(block)
 
     def _flow(self, h: float) -> None:
-        """Move the states over h [s], or to the first change of a guard before that."""
+        """Advance the states by h [s], or to the first change of a guard before that.
+
+        `work.elapsed` and `work.crossed` tell how far and whether a guard changed.
+        """
         mode = self.program.mode_name(self.get("memory.mode"))
         path = self._solve(mode, h)
         change = self._locate_first_change(mode, path, h)
@@ -138,13 +169,16 @@ class ScipyStepper:
         self._time += elapsed
 
     def _peek(self, h: float) -> None:
-        """Move the states over h [s], whatever the guards do."""
+        """Advance the states by h [s] regardless of guards."""
         mode = self.program.mode_name(self.get("memory.mode"))
         for name, value in zip(self._names, self._solve(mode, h)(h), strict=True):
             self.set(f"state.{name}", value)
 
     def _solve(self, mode: str, h: float) -> Solution:
-        """Return the solution from the states over h [s]. Raises Stopped where there is none."""
+        """Return the solution over h [s] from the present states.
+
+        Raises SimulationStopped if a state or a rate is not finite or scipy fails.
+        """
         start: StateVector = list(self._states())
         first = self._rates_at(mode, start, 0.0)
         for name, value, rate in zip(self._names, start, first, strict=True):
@@ -168,10 +202,11 @@ class ScipyStepper:
         return path
 
     def _solve_ivp(self, mode: str, start: StateVector, h: float) -> Any:
-        """Return scipy's solution over h [s], with its polynomial.
+        """Return the result of scipy's solve_ivp over h [s] with dense output.
 
-        No step is longer than a major step; Radau and LSODA, whose polynomials are of lower order
-        than their steps, take at least as many steps as there are looks at the guards.
+        No step is longer than h. Radau and LSODA, whose dense output is of lower order than their
+        steps, take at least `GUARD_CHECKS` steps. Raises SimulationStopped if scipy fails or needs
+        more than `MAX_EVALUATIONS`.
         """
         evaluations = 0
 
@@ -186,7 +221,7 @@ class ScipyStepper:
 
         longest = h if self.method == "DOP853" else h / GUARD_CHECKS
         options = {"rtol": RTOL, "atol": RTOL * self._sizes, "max_step": longest}
-        with np.errstate(over="ignore", invalid="ignore"):  # such a step is rejected by its error
+        with np.errstate(over="ignore", invalid="ignore"):  # the error estimate rejects such a step
             solution = solve_ivp(
                 rates,
                 (0.0, h),
@@ -201,7 +236,7 @@ class ScipyStepper:
         return solution
 
     def _locate_first_change(self, mode: str, path: Solution, h: float) -> float | None:
-        """Return when [s] the first guard changes, on the far side; None if none does."""
+        """Return the time [s] just after the first guard change; None if no guard changes."""
         if not self._guards[mode][0]():
             return None
         low = 0.0
@@ -213,7 +248,7 @@ class ScipyStepper:
         return None
 
     def _bisect(self, mode: str, path: Solution, low: float, high: float) -> float:
-        """Return the upper end of the bracket (low, high] [s]: a guard has changed there."""
+        """Return the upper end of the bisected bracket (low, high] [s] of a guard change."""
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             if self._has_guard_changed(mode, path(middle), middle):
@@ -223,21 +258,28 @@ class ScipyStepper:
         return high
 
     def _has_guard_changed(self, mode: str, point: StateVector, time: float) -> bool:
+        """Return whether a guard differs at a point from its value at the start of the flow."""
         now, armed = self._guards[mode]
         self._set_point(point, time)
         self._inner.run(f"guards_{mode}")
         return now() != armed()
 
     def _rates_at(self, mode: str, point: StateVector, time: float) -> StateVector:
+        """Return the derivatives of the states at a point and time [s] of the flow."""
         self._set_point(point, time)
         self._inner.run(f"rates_{mode}")
         return list(self._rates())
 
     def _set_point(self, point: StateVector, time: float) -> None:
+        """Set the states and the time [s] at which the blocks of rates and guards are evaluated.
+
+        The time is set only if inputs or delays vary inside a step.
+        """
         if self._is_timed:
             self._inner.set("work.s", time)
         for name, value in zip(self._names, point, strict=True):
             self._inner.set(f"work.at_{name}", value)
 
     def _describe_instant(self, mode: str) -> str:
+        """Return the time, Program and mode for a message."""
         return f"t = {self._time:.9g} s, `{self.program.name}` in mode `{mode}`"

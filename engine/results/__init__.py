@@ -1,1 +1,1 @@
-"""Results of a run: the trajectory, files, comparison and plots."""
+"""Results of a run: trajectories, files, comparisons and plots."""

@@ -1,4 +1,4 @@
-"""Difference picture: the signals that differ most, both runs and their difference beneath."""
+"""Comparison plot: the signals that differ most, with both runs and their difference."""
 
 from __future__ import annotations
 
@@ -12,13 +12,17 @@ from engine.results.run_comparison import RunDifference, SignalDifference, resam
 from engine.results.trajectory import Trajectory
 
 MAX_SIGNALS = 4
-"""Most signals drawn: the picture stays on one page."""
+"""Largest number of drawn signals, so that the picture fits on a page."""
 
 
 def draw_difference(
     a: Trajectory, b: Trajectory, difference: RunDifference, labels: Sequence[str] = ("A", "B")
 ) -> Picture:
-    """Return the picture of two runs; windows in which modes disagree are shaded."""
+    """Return a picture of two runs over their common span, windows of different modes shaded.
+
+    Each drawn signal has a panel with both runs and one with the difference A - B. `labels` name
+    the runs in the title.
+    """
     shown = _most_different(a, difference)
     times = a.times[(a.times >= difference.span[0]) & (a.times <= difference.span[1])]
     with np.errstate(invalid="ignore"):
@@ -39,10 +43,10 @@ def draw_difference(
         line = PlotLine(signal.name, f"A - B, RMS {signal.rms:.3g}", run=2, colour=6)
         panels.append(Panel(f"[{signal.unit}]", [line], 0.9))
     named = [name for name in dict.fromkeys((*a.modes, *b.modes))]
-    apart_in = {window.signal for window in difference.windows}
+    disagreeing = {window.signal for window in difference.windows}
     bands = [
         ModeBand(f"{name.removesuffix('.mode')}, {'AB'[run]}", name, run)
-        for name in [name for name in named if name in apart_in] or named
+        for name in [name for name in named if name in disagreeing] or named
         for run, each in enumerate((a, b))
         if name in each.modes and name in each.signals
     ]
@@ -52,6 +56,8 @@ def draw_difference(
 
 
 def _most_different(a: Trajectory, difference: RunDifference) -> list[SignalDifference]:
+    """Return the signals with the largest RMS difference relative to their peak in `a`."""
+
     def share(signal: SignalDifference) -> float:
         peak = float(np.max(np.abs(np.nan_to_num(a.signals[signal.name])), initial=0.0))
         return signal.rms / peak if peak else signal.rms

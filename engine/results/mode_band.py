@@ -1,4 +1,4 @@
-"""Band: the modes of one automaton as a coloured strip, each stretch named."""
+"""Mode band: draws the modes of one automaton as a coloured strip with names."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from engine.results.samples import SampledRun, SignalArray
 from language.lowering.program_builder import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
-"""Colours that colour-blind readers tell apart (Tol 2021, bright)."""
+"""Colours that colour-blind readers can distinguish (Tol 2021, bright)."""
 INACTIVE_COLOUR = "#dddddd"
-"""Of a region that is in none of its modes, which is no mode of its own."""
+"""Colour of a region while none of its modes is active."""
 LIGHTEN_SHARE, DARKEN_SHARE = 0.55, 0.45
-"""By how much the palette is mixed with white, then with black, for more modes than colours."""
+"""Shares of white and of black by which the palette is extended for more modes."""
 BLACK_TEXT_BRIGHTNESS = 0.6
-"""Brightness from which a name is written in black."""
+"""Brightness above which a name is written in black."""
 BORDER_WIDTH = 0.8
-"""Width of the line between two stretches, at most a quarter of a stretch [points]."""
+"""Width of the line between two segments, at most a quarter of a segment [points]."""
 LABEL_FILL = 0.94
-"""The part of a stretch that its name may fill."""
+"""Largest share of a segment that its name may fill."""
 
 
 @dataclass(frozen=True)
 class ModeBand:
-    """One strip: its label, the mode signal, and the run that it is of."""
+    """Strip of a plot: its label, the mode signal, and the index of its run."""
 
     label: str
     signal: str
@@ -39,7 +39,7 @@ class ModeBand:
 
 @dataclass(frozen=True)
 class ModeSegment:
-    """A time in one mode [s], as far as it is shown."""
+    """Time interval [s] in one mode, clipped to the shown window, with its colour."""
 
     start: float
     end: float
@@ -50,7 +50,10 @@ class ModeSegment:
 def draw_band(
     axis: Axes, trajectory: SampledRun, band: ModeBand, window: tuple[float, float]
 ) -> list[ModeSegment]:
-    """Draw a strip with a legend of all its modes; return what `name_stretches` names."""
+    """Draw a strip with a legend of all shown modes; return its segments for `label_segments`.
+
+    `window` is the shown time [s].
+    """
     names = trajectory.modes[band.signal]
     runs = _equal_mode_runs(trajectory.times, trajectory.signals[band.signal])
     colours = _assign_colours(names, [number for *_, number in runs])
@@ -64,7 +67,7 @@ def draw_band(
         border = min(BORDER_WIDTH, 0.25 * (right - left) * width)
         axis.axvspan(start, end, facecolor=colour, edgecolor="white", lw=border)
         segments.append(ModeSegment(left, right, names.get(number, str(number)), colour))
-    _draw_legend(axis, {stretch.name: stretch.colour for stretch in segments})
+    _draw_legend(axis, {segment.name: segment.colour for segment in segments})
     axis.set_yticks([0.5], [band.label], fontsize=8)
     axis.set_ylim(0.0, 1.0)
     axis.tick_params(length=0, labelbottom=False)
@@ -74,9 +77,10 @@ def draw_band(
 
 
 def label_segments(axis: Axes, segments: Sequence[ModeSegment]) -> None:
-    """Name the stretches into which their name fits whole; the legend keeps the other modes.
+    """Write the names of modes into segments that are wide enough.
 
-    The axes must have their places: the legend can only become narrower.
+    The legend keeps the other modes. The layout of the axes has to be complete, because text widths
+    are measured. The legend can only become narrower.
     """
     left, right = axis.get_xlim()
     points_per_second = LABEL_FILL * axis.get_window_extent().width / (right - left)
@@ -97,16 +101,19 @@ def label_segments(axis: Axes, segments: Sequence[ModeSegment]) -> None:
 
 
 def _assign_colours(names: Mapping[int, str], sequence: Sequence[int]) -> dict[int, str]:
-    """Return a colour for each mode; those that follow each other have never the same one."""
+    """Return a colour for each mode number; consecutive modes have different colours if possible.
+
+    `sequence` has the mode numbers in order of time. Inactive modes are grey.
+    """
     wheel = [
         *PALETTE,
         *(_mix_colour(colour, 1.0, LIGHTEN_SHARE) for colour in PALETTE),
         *(_mix_colour(colour, 0.0, DARKEN_SHARE) for colour in PALETTE),
     ]
     neighbours: dict[int, set[int]] = {}
-    for one, other in itertools.pairwise(sequence):
-        neighbours.setdefault(one, set()).add(other)
-        neighbours.setdefault(other, set()).add(one)
+    for first, second in itertools.pairwise(sequence):
+        neighbours.setdefault(first, set()).add(second)
+        neighbours.setdefault(second, set()).add(first)
     assigned: dict[int, str] = {}
     numbers = sorted({*names, *sequence})
     active = [number for number in numbers if names.get(number) != INACTIVE]
@@ -118,17 +125,19 @@ def _assign_colours(names: Mapping[int, str], sequence: Sequence[int]) -> dict[i
 
 
 def _mix_colour(colour: str, brightness: float, share: float) -> str:
-    """Return a colour mixed with white, 1, or black, 0."""
+    """Return a colour mixed with white (`brightness` 1) or black (0); `share` is their share."""
     red, green, blue = ((1.0 - share) * part + share * brightness for part in to_rgb(colour))
     return to_hex((red, green, blue))
 
 
 def _text_colour(colour: str) -> str:
+    """Return black for bright backgrounds, else white."""
     red, green, blue = to_rgb(colour)
     return "black" if 0.3 * red + 0.59 * green + 0.11 * blue > BLACK_TEXT_BRIGHTNESS else "white"
 
 
 def _draw_legend(axis: Axes, colours: dict[str, str]) -> None:
+    """Replace the legend of an axis; without colours there is none."""
     old_legend = axis.get_legend()
     if old_legend:
         old_legend.remove()
@@ -141,7 +150,7 @@ def _draw_legend(axis: Axes, colours: dict[str, str]) -> None:
 
 
 def _equal_mode_runs(times: SignalArray, modes: SignalArray) -> list[tuple[float, float, int]]:
-    """Return the stretches of equal mode as start, end, number."""
+    """Return maximal intervals of constant mode as start [s], end [s] and mode number."""
     if len(times) == 0:
         return []
     changes = np.flatnonzero(np.diff(modes)) + 1

@@ -1,4 +1,4 @@
-"""Arrow: pyarrow with its Parquet, where it is installed."""
+"""Import of pyarrow with its Parquet module, an optional dependency."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from language.text.diagnostic import MissingToolError
 
 
 def import_pyarrow(feature: str, hint: str = "") -> ModuleType:
-    """Return pyarrow for what needs it. Raises ToolMissing, with what to do `hint`."""
+    """Return pyarrow. Raises MissingToolError, whose text names `feature` and ends with `hint`."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -16,5 +16,5 @@ def import_pyarrow(feature: str, hint: str = "") -> ModuleType:
         raise MissingToolError(
             f"{feature} needs the package `pyarrow`: pip install 'modewright[parquet]'{hint}"
         ) from None
-    found: ModuleType = pyarrow
-    return found
+    module: ModuleType = pyarrow
+    return module

@@ -1,4 +1,4 @@
-"""Plot: runs as a picture: modes as coloured bands above the signals, mode changes marked."""
+"""Plot: draws runs with modes as coloured bands above the signals, and marks mode changes."""
 
 from __future__ import annotations
 
@@ -25,16 +25,22 @@ QUANTITIES = {
     "m/s^2": "acceleration", "rad": "angle", "rad/s": "angular speed",
     "rad/s^2": "angular acceleration", "s": "time",
 }  # fmt: skip
-"""What is written beside a unit on an axis."""
+"""Name of the quantity that an axis shows for a unit."""
 MAX_PEAK_RATIO = 6.0
-"""Ratio of peaks from which two neighbours in size do not share an axis: the smaller looks flat."""
+"""Ratio of peaks above which the next smaller signal gets a panel of its own.
+
+In the panel of the larger one it would look flat.
+"""
 MAX_MARKERS = 200
-"""Most mode changes marked in a panel; beyond, lines would be a grey area."""
+"""Largest number of mode changes marked in a panel; more lines would merge."""
 
 
 @dataclass(frozen=True)
 class PlotLine:
-    """One curve: its signal, its label, a factor to the shown unit, the run that it is of."""
+    """Curve of a panel: signal, label, factor to the shown unit, and index of its run.
+
+    `colour` is an index of the palette; None means the position in the panel.
+    """
 
     signal: str
     label: str
@@ -46,7 +52,7 @@ class PlotLine:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one axis; `height` in inches."""
+    """Curves that share an axis; `height` is in inches."""
 
     title: str
     lines: Sequence[PlotLine]
@@ -55,12 +61,12 @@ class Panel:
 
 @dataclass(frozen=True)
 class Picture:
-    """A drawn figure; a notebook shows it, `data` gives the bytes of a file."""
+    """Drawn figure that a notebook displays and that can be saved."""
 
     figure: Figure
 
     def data(self, form: str = "png") -> bytes:
-        """Return the picture as `png`, `svg` or `pdf`, without a date."""
+        """Return the picture as `png`, `svg` or `pdf` bytes, without a date."""
         buffer = io.BytesIO()
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
         with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
@@ -68,10 +74,11 @@ class Picture:
         return buffer.getvalue()
 
     def save(self, path: str | Path) -> None:
-        """Write the picture; the ending of the name says in which format."""
+        """Write the picture to a file; its suffix gives the format."""
         Path(path).write_bytes(self.data(Path(path).suffix.lower()[1:]))
 
     def _repr_png_(self) -> bytes:
+        """Return the picture as PNG for a notebook."""
         return self.data()
 
 
@@ -83,16 +90,17 @@ def draw_picture(
     span: tuple[float, float] | None = None,
     shaded: Sequence[tuple[float, float]] = (),
 ) -> Picture:
-    """Return a picture: the bands, then the panels, over one axis of time [s].
+    """Return a picture of bands and panels over a common axis of time [s].
 
-    The windows `shaded` [s] are drawn red behind the panels.
+    `span` is the shown time; the windows `shaded` [s] are drawn red behind the panels. Events are
+    those of the first run.
     """
     heights = [0.28] * len(bands) + [panel.height for panel in panels] or [1.0]
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
     window = _time_window(runs, span)
-    strips = [
+    segments_by_band = [
         draw_band(axis, runs[band.run], band, window)
         for axis, band in zip(axes, bands, strict=False)
     ]
@@ -105,10 +113,10 @@ def draw_picture(
     axes[-1].set_xlabel("time [s]")
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlim(*window)
-    if any(strips):
-        figure.draw_without_rendering()  # what fits is known when the axes have their places
-    for axis, stretches in zip(axes, strips, strict=False):
-        label_segments(axis, stretches)
+    if any(segments_by_band):
+        figure.draw_without_rendering()  # widths of labels are known after the layout
+    for axis, segments in zip(axes, segments_by_band, strict=False):
+        label_segments(axis, segments)
     return Picture(figure)
 
 
@@ -119,9 +127,10 @@ def draw_overview(
     title: str = "",
     labels: Sequence[str] = ("A", "B"),
 ) -> Picture:
-    """Return a picture of all signals (or those that match a pattern) of one run or two.
+    """Return a picture of one run or two, of all signals or those that match a pattern.
 
-    The second run is dashed, in the colours of the first. Raises ValueError for an unknown signal.
+    The second run is dashed in the colours of the first. Raises ValueError if a pattern matches no
+    signal.
     """
     _require_matches(runs, patterns)
     two = len(runs) > 1
@@ -138,7 +147,10 @@ def draw_overview(
 def panels_by_unit(
     runs: Sequence[SampledRun], patterns: Sequence[str] = (), labels: Sequence[str] = ("A", "B")
 ) -> list[Panel]:
-    """Return panels of signals by unit, those far apart in size in panels of their own."""
+    """Return panels that group signals by unit and by size.
+
+    Mode signals are left out; a signal in several runs has one curve for each.
+    """
     by_unit: dict[str, list[str]] = {}
     for run in runs:
         for name in run.signals:
@@ -161,12 +173,16 @@ def panels_by_unit(
 
 
 def _has_modes(run: SampledRun, name: str) -> bool:
-    """Tell whether a signal is of modes, not of an automaton that has none of its own."""
+    """Return whether a signal is a mode signal with more than the implicit mode."""
     return set(run.modes.get(name, {}).values()) not in (set(), {IMPLICIT_MODE})
 
 
 def _group_by_magnitude(names: Sequence[str], runs: Sequence[SampledRun]) -> list[list[str]]:
-    """Return names in groups of similar size, none with more than there are colours."""
+    """Return names in groups of similar peak values, each at most as large as the palette.
+
+    A group ends where the next peak is more than `MAX_PEAK_RATIO` times smaller; zero signals join
+    a group.
+    """
     peaks = {name: max(_peak(run, name) for run in runs) for name in names}
     groups: list[list[str]] = []
     last = 0.0
@@ -185,21 +201,23 @@ def _group_by_magnitude(names: Sequence[str], runs: Sequence[SampledRun]) -> lis
 
 
 def _peak(run: SampledRun, name: str) -> float:
-    """Return the largest finite magnitude of a signal, 0 if there is none."""
+    """Return the largest finite magnitude of a signal; 0 if there is none."""
     values = np.abs(run.signals.get(name, np.zeros(0)).astype(np.float64))
     return float(np.max(values, initial=0.0, where=np.isfinite(values)))
 
 
 def axis_title(unit: str) -> str:
-    """Return what is written at an axis: the quantity and its unit."""
+    """Return the title of an axis: quantity and unit, or the unit alone."""
     return f"{QUANTITIES.get(unit, '')} [{unit}]".strip()
 
 
 def _matches(name: str, patterns: Sequence[str]) -> bool:
+    """Return whether a name matches one of the patterns; True without patterns."""
     return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> None:
+    """Raise ValueError for a pattern that matches no signal."""
     known = list(dict.fromkeys(name for run in runs for name in run.signals))
     for pattern in patterns:
         if not fnmatch.filter(known, pattern):
@@ -210,20 +228,22 @@ def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> Non
 def _time_window(
     runs: Sequence[SampledRun], span: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Return what is shown: the span, its infinite ends replaced by those of the runs [s]."""
+    """Return the shown time [s]: the span, with infinite ends replaced by those of the runs.
+
+    An empty span or None gives the whole time of the runs, and runs without samples (0, 1).
+    """
     times = [float(run.times[k]) for run in runs if len(run.times) for k in (0, -1)]
     whole = (min(times), max(times)) if len(set(times)) > 1 else (0.0, 1.0)
     if span is None:
         return whole
-    start, end = (
-        given if np.isfinite(given) else own for given, own in zip(span, whole, strict=True)
-    )
+    start, end = (end if np.isfinite(end) else own for end, own in zip(span, whole, strict=True))
     return (start, end) if start < end else whole
 
 
 def _draw_panel(
     axis: Axes, runs: Sequence[SampledRun], panel: Panel, window: tuple[float, float]
 ) -> None:
+    """Draw the curves of a panel within a window [s]; integer signals are drawn as steps."""
     for k, line in enumerate(panel.lines):
         run = runs[line.run]
         shown = (run.times >= window[0]) & (run.times <= window[1])
@@ -240,7 +260,10 @@ def _draw_panel(
 
 
 def _mark_events(axis: Axes, run: SampledRun, window: tuple[float, float]) -> None:
-    """Mark when a mode became another one, not what fired and left the modes as they were."""
+    """Mark the times of mode changes by dotted lines, at most `MAX_MARKERS`.
+
+    Events that leave the mode unchanged are not marked.
+    """
     times = {e.time for e in run.events if e.target not in ("", e.source)}
     instants = sorted(time for time in times if window[0] <= time <= window[1])
     for k, time in enumerate(instants[:MAX_MARKERS]):

@@ -1,4 +1,4 @@
-"""Rows: what is recorded of a run - every signal that was asked for, at every row's time."""
+"""Row recorder: collects the recorded signals of a run at the times of its rows."""
 
 from __future__ import annotations
 
@@ -20,11 +20,16 @@ from language.model.declaration import Formula
 from language.model.system import Scenario, System
 
 RowValues = tuple[Any, ...]
+"""Values of one row, in the order of the recorded columns."""
 
 
 @dataclass(frozen=True)
 class RecordedColumn:
-    """A recorded signal: the name, its type and unit, and the output block or signal it reads."""
+    """Recorded signal: name, type, unit, and its source.
+
+    An expression is evaluated by the output block `block`; otherwise `source` is the signal to
+    read.
+    """
 
     name: str
     type: ValueType
@@ -36,7 +41,11 @@ class RecordedColumn:
 def recorded_columns(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> tuple[RecordedColumn, ...]:
-    """Return what is recorded: the scenario's choice, else outputs of all and expressions."""
+    """Return the recorded columns of a run.
+
+    These are the signals that the scenario selects; by default all outputs, sensors and expressions
+    of the system.
+    """
     known: dict[str, RecordedColumn] = {}
     for name, thing in system.inputs.items():
         kind: ValueType = "truth" if thing.is_bool else "real"
@@ -66,10 +75,10 @@ def recorded_columns(
 
 
 class RowRecorder:
-    """The rows of a run, in the order of time."""
+    """Recorded rows of a run, in the order of time."""
 
     def __init__(self, columns: tuple[RecordedColumn, ...]) -> None:
-        """Take what is recorded."""
+        """Start without rows."""
         self.columns = columns
         self.times: list[Fraction] = []
         self._rows: list[tuple[Any, ...]] = []
@@ -80,25 +89,31 @@ class RowRecorder:
         read: Callable[[str], Any],
         formula: Callable[[str, Callable[[str], Any]], Any],
     ) -> None:
-        """Add the row of a time: `read` gives a signal, `formula` evaluates an output."""
+        """Append the row of a time [s].
+
+        `read` returns the value of a signal; `formula` evaluates an output block with `read`.
+        """
         self.times.append(time)
         row = [formula(c.block, read) if c.block else read(c.source) for c in self.columns]
         self._rows.append(tuple(row))
 
     def make_row_picker(self, names: Sequence[str]) -> Callable[[RowValues], RowValues] | None:
-        """Return what picks a row out of the values of some signals; None if they are too few."""
+        """Return a function that selects a row from the values of some signals.
+
+        The result is None if a column is an expression or its signal is not among `names`.
+        """
         if any(column.block or column.source not in names for column in self.columns):
             return None
         places = [names.index(column.source) for column in self.columns]
         return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
 
     def extend(self, times: Sequence[Fraction], rows: Iterable[RowValues]) -> None:
-        """Add rows that are complete."""
+        """Append complete rows with their times [s]."""
         self.times += times
         self._rows += rows
 
     def signals(self) -> dict[str, Column]:
-        """Return the values of each signal (n_rows,)."""
+        """Return the values of each column (n_rows,)."""
         columns = list(zip(*self._rows, strict=True)) if self._rows else [()] * len(self.columns)
         return {
             column.name: column_array(column.type, values)
@@ -106,9 +121,9 @@ class RowRecorder:
         }
 
     def units(self) -> dict[str, str]:
-        """Return the unit of each signal."""
+        """Return the unit of each column."""
         return {column.name: column.unit for column in self.columns}
 
     def seconds(self) -> NDArray[np.float64]:
-        """Return the times [s] (n_rows,)."""
+        """Return the times of the rows [s] (n_rows,)."""
         return np.array([float(time) for time in self.times])

@@ -1,4 +1,4 @@
-"""Difference: two runs signal by signal, and where their modes disagree."""
+"""Run comparison: differences of two runs by signal, and times at which their modes differ."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SignalDifference:
-    """One signal: RMS, largest difference and its time [s], and when it first left `allowed`.
+    """Difference of one signal: RMS, largest difference, its time [s], and the allowed difference.
 
-    All in the signal's SI unit; infinite where only one of the two is a number.
+    `first` is the first time [s] above `allowed`, else None. Values are in the SI unit of the
+    signal; they are infinite where only one value is a number.
     """
 
     name: str
@@ -34,7 +35,7 @@ class SignalDifference:
 
 @dataclass(frozen=True)
 class ModeWindow:
-    """A stretch of time [s] in which the modes of a mode signal disagree, both by name."""
+    """Time interval [s] in which a mode signal differs, with both mode names."""
 
     signal: str
     start: float
@@ -45,10 +46,10 @@ class ModeWindow:
 
 @dataclass(frozen=True)
 class ModeSequence:
-    """The transitions of one automaton, or of a region of it, in both runs.
+    """Comparison of the transitions of one automaton or region in both runs.
 
-    `parted` is the first position at which they are not the same (None: never); `apart` is the
-    largest distance in time [s] of two that are the same, before that.
+    `parted` is the index of the first transition that differs (None if none does). `apart` is the
+    largest time distance [s] of corresponding transitions before that.
     """
 
     instance: str
@@ -60,7 +61,11 @@ class ModeSequence:
 
 @dataclass(frozen=True)
 class RunDifference:
-    """All differences of two runs over the span [s] that both cover."""
+    """All differences of two runs over their common span [s].
+
+    `only_a` and `only_b` are signals of one run; `uncovered` [s] is the time that only one run
+    covers.
+    """
 
     span: tuple[float, float]
     samples: int
@@ -73,14 +78,18 @@ class RunDifference:
 
     @property
     def is_within(self) -> bool:
-        """Tell whether nothing is beyond its tolerance, missing, or outside the common span."""
-        lacking = self.only_a or self.only_b or self.uncovered > 0.0 or self.windows
+        """Return whether all signals are within tolerance and nothing is missing.
+
+        Windows of different modes, different transitions, and time or signals of one run alone make
+        the result False.
+        """
+        missing = self.only_a or self.only_b or self.uncovered > 0.0 or self.windows
         parted = any(sequence.parted is not None for sequence in self.sequences)
-        return not lacking and not parted and all(item.first is None for item in self.signals)
+        return not missing and not parted and all(item.first is None for item in self.signals)
 
     @property
     def first(self) -> tuple[float, str] | None:
-        """When and in what the runs part first."""
+        """First time [s] and signal that differ, modes included; None if there is none."""
         found = [(item.first, item.name) for item in self.signals if item.first is not None]
         found += [(window.start, window.signal) for window in self.windows]
         return min(found, default=None)
@@ -96,11 +105,12 @@ def compare_runs(
     patterns: Sequence[str] = (),
     span: tuple[float, float] | None = None,
 ) -> RunDifference:
-    """Compare two runs at the samples of `a`; `b` is read between its samples if need be.
+    """Compare two runs at the samples of `a`; `b` is interpolated if it has other samples.
 
-    A signal may differ by `relative` times its peak in `a`, or by its tolerance (keys are patterns
-    of names, values in SI); without either, by nothing. Modes may disagree for `slack` [s].
-    Raises ValueError for runs without common time or signal, and for different units.
+    A signal may differ by the larger of `relative` times its peak in `a` and its tolerance
+    (patterns of names with values in SI); without both by nothing. Modes may differ for `slack`
+    [s]. Raises ValueError for runs without common time or signal, for different units and for a
+    tolerance that matches no signal.
     """
     names = [name for name in a.signals if _matches(name, patterns)]
     common = [name for name in names if name in b.signals]
@@ -127,7 +137,7 @@ def compare_runs(
 
 
 def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
-    """Return a signal at given times (n,): reals on straight lines, whole numbers held."""
+    """Return a signal at times (n,): reals interpolated linearly, integers held."""
     values = trajectory.signals[name]
     if trajectory.times.tobytes() == times.tobytes():
         return values.astype(np.float64)
@@ -139,13 +149,18 @@ def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
 
 
 def _hold_previous(sample_times: Reals, values: SignalArray, times: Reals) -> SignalArray:
+    """Return the values of the last sample up to each time; the first value before it."""
     return values[np.maximum(np.searchsorted(sample_times, times, side="right") - 1, 0)]
 
 
 def _common_times(
     a: Trajectory, b: Trajectory, span: tuple[float, float] | None
 ) -> tuple[Reals, float]:
-    """Return the times of `a` that both cover, and how many seconds only one covers."""
+    """Return the sample times [s] of `a` in the common span, and the time that is not common.
+
+    The second value [s] is the time that one run alone covers. Raises ValueError if a run has no
+    samples or the runs have no time in common.
+    """
     if not len(a.times) or not len(b.times):
         raise ValueError("a run without samples cannot be compared")
     wanted = span or (-np.inf, np.inf)
@@ -160,6 +175,10 @@ def _common_times(
 def _require_comparable(
     a: Trajectory, b: Trajectory, common: Sequence[str], tolerances: Mapping[str, float]
 ) -> None:
+    """Raise ValueError if two runs cannot be compared.
+
+    The reasons are no common signal, different units, and a tolerance that matches no signal.
+    """
     if not common:
         raise ValueError("the runs have no signal in common")
     for name in common:
@@ -171,12 +190,14 @@ def _require_comparable(
 
 
 def _matches(name: str, patterns: Sequence[str]) -> bool:
+    """Return whether a name matches one of the patterns; True without patterns."""
     return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _tolerance_of(
     name: str, run: Trajectory, relative: float, tolerances: Mapping[str, float]
 ) -> float:
+    """Return the allowed difference of a signal in SI: the largest that applies."""
     values = np.abs(run.signals[name].astype(np.float64))
     peak = float(np.max(values, initial=0.0, where=np.isfinite(values)))
     given = [value for pattern, value in tolerances.items() if fnmatch.fnmatchcase(name, pattern)]
@@ -186,10 +207,11 @@ def _tolerance_of(
 def _compare_signal(
     name: str, a: Trajectory, b: Trajectory, times: Reals, allowed: float
 ) -> SignalDifference:
-    ours, theirs = resample_signal(a, name, times), resample_signal(b, name, times)
-    same = (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))
+    """Return the difference of a signal at some times; two NaNs are equal."""
+    values_a, values_b = resample_signal(a, name, times), resample_signal(b, name, times)
+    same = (values_a == values_b) | (np.isnan(values_a) & np.isnan(values_b))
     with np.errstate(invalid="ignore", over="ignore"):
-        apart = np.where(same, 0.0, np.abs(ours - theirs))
+        apart = np.where(same, 0.0, np.abs(values_a - values_b))
         apart = np.where(np.isnan(apart), np.inf, apart)
         rms = float(np.sqrt(np.mean(apart**2)))
     beyond = np.flatnonzero(apart > allowed)
@@ -200,22 +222,30 @@ def _compare_signal(
 
 
 def _mode_windows(name: str, a: Trajectory, b: Trajectory, times: Reals) -> list[ModeWindow]:
-    ours = _mode_names(a, b, name, times)
-    theirs = _mode_names(b, a, name, times)
-    found: list[ModeWindow] = []
-    for k, (one, other) in enumerate(zip(ours, theirs, strict=True)):
-        if one == other:
+    """Return the intervals in which a mode signal differs.
+
+    Adjacent ones with equal modes are merged.
+    """
+    names_a = _mode_names(a, b, name, times)
+    names_b = _mode_names(b, a, name, times)
+    windows: list[ModeWindow] = []
+    for k, (mode_a, mode_b) in enumerate(zip(names_a, names_b, strict=True)):
+        if mode_a == mode_b:
             continue
         end = float(times[min(k + 1, len(times) - 1)])
-        last = found[-1] if found else None
-        if last and last.end == times[k] and (last.a, last.b) == (one, other):
-            found[-1] = ModeWindow(name, last.start, end, one, other)
+        last = windows[-1] if windows else None
+        if last and last.end == times[k] and (last.a, last.b) == (mode_a, mode_b):
+            windows[-1] = ModeWindow(name, last.start, end, mode_a, mode_b)
         else:
-            found.append(ModeWindow(name, float(times[k]), end, one, other))
-    return found
+            windows.append(ModeWindow(name, float(times[k]), end, mode_a, mode_b))
+    return windows
 
 
 def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> list[str]:
+    """Return the mode names of a signal at some times.
+
+    Names of the other run replace missing ones.
+    """
     names = run.modes.get(name) or other.modes[name]
     values = run.signals[name]
     held = (
@@ -229,8 +259,12 @@ def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> 
 def _compare_mode_sequences(
     a: Trajectory, b: Trajectory, common: Sequence[str], span: tuple[float, float]
 ) -> list[ModeSequence]:
+    """Return the comparisons of transitions of each automaton and region.
+
+    The result is empty if a run has no mode names.
+    """
     if not a.modes or not b.modes:
-        return []  # samples alone: what is not known is not compared
+        return []  # a run of samples alone has no events to compare
     compared = {name.rpartition(".")[0] for name in common}
     parts = dict.fromkeys((event.instance, event.region) for event in (*a.events, *b.events))
     found = []
@@ -258,4 +292,5 @@ def _compare_mode_sequences(
 
 
 def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
+    """Return the events within a time span [s], ends included."""
     return [event for event in events if span[0] <= event.time <= span[1]]

@@ -1,7 +1,8 @@
-"""Run file: a trajectory as CSV with a side file, or as Parquet, read back bit for bit.
+"""Run file: stores a trajectory as CSV with a side file, or as Parquet, without loss.
 
-A CSV holds the samples alone, so that anything can read it; beside `run.csv` stands `run.csv.json`
-with mode names, events and why the run stopped. Parquet keeps both in one file. All NaNs are one.
+A CSV has only the samples, so other tools can read it. `run.csv.json` beside `run.csv` has mode
+names, events and the reason for which the run stopped. Parquet has both in one file. NaN payloads
+are not kept.
 """
 
 from __future__ import annotations
@@ -24,15 +25,17 @@ from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 
 FORMATS = (".csv", ".parquet")
+"""Suffixes of run files."""
 FORMAT_VERSION = 1
-"""Form of the side data; a file of a later form is refused."""
+"""Version of the side data; files of another version are refused."""
 SideData = dict[str, Any]
+"""Content of the side file: names, columns, modes, events, stop reason and faults."""
 
 
 def encode_run(trajectory: Trajectory, path: Path) -> dict[Path, bytes]:
-    """Return what is written for a trajectory, by path: CSV and its side file, or Parquet.
+    """Return the files of a trajectory as bytes by path: CSV and its side file, or Parquet.
 
-    Raises ToolMissing (no pyarrow), ValueError (another ending).
+    Raises MissingToolError without pyarrow, and ValueError for another suffix.
     """
     if path.suffix.lower() == ".parquet":
         return {path: _encode_parquet(trajectory)}
@@ -43,9 +46,10 @@ def encode_run(trajectory: Trajectory, path: Path) -> dict[Path, bytes]:
 
 
 def read_run(path: Path) -> Trajectory:
-    """Read a trajectory that was written by `run_files`; a CSV without side file has no events.
+    """Read a trajectory that `encode_run` wrote.
 
-    Raises SpecError, ToolMissing.
+    A CSV without side file has no events and no mode names. Raises SpecError, and MissingToolError
+    without pyarrow.
     """
     if path.suffix.lower() == ".parquet":
         return _read_parquet(path)
@@ -57,11 +61,12 @@ def read_run(path: Path) -> Trajectory:
 
 
 def side_path(path: Path) -> Path:
-    """Return the path of the side file of a CSV."""
+    """Return the path of the side file of a CSV: its name with `.json` appended."""
     return path.with_name(path.name + ".json")
 
 
 def _side_data(trajectory: Trajectory) -> SideData:
+    """Return the side data of a trajectory."""
     return {
         "modewright": FORMAT_VERSION,
         "name": trajectory.name,
@@ -84,8 +89,12 @@ def _build_trajectory(
     columns: Sequence[SignalArray],
     side: SideData,
 ) -> Trajectory:
-    wanted = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
-    if side and side.get("columns") != wanted:
+    """Return the trajectory of columns and side data; the first column is the time.
+
+    Raises SpecError if the side data belong to other columns or are damaged.
+    """
+    headers = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
+    if side and side.get("columns") != headers:
         label = f"{side_path(path).name} belongs to another run: its columns are not those here"
         raise _read_error(path, "column", label, "remove it, or write both anew")
     whole = side.get("whole", ())
@@ -110,6 +119,7 @@ def _build_trajectory(
 
 
 def _mode_names(modes: Mapping[str, Mapping[str, str]]) -> dict[str, dict[int, str]]:
+    """Return mode names with the numbers as integers; JSON keys are texts."""
     return {
         signal: {int(number): name for number, name in names.items()}
         for signal, names in modes.items()
@@ -117,6 +127,7 @@ def _mode_names(modes: Mapping[str, Mapping[str, str]]) -> dict[str, dict[int, s
 
 
 def _read_side(path: Path) -> SideData:
+    """Read a side file. Raises SpecError if it is unreadable or of another version."""
     try:
         side = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError) as error:
@@ -127,6 +138,7 @@ def _read_side(path: Path) -> SideData:
 
 
 def _read_csv(path: Path) -> tuple[list[str], list[str], list[SignalArray]]:
+    """Return the names, units and arrays of the columns of a CSV. Raises SpecError."""
     try:
         rows = list(csv.reader(io.StringIO(path.read_text("utf-8")), strict=True))
     except OSError as error:
@@ -147,6 +159,7 @@ def _read_csv(path: Path) -> tuple[list[str], list[str], list[SignalArray]]:
 
 
 def _names_and_units(path: Path, heads: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the names and units of headers `name [unit]`. Raises SpecError for other headers."""
     parts = [head.removesuffix("]").rpartition(" [") for head in heads]
     for head, (name, _, _) in zip(heads, parts, strict=True):
         if not name or not head.endswith("]") or heads.count(head) > 1:
@@ -155,7 +168,10 @@ def _names_and_units(path: Path, heads: Sequence[str]) -> tuple[list[str], list[
 
 
 def _parse_column(path: Path, rows: Sequence[Sequence[str]], position: int) -> SignalArray:
-    """Return a column: whole numbers if no cell has a point, an exponent or a word."""
+    """Return a column: integers if no cell has a point, an exponent or a word, else reals.
+
+    The time column is always real. Raises SpecError for a cell that is not a number.
+    """
     cells = [row[position] for row in rows[1:]]
     if position > 0 and cells and all(cell.removeprefix("-").isdecimal() for cell in cells):
         with suppress(OverflowError):
@@ -171,10 +187,13 @@ def _parse_column(path: Path, rows: Sequence[Sequence[str]], position: int) -> S
 
 
 def _encode_parquet(trajectory: Trajectory) -> bytes:
+    """Return a trajectory as the bytes of a Parquet file, with the side data as metadata."""
     arrow = import_pyarrow("Parquet", "; or write .csv")
     columns = [trajectory.times, *trajectory.signals.values()]
-    kept = {b"modewright": json.dumps(_side_data(trajectory), allow_nan=False).encode()}
-    table = arrow.table(dict(zip(column_headers(trajectory), columns, strict=True)), metadata=kept)
+    metadata = {b"modewright": json.dumps(_side_data(trajectory), allow_nan=False).encode()}
+    table = arrow.table(
+        dict(zip(column_headers(trajectory), columns, strict=True)), metadata=metadata
+    )
     sink = arrow.BufferOutputStream()
     arrow.parquet.write_table(table, sink)
     data: bytes = sink.getvalue().to_pybytes()
@@ -182,6 +201,7 @@ def _encode_parquet(trajectory: Trajectory) -> bytes:
 
 
 def _read_parquet(path: Path) -> Trajectory:
+    """Read a trajectory from Parquet. Raises SpecError, MissingToolError."""
     arrow = import_pyarrow("Parquet", "; or write .csv")
     try:
         table = arrow.parquet.read_table(path)
@@ -199,6 +219,7 @@ def _read_parquet(path: Path) -> Trajectory:
 
 
 def _read_error(path: Path, kind: str, label: str, help: str = "", line: int = 1) -> SpecError:
+    """Return the error of a run file at a line."""
     problems = Problems()
     problems.error(kind, Span(Source(display_path(path)), line, 1), label, help)
     return SpecError(problems.reported)

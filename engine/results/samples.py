@@ -1,29 +1,27 @@
-"""Samples: signals over time with modes and events, as plots and comparisons read them."""
+"""Sampled run: the protocol of sampled signals with modes and events that plots read."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from language.ir.regions import CHART
 
-if TYPE_CHECKING:
-    pass
-
 SignalArray = NDArray[np.float64] | NDArray[np.int64]
+"""Samples of a signal (n_samples,): reals, or integers for modes, counters and truth values."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """A transition: time [s], micro-step at that instant, and what changed.
+    """Transition, range violation or invariant violation at a time [s].
 
-    In a chart a transition `to: []` has no target: nothing is entered.
-    Of another `kind` is a signal that left its range, or an invariant that ceased to hold:
-    `transition` names it, `message` says how, `source` and `target` are both the mode.
+    `micro_step` counts the micro-steps at that instant. A transition `to: []` of a chart has an
+    empty target. For the kinds `range` and `invariant`, `transition` names the signal or invariant,
+    `message` describes it, and `source` and `target` are the mode.
     """
 
     time: float
@@ -38,28 +36,28 @@ class Event:
 
 
 class SampledRun(Protocol):
-    """Samples of signals over time, as `Trajectory` holds them: what a plot reads."""
+    """Samples of signals over time, as `Trajectory` has them."""
 
     @property
     def name(self) -> str:
-        """The name of the run."""
+        """Name of the run."""
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """The times of the samples (n_samples,) [s]."""
+        """Times of the samples (n_samples,) [s]."""
 
     @property
     def signals(self) -> Mapping[str, SignalArray]:
-        """The samples of each signal (n_samples,), in SI."""
+        """Samples of each signal (n_samples,), in SI."""
 
     @property
     def units(self) -> Mapping[str, str]:
-        """The SI unit of each signal."""
+        """SI unit of each signal."""
 
     @property
     def modes(self) -> Mapping[str, Mapping[int, str]]:
-        """The names of the modes of each mode signal, by number."""
+        """Names of the modes of each mode signal, by number."""
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """The transitions and violations, in the order of time."""
+        """Transitions and violations, in the order of time."""

@@ -1,4 +1,4 @@
-"""Trajectory: values over time with modes, and the events in between."""
+"""Trajectory: the sampled signals, modes and events of one run."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ if TYPE_CHECKING:
     from engine.results.plot import Picture
 
 TIME_HEADER = "t [s]"
-"""Head of the first column of every table of samples."""
+"""Header of the first column of a table of samples."""
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Samples of signals (n_samples,) each, in SI, and all events up to `stopped`.
+    """Samples of signals (n_samples,) in SI, and all events.
 
-    `signals` are keyed `instance.output`; modes are whole numbers, `modes` names them.
-    `stopped` says why the run ended before the horizon; None if it did not. `faults` are the
-    latched fault bits as `instance: fault`; a run with one does not count for accuracy (rule 18).
+    `signals` are keyed `instance.output`; mode signals are integers, and `modes` gives their names.
+    `stopped` is the reason why the run ended before the horizon, else None. `faults` are the
+    latched fault bits as `instance: fault`; runs with a fault are excluded from accuracy
+    measurements (rule 18).
     """
 
     name: str
@@ -41,11 +42,14 @@ class Trajectory:
     faults: tuple[str, ...] = ()
 
     def events_of(self, instance: str) -> tuple[Event, ...]:
-        """Return the events of one instance."""
+        """Return the events of one instance, in the order of time."""
         return tuple(event for event in self.events if event.instance == instance)
 
     def csv(self) -> str:
-        """Return the samples as CSV: a head line with units, shortest exact decimals."""
+        """Return the samples as CSV text with a header of names and units.
+
+        Reals are the shortest decimals that read back exactly.
+        """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(column_headers(self))
@@ -54,9 +58,9 @@ class Trajectory:
         return text.getvalue()
 
     def frame(self) -> Any:
-        """Return a pandas DataFrame over time: reals in SI, modes by name, `attrs["units"]`.
+        """Return a pandas DataFrame indexed by time: reals in SI, modes as categories of names.
 
-        Raises ToolMissing.
+        `attrs["units"]` has the units. Raises MissingToolError without pandas.
         """
         try:
             import pandas
@@ -79,24 +83,28 @@ class Trajectory:
         return frame
 
     def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
-        """Return a picture: signals by unit (patterns such as `plant.*`; all), modes, events."""
+        """Return a picture of signals by unit, modes and events.
+
+        `signals` are patterns such as `plant.*`; all signals if empty. `span` is the shown time
+        [s].
+        """
         from engine.results.plot import draw_overview
 
         return draw_overview([self], signals, span)
 
 
 def column_headers(trajectory: Trajectory) -> list[str]:
-    """Return the heads of a table of samples: `name [unit]`, the time first."""
+    """Return the headers of a table of samples, `name [unit]`; the first is the time."""
     return [TIME_HEADER, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
 
 
 def column_array(kind: str, values: Sequence[float | int | bool]) -> SignalArray:
-    """Return the values of one signal (n_samples,): doubles for reals, else whole numbers."""
+    """Return the values of a signal (n_samples,): float64 if `kind` is `real`, else int64."""
     if kind == "real":
         return np.array(values, dtype=np.float64)
     return np.array(values, dtype=np.int64)
 
 
 def fault_names(name: str, program: Program, word: int) -> tuple[str, ...]:
-    """Return the names of the latched bits of a fault word, as `instance: fault`."""
+    """Return the names of the bits set in a fault word as `instance: fault`, lowest bit first."""
     return tuple(f"{name}: {fault}" for bit, fault in enumerate(program.faults) if word >> bit & 1)

@@ -1,4 +1,4 @@
-"""Check of actions: assignments, and what a transition says - its target, guard, wait, resets."""
+"""Check of actions and transitions: assignments, targets, guards, waits and resets."""
 
 from __future__ import annotations
 
@@ -24,11 +24,14 @@ def check_assignments(
     check: TypeChecker,
     problems: Problems,
 ) -> None:
-    """Report assignments to what is not carried, and values of another kind."""
+    """Report assignments to names that are not states or discrete variables, and wrong value types.
+
+    Invalid names are skipped because the reader has reported them.
+    """
     for name, formula in formulas.items():
         kind = check.environment.types.get(name)
         if not NAME_PATTERN.fullmatch(name):
-            continue  # told where it was read
+            continue  # the reader has reported it
         if name not in automaton.state_variables:
             hint = _assignment_hint(automaton, name) or suggest_name(
                 name, automaton.state_variables
@@ -40,7 +43,7 @@ def check_assignments(
 
 
 def _assignment_hint(automaton: Automaton, name: str) -> str:
-    """Return what is done with a known name that is not assigned."""
+    """Return a hint for an assigned event, input or parameter; an empty text for other names."""
     if automaton.statechart and name in automaton.statechart.events:
         return f"it is an event: a transition raises it, `raise: {name}`"
     if name in automaton.inputs:
@@ -57,11 +60,14 @@ def check_mode_transitions(
     parameter_check: TypeChecker,
     problems: Problems,
 ) -> None:
-    """Report mistakes in the transitions and invariants of a mode; `parameter_check` knows parameters."""
-    remembered = frozenset(
+    """Report mistakes in the transitions and invariants of a mode.
+
+    `check` knows all names of the mode. `parameter_check` knows parameters only and checks waits.
+    """
+    memory_functions = frozenset(
         MEMORY_FUNCTIONS if automaton.is_sampled else ("delay", *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
     )
-    guards = dataclasses.replace(check.environment, memory_functions=remembered)
+    guards = dataclasses.replace(check.environment, memory_functions=memory_functions)
     guard = TypeChecker(guards, problems)
     for transition in mode.transitions:
         _check_target(automaton, transition, problems)
@@ -83,7 +89,7 @@ def check_mode_transitions(
 
 
 def _check_target(automaton: Automaton, transition: Transition, problems: Problems) -> None:
-    """In a chart its own check looks targets up."""
+    """Report a target that is not a mode of the region; charts are checked elsewhere."""
     region = automaton.region(transition.region)
     if automaton.statechart is None and transition.target not in region.modes:
         label = f"there is no mode `{transition.target}`"
@@ -94,6 +100,7 @@ def _check_target(automaton: Automaton, transition: Transition, problems: Proble
 
 
 def _check_fixed_time(automaton: Automaton, time: Formula, problems: Problems) -> None:
+    """Report parameters in a time that are not fixed."""
     for read in names(time.tree):
         parameter = automaton.parameters.get(read.path)
         if parameter and parameter_kinds(automaton)[read.path] != "fixed":

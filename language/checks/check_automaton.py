@@ -1,4 +1,8 @@
-"""Check: names, dimensions, order and completeness of a read automaton, all problems at once."""
+"""Check of an automaton: names, dimensions, order and completeness, with all problems in one pass.
+
+The input is the automaton that the reader built; the result has the types of all names. The other
+modules of this package are called from here or from check_warnings.py.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +51,10 @@ from language.typecheck.types import EnumType, ExprType, IntType
 
 
 def check_flow(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
-    """Report states of a mode of the chart that nothing balances, then its balances."""
+    """Report states without a balance in a mode of a continuous automaton, then check its balances.
+
+    A state that a parallel region balances needs none.
+    """
     problems = check.problems
     if automaton.is_sampled:
         return
@@ -65,7 +72,7 @@ def check_flow(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
 
 
 def check_balances(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
-    """Report balances whose two sides differ, or of no state."""
+    """Report balances of names that are not states, and sides of different dimension."""
     problems = check.problems
     for name, balance in mode.flow.items():
         if name not in automaton.states:
@@ -88,7 +95,7 @@ def check_balances(automaton: Automaton, mode: Mode, check: TypeChecker) -> None
 
 
 def check_elements(automaton: Automaton, names: Mapping[str, ExprType], problems: Problems) -> None:
-    """Report names in elements and places that are not there."""
+    """Report unknown names in elements and places, and mistakes in their formulas."""
     check = TypeChecker(NameEnvironment(names), problems)
     for element in automaton.elements.values():
         for formula in element.parts.values():
@@ -108,19 +115,21 @@ def check_elements(automaton: Automaton, names: Mapping[str, ExprType], problems
 
 
 MAX_EQUATIONS = 100_000
-"""Equations and balances of all modes: half of what a spec may have of keys and values."""
-
+"""Largest number of equations and balances in all modes: half of the keys and values of a spec."""
 MAX_TRANSITIONS = 200
-"""Transitions that leave a mode: in the Program and in C each is inside the one before it."""
+"""Largest number of transitions that leave a mode: the Program and the C code nest them."""
 
 
 def check_size(automaton: Automaton, problems: Problems) -> None:
-    """What stands at the root holds in every mode: the Program has it once for each."""
+    """Report an automaton with too many equations or transitions; raises SpecError then.
+
+    Equations at the root count once for each mode, because the Program repeats them.
+    """
     modes = automaton.all_modes
     before = len(problems.reported)
-    held = sum(len(mode.equations) + len(mode.flow) for mode in modes)
-    if held > MAX_EQUATIONS:
-        label = f"the modes have {held} equations and balances, those of the root in each of them"
+    count = sum(len(mode.equations) + len(mode.flow) for mode in modes)
+    if count > MAX_EQUATIONS:
+        label = f"the modes have {count} equations and balances, those of the root in each of them"
         problems.error("huge", automaton.span, label, f"at most {MAX_EQUATIONS} are checked")
     for mode in modes:
         if len(mode.transitions) > MAX_TRANSITIONS:
@@ -131,12 +140,14 @@ def check_size(automaton: Automaton, problems: Problems) -> None:
 
 
 WHOLE_KINDS = (IntType, EnumType)
+"""Types with integer values."""
 
 
 def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
-    """Return a read automaton with the dimensions of its names. Raises SpecError.
+    """Return the automaton with the types and dimensions of its names. Raises SpecError.
 
-    All problems are reported, with those that `problems` holds already.
+    The error contains all problems, including those that `problems` has before. The model of a
+    sampled automaton is checked too. Warnings about unused names are added.
     """
     if automaton.model:
         automaton = dataclasses.replace(
@@ -161,11 +172,12 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
 
 
 def _check_declarations(automaton: Automaton, problems: Problems) -> Automaton:
+    """Return the automaton with types after the checks of names and dimensions."""
     return _AutomatonChecker(automaton, problems).run()
 
 
 class _AutomatonChecker:
-    """One method per rule; the names known at each place are the scopes."""
+    """Checks of names and dimensions; each part of a spec has a name environment."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
         self.automaton = automaton
@@ -179,6 +191,7 @@ class _AutomatonChecker:
         }
 
     def run(self) -> Automaton:
+        """Run all checks and return the automaton with dimensions, types and marked equations."""
         automaton = self.automaton
         self.kinds, self.literal_kinds = declared_names(automaton, self.problems)
         self._check_parameters()
@@ -216,10 +229,11 @@ class _AutomatonChecker:
         )
 
     def _mark_whole_modes(self, modes: Mapping[str, Mode]) -> dict[str, Mode]:
+        """Return the modes with their integer equations marked."""
         return {name: self._mark_whole_equations(mode) for name, mode in modes.items()}
 
     def _mark_whole_equations(self, mode: Mode) -> Mode:
-        """Mark the equations whose value is a whole number, in whatever mode it is given so."""
+        """Return the mode with `is_integer` set on equations whose name has an integer type."""
         marked = {
             name: dataclasses.replace(formula, is_integer=True)
             for name, formula in mode.equations.items()
@@ -228,6 +242,10 @@ class _AutomatonChecker:
         return dataclasses.replace(mode, equations={**mode.equations, **marked})
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> NameEnvironment:
+        """Return the environment of the names in some groups and of enumeration values.
+
+        `place` describes it in messages.
+        """
         known = {name: self.kinds[name] for group in groups for name in group}
         known = {**self.literal_kinds, **known}
         return NameEnvironment(
@@ -235,19 +253,24 @@ class _AutomatonChecker:
         )
 
     def _memory_functions(self) -> frozenset[str]:
-        """Return the functions with memory that are for every expression of a mode."""
+        """Return the functions with memory that any expression of a mode may call."""
         return frozenset(DELAY_FUNCTIONS if self.automaton.is_sampled else ("delay",))
 
     def _lookup_tables(self) -> dict[str, LookupTable]:
+        """Return the tables of parameters by name."""
         declared = self.automaton.parameters.items()
         return {name: thing.table for name, thing in declared if thing.table}
 
     def _angle_units(self) -> dict[str, Unit]:
-        """Return the units of the parameters whose value is declared in a unit of angle."""
+        """Return the units of the parameters that are declared in a unit of angle."""
         declared = self.automaton.parameters.items()
         return {name: thing.unit for name, thing in declared if thing.unit.dimension.angle}
 
     def _check_parameters(self) -> None:
+        """Report derived parameters of a wrong dimension and cycles among them.
+
+        Parameters of the model are checked with the model.
+        """
         automaton = self.automaton
         scope = self._scope([automaton.parameters], "among the parameters")
         check = TypeChecker(scope, self.problems)
@@ -261,6 +284,7 @@ class _AutomatonChecker:
         report_cycle(trees, spans, "derived", self.problems)
 
     def _check_initial_values(self) -> None:
+        """Report initial values of a wrong type and cycles among them."""
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.state_variables]
         check = TypeChecker(self._scope(groups, "where a state starts"), self.problems)
@@ -271,6 +295,7 @@ class _AutomatonChecker:
         report_cycle(trees, spans, "initial", self.problems)
 
     def _check_mode(self, mode: Mode) -> None:
+        """Check a mode of the chart: equations in order, flow, actions, transitions, observer."""
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.state_variables]
         known = dict(self._scope(groups, "").types)
@@ -281,9 +306,16 @@ class _AutomatonChecker:
             modes |= {f"{automaton.model.name}.{name}" for name in automaton.model.modes}
             modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
         formulas = equation_formulas(mode)
-        kept, owners = self._memory_functions(), self.equation_owners
+        memory, owners = self._memory_functions(), self.equation_owners
         scope = NameEnvironment(
-            known, modes, place, self._angle_units(), kept, self._lookup_tables(), mode.name, owners
+            known,
+            modes,
+            place,
+            self._angle_units(),
+            memory,
+            self._lookup_tables(),
+            mode.name,
+            owners,
         )
         scope = dataclasses.replace(scope, events=_event_names(automaton))
         check = TypeChecker(scope, self.problems)
@@ -297,14 +329,17 @@ class _AutomatonChecker:
             check_assignments(automaton, assignments, check, self.problems)
         self._check_transitions(mode, check)
         if mode.observer:
-            plain = TypeChecker(
+            memoryless = TypeChecker(
                 dataclasses.replace(scope, memory_functions=frozenset()), self.problems
             )
-            check_observer(automaton, mode.observer, self.kinds, plain)
+            check_observer(automaton, mode.observer, self.kinds, memoryless)
         check_writers(automaton, mode, self.problems)
 
     def _common_equations_check(self, place: str, active_modes: Iterable[Mode] = ()) -> TypeChecker:
-        """What is beside the chart reads what every mode of it, or each of some of them, has."""
+        """Return a type checker that knows the equations of all modes in `active_modes`.
+
+        If `active_modes` is empty, these are the equations that every mode of the chart has.
+        """
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.state_variables]
         known = dict(self._scope(groups, "").types)
@@ -323,6 +358,7 @@ class _AutomatonChecker:
         return TypeChecker(scope, self.problems)
 
     def _check_parallel_mode(self, mode: Mode) -> None:
+        """Check a mode of a parallel region or a superstate: balances, actions, transitions."""
         automaton = self.automaton
         place = f"beside every mode of the chart, in region `{mode.region}`"
         if automaton.statechart:
@@ -335,7 +371,10 @@ class _AutomatonChecker:
         check_writers(automaton, mode, self.problems)
 
     def _concurrent_modes(self, mode: Mode) -> list[Mode]:
-        """Return the modes of the chart that may be active together with another."""
+        """Return the modes that can be active together with a mode.
+
+        These are the nested leaves of the chart, or all modes if there is no such leaf.
+        """
         automaton = self.automaton
         found = list(automaton.modes.values())
         if automaton.statechart:
@@ -346,12 +385,17 @@ class _AutomatonChecker:
         return found
 
     def _check_transitions(self, mode: Mode, check: TypeChecker) -> None:
+        """Check the transitions of a mode; waits may read parameters only."""
         parameters = self._scope([self.automaton.parameters], "in `wait`: it is a fixed time")
         constant = TypeChecker(parameters, self.problems)
         check_mode_transitions(self.automaton, mode, check, constant, self.problems)
 
     def _merge_kinds(self, name: str, kind: ExprType | None, formula: Formula) -> ExprType | None:
-        """Return what a name is, and report where two modes disagree on it."""
+        """Return the type of an equation after a formula of type `kind` is added.
+
+        Integer types are merged to their hull; a bare 0 accepts any dimension. Contradicting types
+        of two modes are reported, and the earlier type is returned.
+        """
         before = self.kinds.get(name)
         if kind is None:
             return before
@@ -382,15 +426,20 @@ class _AutomatonChecker:
 
 
 def _model_parameters(automaton: Automaton) -> Mapping[str, object]:
+    """Return the parameters of the model; an empty mapping without a model."""
     return automaton.model.parameters if automaton.model else {}
 
 
 def _event_names(automaton: Automaton) -> frozenset[str]:
+    """Return the names of the events of the chart."""
     return frozenset(automaton.statechart.events if automaton.statechart else ())
 
 
 def _mode_paths(automaton: Automaton) -> frozenset[str]:
-    """Return the modes that `in` may name: of parallel regions, by region and mode."""
+    """Return the names that `in(...)` accepts: mode paths of a chart, or `region.mode`.
+
+    There are none for an automaton with one region.
+    """
     if automaton.statechart:
         return frozenset(mode_paths(automaton.statechart))
     if not automaton.regions:

@@ -1,4 +1,4 @@
-"""Check of a chart: what its regions may write, what can be entered, what can come to its end."""
+"""Check of charts: targets, histories, completions, priorities and writers (rules 3 and 14)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from language.text.diagnostic import Problems, Span
 
 
 def check_chart(automaton: Automaton, problems: Problems) -> None:
-    """Report what a chart cannot do."""
+    """Report invalid transitions, modes and regions of a chart; other automata have no problem."""
     chart = automaton.statechart
     if chart is None:
         return
@@ -35,9 +35,10 @@ def check_chart(automaton: Automaton, problems: Problems) -> None:
 def unreachable_chart_modes(
     automaton: Automaton, chart: Chart, dead_transitions: Set[str]
 ) -> list[Mode]:
-    """Return the modes that nothing leads to but silent transitions, given by their key paths.
+    """Return the modes of a chart that no transition outside of `dead_transitions` leads to.
 
-    Entering over-estimates what a history may enter.
+    `dead_transitions` are keys. The set of modes that a history can enter is over-estimated. The
+    fault mode and the initial modes are reachable.
     """
     seen = {node.index for node in chart.initial_configuration()}
     if automaton.fault_mode:
@@ -60,7 +61,11 @@ def unreachable_chart_modes(
 
 
 def _entry_set(chart: Chart, targets: list[int]) -> set[int]:
-    """Return what entering some nodes enters: those around them and what they start with."""
+    """Return the indices of the nodes that are active after some nodes are entered.
+
+    These are the initial configurations of the nodes, their ancestors, and the other regions of
+    parallel ancestors.
+    """
     found: set[int] = set()
     for target in targets:
         node = chart.nodes[target]
@@ -73,6 +78,10 @@ def _entry_set(chart: Chart, targets: list[int]) -> set[int]:
 
 
 def _check_inner(chart: Chart, node: ChartNode, mode: Mode, problems: Problems) -> None:
+    """Report transitions of a final mode, a reserved name, and formulas of an inner region.
+
+    A region inside a mode has no equations and no flow.
+    """
     if node.is_final and mode.transitions:
         label = f"`{node.path}` is final: no transition leaves it"
         problems.error("form", mode.transitions[0].span, label)
@@ -92,6 +101,7 @@ def _check_inner(chart: Chart, node: ChartNode, mode: Mode, problems: Problems) 
 def _check_transition(
     chart: Chart, node: ChartNode, transition: Transition, problems: Problems
 ) -> None:
+    """Report a rewind, a completion without final mode, and a history of a mode without modes."""
     if transition.rewind:
         label = "a transition of a chart does not rewind"
         problems.error("form", transition.span, label)
@@ -111,7 +121,11 @@ def _check_transition(
 def _check_history(
     chart: Chart, node: ChartNode, transition: Transition, problems: Problems
 ) -> None:
-    """Warn of a history that is entered from inside: it tells of the time before."""
+    """Warn of a transition to a history from inside of its mode.
+
+    The history stores the last configuration before the mode was left, and this transition does not
+    leave it.
+    """
     way = chart.transitions[transition.key]
     for index in way.targets:
         target = chart.nodes[index]
@@ -128,7 +142,7 @@ def _check_history(
 
 
 def _check_region_priorities(automaton: Automaton, chart: Chart, problems: Problems) -> None:
-    """Regions side by side of which one leaves the other have different priorities (rule 3)."""
+    """Report sibling regions of equal priority in which a transition can leave both (rule 3)."""
     for parallel in chart.nodes[ROOT + 1 :]:
         regions = chart.child_regions(parallel)
         for position, later in enumerate(regions):
@@ -142,7 +156,11 @@ def _check_region_priorities(automaton: Automaton, chart: Chart, problems: Probl
 
 
 def _can_leave_both(chart: Chart, left: ChartNode, right: ChartNode) -> bool:
-    """Tell whether in two regions transitions may be enabled together of which one leaves both."""
+    """Return whether a transition in one of two sibling regions can leave both.
+
+    Both regions need a transition with a domain; one of these domains has to contain the parallel
+    mode.
+    """
     ways = [way for way in chart.transitions.values() if way.domain is not None]
     from_left = [way.domain for way in ways if left.contains(way.source)]
     from_right = [way.domain for way in ways if right.contains(way.source)]
@@ -153,7 +171,10 @@ def _can_leave_both(chart: Chart, left: ChartNode, right: ChartNode) -> bool:
 
 
 def _check_guard(chart: Chart, transition: Transition, problems: Problems) -> None:
-    """Warn of a guard that reads the input of an event: it holds in all micro-steps of a tick."""
+    """Warn of a guard that reads an input event as a condition.
+
+    Such a guard holds in every micro-step of a tick.
+    """
     for part in walk(transition.when.tree):
         signal = chart.events.get(part.path) if isinstance(part, Name) else None
         if signal and signal.is_input:
@@ -166,7 +187,7 @@ def _check_guard(chart: Chart, transition: Transition, problems: Problems) -> No
 def _check_memory(
     automaton: Automaton, chart: Chart, transition: Transition, problems: Problems
 ) -> None:
-    """`memory: continue` keeps the wait counters of what may be entered: there have to be some."""
+    """Report `memory: continue` on a transition that enters no mode with wait counters."""
     targets = chart.transitions[transition.key].targets
     reached = [n for n in chart.nodes if any(chart.are_nested(n.index, t) for t in targets)]
     modes = [automaton.modes_by_key[node.mode_key] for node in reached if node.mode_key]
@@ -178,9 +199,9 @@ def _check_memory(
 
 
 def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> None:
-    """Regions side by side write disjoint variables (rule 14).
+    """Report variables that two parallel regions assign (rule 14).
 
-    A region inside a mode may write what that mode's own region does, but not in the same stage.
+    Nested regions may assign the same variable, but not both while their modes stay active.
     """
     writers: dict[str, list[tuple[str, bool]]] = {}
     for mode in automaton.all_modes:
@@ -200,7 +221,7 @@ def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> No
 
 
 def _assigned_names(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]]:
-    """Yield what a mode writes, and whether it does while it stays active."""
+    """Yield each assigned name of a mode with its place and whether the mode stays active."""
     for formulas in (mode.entry, mode.exit):
         yield from ((name, formula.span, False) for name, formula in formulas.items())
     yield from ((name, formula.span, True) for name, formula in mode.update.items())
@@ -210,6 +231,6 @@ def _assigned_names(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]
 
 
 def _are_parallel(chart: Chart, left: str, right: str) -> bool:
-    """Tell whether two regions stand side by side, none inside the other."""
+    """Return whether two regions are parallel, that is neither contains the other."""
     a, b = chart.region_node(left), chart.region_node(right)
     return not chart.are_nested(a.index, b.index)

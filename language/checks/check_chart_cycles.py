@@ -1,7 +1,7 @@
-"""Check of charts: transitions that fire in every micro-step of a tick, until the bound stops them.
+"""Chart cycle check: finds transitions that fire in every micro-step of a tick (rule 7).
 
-Told is what is certain: all that the guards read is fixed within a tick, and no other transition
-of the modes that are active comes between.
+A cycle is reported only if it is certain: all variables that the guards read are constant within a
+tick, and no other transition of the active modes can fire between.
 """
 
 from __future__ import annotations
@@ -21,17 +21,23 @@ from language.smt.query_engine import QueryEngine, Witness
 from language.text.diagnostic import Problems, SpecError
 
 CHANGED_PREFIX = "memory.changed"
-"""What is true in the first micro-step of a tick only: what goes on goes on without it."""
+"""Variables that are true in the first micro-step of a tick only.
+
+An endless cycle does not need them.
+"""
 DELAYED_PREFIXES = ("memory.previous", "memory.delay")
-"""What says of the ticks before how a value changed, as what turns does."""
+"""Variables of earlier ticks: they can be inconsistent with the assumption that nothing changed."""
 AGE_PREFIXES = (TIME_IN_MODE, "memory.every")
-"""What is counted anew where a mode is entered."""
+"""Variables that restart when a mode is entered."""
 CYCLE_HINT = "let one of them wait, or its guard exclude the one before"
 EVENT_HINT = "let one of them raise no event"
 
 
 def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of transitions of a chart that use up all micro-steps of a tick."""
+    """Warn of cycles of chart transitions that use up all micro-steps of a tick.
+
+    A chart with one micro-step has none. At most `MAX_CYCLES` candidate cycles are examined.
+    """
     chart = automaton.statechart
     if chart is None or chart.micro_steps < 2:
         return
@@ -50,7 +56,10 @@ def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems
 
 
 def _self_loop_hint(automaton: Automaton, transition: Transition) -> str:
-    """Return what is written in place of a transition without target that fires on and on."""
+    """Return the hint for a transition without target that fires in every micro-step.
+
+    The hint depends on whether the guard reads time and whether the source is a superstate.
+    """
     own = automaton.source_mode(transition)
     reads_time = any(
         isinstance(part, FunctionCall) and part.function in TIME_FUNCTIONS
@@ -68,11 +77,15 @@ def _self_loop_hint(automaton: Automaton, transition: Transition) -> str:
 def _possible_successors(
     automaton: Automaton, chart: Chart, transition: Transition
 ) -> Iterator[str]:
-    """Yield the transitions that may follow one without any time, by their key paths."""
+    """Yield the keys of transitions that can follow a transition in the same tick.
+
+    An internal transition (without target) is followed by itself. There are no successors of
+    completions, histories and waits.
+    """
     if transition.is_completion or transition.history:
         return
     if not transition.targets:
-        yield transition.key  # a wait that has elapsed stays so
+        yield transition.key  # an elapsed wait remains elapsed
         return
     if transition.wait and evaluate_exactly(transition.wait, automaton):
         return
@@ -91,22 +104,25 @@ def _possible_successors(
 def _find_endless_witness(
     automaton: Automaton, chart: Chart, cycle: Cycle, query_engine: QueryEngine
 ) -> Witness | None:
-    """Return values at which a way round is taken in every micro-step, None if none is certain."""
+    """Return values at which a cycle is taken in every micro-step; None if no case is certain.
+
+    All guards of the cycle hold, no competing guard holds, and no variable changes within a tick.
+    """
     if not _has_required_events(automaton, chart, cycle):
         return None
     path = SymbolicPath()
-    taken: list[Expr] = []
-    between: list[Expr] = []
+    guards: list[Expr] = []
+    no_rivals: list[Expr] = []
     try:
         for each in cycle:
             snapshot = GuardSnapshot(automaton, automaton.source_mode(each), path)
-            taken.append(snapshot.lower_expression(each.when.tree))
+            guards.append(snapshot.lower_expression(each.when.tree))
             for other in _competing_transitions(automaton, chart, each, cycle):
-                between.append(Unary("not", snapshot.lower_expression(other.when.tree)))
+                no_rivals.append(Unary("not", snapshot.lower_expression(other.when.tree)))
     except (KeyError, SpecError):
         return None
     still = [Unary("not", Ref(name)) for name in path.domains if name.startswith(CHANGED_PREFIX)]
-    query = query_engine.build_query(path, (*taken, *between, *still))
+    query = query_engine.build_query(path, (*guards, *no_rivals, *still))
     moving = (AGE_PREFIXES if cycle[0].targets else ()) + (DELAYED_PREFIXES if still else ())
     if not _is_constant_in_tick(automaton, query.variables, moving):
         return None
@@ -117,7 +133,11 @@ def _find_endless_witness(
 
 
 def _has_required_events(automaton: Automaton, chart: Chart, cycle: Cycle) -> bool:
-    """Tell whether each transition raises the event of the next one, and the first may come."""
+    """Return whether the events of a cycle can occur in every micro-step.
+
+    The predecessor of each transition with events raises one of them. In addition, some transition
+    has no events, or an input or a transition outside of the cycle gives it one.
+    """
     if not any(each.events for each in cycle):
         return True
     before = (cycle[-1], *cycle[:-1])
@@ -135,7 +155,12 @@ def _has_required_events(automaton: Automaton, chart: Chart, cycle: Cycle) -> bo
 def _competing_transitions(
     automaton: Automaton, chart: Chart, transition: Transition, cycle: Cycle
 ) -> Iterator[Transition]:
-    """Yield the transitions that may be taken in place of one of a way round, or between two."""
+    """Yield the transitions outside of a cycle that can fire instead of one of it, or before it.
+
+    They leave a mode that is nested with the source of `transition`. Transitions with a wait,
+    completions of other modes, transitions of lower precedence in the same mode, and those with
+    other events are left out.
+    """
     source = automaton.source_mode(transition)
     node = node_of(automaton, source)
     assert node is not None
@@ -147,7 +172,7 @@ def _competing_transitions(
             if rival in cycle or (rival.wait and evaluate_exactly(rival.wait, automaton)):
                 continue
             if rival.is_completion and mode != source:
-                continue  # an active mode that has transitions is no final one
+                continue  # a mode with transitions is not final, so no other mode completes
             later = mode == source and (rival.priority or 0) > rank
             comes = {*rival.events} & {*transition.events} if rival.events else True
             between = bool(transition.events) and not rival.events
@@ -156,13 +181,18 @@ def _competing_transitions(
 
 
 def _are_nested(chart: Chart, node: ChartNode, other: ChartNode) -> bool:
+    """Return whether two nodes are nested; the root counts as nested with none."""
     return other.index != ROOT and chart.are_nested(node.index, other.index)
 
 
 def _is_constant_in_tick(
     automaton: Automaton, variables: list[str], changing_prefixes: tuple[str, ...]
 ) -> bool:
-    """Tell whether variables keep their values within a tick, whatever fires."""
+    """Return whether variables cannot change within a tick.
+
+    A variable can change if it is a mode variable, has one of the given prefixes, or an entry, exit
+    or reset assigns to it.
+    """
     written: set[str] = set()
     for mode in automaton.all_modes:
         for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):

@@ -1,5 +1,6 @@
-"""Check of transitions: what never fires - dead, shadowed, a wait that never elapses - and waits
-that are nearer to each other than a period. Warnings: nothing of it is ambiguous.
+"""Check for dead transitions: warns of guards that never hold, are shadowed, or wait in vain.
+
+It also warns of modes that cannot be left and of waits that differ by less than a period (rule 10).
 """
 
 from __future__ import annotations
@@ -27,13 +28,19 @@ from language.smt.query_engine import QueryEngine
 from language.text.diagnostic import Problems, Span, SpecError
 
 PRIORITY_HINT = "give it a smaller priority, or "
+"""Start of the hint for a transition that another one of the same mode precedes."""
 ORDER_HINT = "let the other guard exclude it, choose the other `order`, or "
+"""Start of the hint for a transition that one of an enclosing or inner mode precedes."""
 
 
 def check_dead_transitions(
     automaton: Automaton, query_engine: QueryEngine, problems: Problems
 ) -> set[str]:
-    """Warn of transitions that never fire; return the keys of them."""
+    """Warn of transitions that never fire; return their keys.
+
+    A transition never fires if nothing raises its events, its guard never holds, or transitions of
+    higher precedence always fire first.
+    """
     dead_transitions: set[str] = set()
     for mode in automaton.all_modes:
         guards = _ModeGuards(automaton, mode, query_engine)
@@ -53,7 +60,7 @@ def check_dead_transitions(
                 continue
             if guards.never_holds(transition):
                 if transition.is_completion:
-                    continue  # language/checks/check_chart.py
+                    continue  # language/checks/check_chart.py reports it
                 label = f"{_describe_guard(transition)} never holds within the declared ranges"
                 hint = "they exclude it, with the equations of the mode: correct one of them"
                 problems.warning("dead", _span_of(transition, transition.when), label, hint)
@@ -64,12 +71,15 @@ def check_dead_transitions(
 
 
 def _waits_for_unraised_event(automaton: Automaton, transition: Transition) -> bool:
-    """Tell whether a transition waits for events that never come."""
+    """Return whether a transition has events and none of them can occur."""
     return bool(transition.events) and not possible_events(automaton) & {*transition.events}
 
 
 def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of two waits that differ by less than a period (rule 10)."""
+    """Warn of two waits of a mode that differ by less than a period (rule 10).
+
+    Tunable waits and transitions with exclusive guards are left out.
+    """
     if automaton.period is None:
         return
     for mode in automaton.all_modes:
@@ -91,7 +101,10 @@ def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems:
 
 
 def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems: Problems) -> None:
-    """Warn of modes that only transitions which never fire leave; those of superstates count."""
+    """Warn of modes whose transitions are all dead, those of enclosing modes included.
+
+    Superstates and modes without transitions are left out.
+    """
     superstates = {mode.key for mode in automaton.superstates}
     for mode in automaton.all_modes:
         ways = [way for each in _enclosing_modes(automaton, mode) for way in each.transitions]
@@ -105,7 +118,7 @@ def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems
 
 
 def _enclosing_modes(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
-    """Yield a mode and those that it stands in."""
+    """Yield a mode and the modes of a chart that enclose it."""
     yield mode
     chart = automaton.statechart
     own = next(node for node in chart.nodes if node.mode_key == mode.key) if chart else None
@@ -115,7 +128,7 @@ def _enclosing_modes(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
 
 
 class _ModeGuards:
-    """The guards of one mode at one moment."""
+    """Lowered guards and waits of one mode in a snapshot."""
 
     def __init__(self, automaton: Automaton, mode: Mode, query_engine: QueryEngine) -> None:
         self.automaton = automaton
@@ -128,7 +141,7 @@ class _ModeGuards:
             self.guard_of(transition)
 
     def guard_of(self, transition: Transition) -> Expr | None:
-        """Return a guard, None if it has no form that questions can be asked of."""
+        """Return the lowered guard of a transition; None if it cannot be lowered."""
         if transition.key not in self.guards:
             self.guards[transition.key] = None
             with suppress(KeyError, SpecError):
@@ -136,15 +149,19 @@ class _ModeGuards:
         return self.guards[transition.key]
 
     def wait_of(self, transition: Transition) -> Fraction:
-        """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
+        """Return the longest wait of a transition: ticks if the automaton is sampled, else [s].
 
-        At most, where that is tunable.
+        The wait is 0 without `wait`.
         """
         if transition.key not in self.waits:
             self.waits[transition.key] = _longest_wait(self.automaton, transition)
         return self.waits[transition.key]
 
     def _lower_guard(self, transition: Transition) -> Expr | None:
+        """Return the guard, also that of a transition of an enclosing mode.
+
+        It is None if that guard depends on the enclosing mode.
+        """
         source = self.automaton.source_mode(transition)
         if source.key == self.mode.key:
             return self.snapshot.lower_guard(transition)
@@ -153,7 +170,10 @@ class _ModeGuards:
         return self.snapshot.in_enclosing_mode(source).lower_guard(transition)
 
     def are_incompatible(self, *conditions: Expr | None) -> bool:
-        """Tell whether conditions never hold together, whatever the tunables are."""
+        """Return whether it is proven that conditions never hold together, for all tunable values.
+
+        The result is False if a condition is None.
+        """
         found = [condition for condition in conditions if condition is not None]
         if len(found) < len(conditions):
             return False
@@ -162,7 +182,10 @@ class _ModeGuards:
         )
 
     def report_inner_shadow(self, transition: Transition, problems: Problems) -> bool:
-        """Warn of a superstate's transition before which one inside always fires."""
+        """Warn of a transition of a superstate that an inner transition always precedes.
+
+        Return whether this was proven for every inner mode.
+        """
         found = list(inner_preceding_transitions(self.automaton, self.mode))
         held = self.wait_of(transition)
         for leaf, ways in found:
@@ -176,24 +199,27 @@ class _ModeGuards:
         return bool(found) and _report_shadow(transition, what, bool(held), problems, ORDER_HINT)
 
     def never_fires(self, transition: Transition) -> bool:
-        """Tell whether a guard never holds where none does that comes first.
+        """Return whether it is proven that a guard never holds unless an earlier guard does.
 
-        Where that is not so it is neither dead nor shadowed: one question for most transitions.
+        This single query excludes most transitions from the search for the reason.
         """
         held = self.wait_of(transition)
         others = (_negate(self.guard_of(way)) for way in self._earlier_transitions(transition))
         return self.are_incompatible(self.guard_of(transition), *self._active_for(held), *others)
 
     def never_holds(self, transition: Transition) -> bool:
-        """Tell whether a guard never holds."""
+        """Return whether it is proven that a guard never holds."""
         return self.are_incompatible(self.guard_of(transition))
 
     def are_exclusive(self, first: Transition, second: Transition) -> bool:
-        """Tell whether two guards never hold together."""
+        """Return whether it is proven that two guards never hold together."""
         return self.are_incompatible(self.guard_of(first), self.guard_of(second))
 
     def report_shadow(self, transition: Transition, problems: Problems) -> bool:
-        """Warn of a transition before which others always fire; tell whether it was so."""
+        """Warn of a transition that one or several others always precede; return whether it was so.
+
+        A single transition that precedes is named; otherwise the set of those without wait is.
+        """
         guard = self.guard_of(transition)
         if guard is None:
             return False
@@ -220,7 +246,10 @@ class _ModeGuards:
         return False
 
     def _earlier_transitions(self, transition: Transition) -> list[Transition]:
-        """Return the transitions that fire first wherever both guards hold from one time on."""
+        """Return the transitions that fire first whenever both guards hold from the same time on.
+
+        Only transitions with a lowered guard are returned.
+        """
         wait = _shortest_wait(self.automaton, transition)
         before = {
             way.key: way for way in preceding_transitions(self.automaton, self.mode, transition)
@@ -237,6 +266,10 @@ class _ModeGuards:
     def _fires_before(
         self, other: Transition, before: Mapping[str, Transition], wait: Fraction
     ) -> bool:
+        """Return whether a transition fires before one with a given wait.
+
+        `before` has the transitions of higher precedence by their keys.
+        """
         own = self.wait_of(other)
         if not wait:
             return not own and other.key in before
@@ -244,7 +277,10 @@ class _ModeGuards:
         return (leaves and own < wait) or (own == wait and other.key in before)
 
     def _active_for(self, wait: Fraction) -> tuple[Expr, ...]:
-        """Return that the mode has been active for a wait, where its age matters."""
+        """Return the condition that the mode has been active for a wait.
+
+        It is empty if the wait is 0 or no guard reads the time in the mode.
+        """
         if not wait or TIME_IN_MODE not in self.snapshot.path.domains:
             return ()
         is_sampled = self.automaton.is_sampled
@@ -255,6 +291,7 @@ class _ModeGuards:
 def _report_shadow(
     transition: Transition, what: str, waits: bool, problems: Problems, hint: str
 ) -> bool:
+    """Warn that other transitions precede one; the place is its wait if it waits. Returns True."""
     other = f"write `{STAY}`" if transition.is_table_cell else "remove it"
     if waits:
         label = f"this wait never elapses: {what} before, whenever the guard holds"
@@ -268,30 +305,35 @@ def _report_shadow(
 
 
 def _span_of(transition: Transition, formula: Formula) -> Span:
-    """Return where a formula stands; of a transition table its cell: other rows share it."""
+    """Return the place of a formula.
+
+    For a transition table the cell, because rows share formulas.
+    """
     return transition.span if transition.is_table_cell else formula.span
 
 
 def _describe_guard(transition: Transition) -> str:
+    """Return the subject of a message about a guard."""
     return f"the guard of `{transition.name}`" if transition.is_table_cell else "this"
 
 
 def _wait_seconds(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return how long a guard has to hold [s]."""
+    """Return the wait of a transition [s], exactly; 0 without `wait`."""
     return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
 
 
 def _shortest_wait(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return how long a guard has to hold at least: ticks of a sampled automaton, else [s]."""
+    """Return the shortest wait of a transition: ticks if the automaton is sampled, else [s]."""
     return _wait_range(automaton, transition)[0]
 
 
 def _longest_wait(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return the same at most: it differs where the wait is tunable."""
+    """Return the longest wait; it differs from the shortest if the wait is tunable."""
     return _wait_range(automaton, transition)[1]
 
 
 def _wait_range(automaton: Automaton, transition: Transition) -> Range:
+    """Return the shortest and longest wait: ticks if the automaton is sampled, else [s]."""
     tunable = tunable_wait(automaton, transition.wait)
     if tunable:
         return wait_range_in_ticks(automaton, automaton.parameters[tunable])
@@ -301,7 +343,7 @@ def _wait_range(automaton: Automaton, transition: Transition) -> Range:
 
 
 def _waiting_pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
-    """Yield each two transitions of a mode that wait."""
+    """Yield each pair of transitions of a mode that both have a wait."""
     waiting = [way for way in mode.transitions if way.wait]
     for position, later in enumerate(waiting):
         for earlier in waiting[:position]:
@@ -309,6 +351,7 @@ def _waiting_pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
 
 
 def _negate(condition: Expr | None) -> Expr | None:
+    """Return the negation of a condition; a literal is negated directly, None remains None."""
     if isinstance(condition, Value):
         return Value(not condition.value)
     return None if condition is None else Unary("not", condition)

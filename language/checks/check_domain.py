@@ -1,6 +1,7 @@
-"""Check of domains: a divisor that may be 0, a square root or logarithm of what may be below 0.
+"""Check of function domains: divisors that may be 0, and roots or logarithms of invalid values.
 
-Intervals decide most; where they cannot, the solver is asked, with the conditions around the place.
+Interval arithmetic decides most cases. Otherwise the solver is asked, with the conditions of the
+enclosing `if` branches.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ HINTS = {
     "power": "`pow(max(..., 0), ...)`, or exclude it by an enclosing `if`",
     "inverse power": "`pow(max(..., 0.001), ...)`, or exclude it by an enclosing `if`",
 }
+"""Hint for each kind of domain."""
 LABELS = {
     "divisor": "this divisor may be 0",
     "root": "this may be below 0, which has no square root",
@@ -39,15 +41,19 @@ LABELS = {
     "power": "this may be below 0, and `pow` takes bases of 0 and more",
     "inverse power": "this may be 0 or below, which has no power of a degree below 0",
 }
+"""Message for each kind of domain."""
 OUTSIDE_RELATION: Mapping[str, Literal["==", "<", "<="]] = {
     **{"divisor": "==", "root": "<", "log": "<="},
     **{"power": "<", "inverse power": "<="},
 }
-"""How what is outside of each domain compares with 0."""
+"""Relation to 0 that the values outside of each domain have."""
 
 
 def check_domains(automaton: Automaton, problems: Problems) -> None:
-    """Report divisors and roots whose declared ranges go beyond their domain."""
+    """Report operands whose declared ranges exceed the domain of their operation.
+
+    Start values outside of their range are reported too.
+    """
     fixed: dict[str, Interval] = {}
     likeness = TreeNumbering()
     for mode in automaton.all_modes:
@@ -60,7 +66,7 @@ def check_domains(automaton: Automaton, problems: Problems) -> None:
 
 
 class _ModeDomainChecker:
-    """The intervals of the names of one mode, each equation's found once."""
+    """Intervals of the names of one mode; the interval of each equation is computed once."""
 
     def __init__(
         self,
@@ -81,6 +87,11 @@ class _ModeDomainChecker:
         self.unreported_range_analysis = self.range_analysis.unreported
 
     def check(self) -> None:
+        """Report the operands of equations, actions, truth tables and balances of the mode.
+
+        A balance needs a coefficient that cannot be 0. Spectral densities of an observer are
+        checked for sign.
+        """
         ranging = self.range_analysis
         for name in equation_order(self.mode):
             self.interval_of(name)
@@ -97,9 +108,7 @@ class _ModeDomainChecker:
         self._check_densities()
 
     def _check_densities(self) -> None:
-        """Warn of spectral densities of an observer that the ranges of what they read let be
-        negative.
-        """
+        """Warn of spectral densities of an observer whose interval contains negative values."""
         noise = self.mode.observer.process_noise if self.mode.observer else {}
         for name, formula in noise.items():
             found = self.unreported_range_analysis.analyse(formula.tree)
@@ -109,7 +118,7 @@ class _ModeDomainChecker:
                 self.problems.warning("observer", formula.span, label, help)
 
     def check_initial_values(self) -> None:
-        """Report start values that lie outside of their range, whatever tunables are."""
+        """Report start values outside of their range for all values of tunable parameters."""
         for state in self.automaton.state_variables.values():
             if state.range:
                 start, (low, high) = (
@@ -121,9 +130,10 @@ class _ModeDomainChecker:
                     self.problems.error("range", state.initial.span, label)
 
     def interval_of(self, name: str) -> Interval:
-        """Return the interval of a name; called in order, so that a long chain needs no stack.
+        """Return the interval of a name; unbounded if the name depends on itself or has no range.
 
-        What is outside a domain in one of the mode's own equations is reported.
+        Operands outside of their domain in the equations of the mode are reported. Names are
+        evaluated in the order of equations, so the depth of recursion is small.
         """
         if name not in self.intervals:
             self.intervals[name] = UNBOUNDED
@@ -131,6 +141,11 @@ class _ModeDomainChecker:
         return self.intervals[name]
 
     def _compute_interval(self, name: str) -> Interval:
+        """Return the interval of a name that is not cached.
+
+        A fixed parameter has its value, a derived one the interval of its formula, a declared
+        variable its range, and an equation the hull over its formulas.
+        """
         automaton = self.automaton
         parameter = automaton.parameters.get(name)
         if parameter is not None and parameter.derived:
@@ -153,6 +168,7 @@ class _ModeDomainChecker:
         return result
 
     def _table_interval(self, name: str) -> Interval:
+        """Return the interval of the values of a table; of a tunable table its range."""
         parameter = self.automaton.parameters[name]
         if parameter.kind == "tunable" or parameter.table is None:
             limits = parameter.range
@@ -161,6 +177,10 @@ class _ModeDomainChecker:
         return Interval(float(min(values)), float(max(values)), True)
 
     def _report(self, what: str, tree: SyntaxTree, interval: Interval) -> None:
+        """Report an operand outside of its domain.
+
+        Nothing is reported if its interval is uncertain or the solver excludes the values outside.
+        """
         if not interval.is_certain:
             return
         if self._is_excluded(what, tree):
@@ -170,7 +190,10 @@ class _ModeDomainChecker:
         self.problems.error("domain", tree.span, label, HINTS[what])
 
     def _is_excluded(self, what: str, tree: SyntaxTree) -> bool:
-        """Tell whether what is around a place excludes what is outside of the domain there."""
+        """Return whether the enclosing conditions exclude values outside of the domain.
+
+        This is proven by the solver. The result is False if the place cannot be lowered.
+        """
         with suppress(KeyError, SpecError):
             snapshot = GuardSnapshot(self.automaton, self.mode)
             around = [
@@ -180,6 +203,7 @@ class _ModeDomainChecker:
             conditions = [part if holds else Unary("not", part) for part, holds in around]
             value = snapshot.lower_expression(tree)
             conditions.append(Compare(OUTSIDE_RELATION[what], value, real(0)))
-            inquiry = QueryEngine(self.automaton)
-            return inquiry.is_unsatisfiable(inquiry.build_query(snapshot.path, conditions))
+            query_engine = QueryEngine(self.automaton)
+            query = query_engine.build_query(snapshot.path, conditions)
+            return query_engine.is_unsatisfiable(query)
         return False

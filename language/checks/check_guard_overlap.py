@@ -1,4 +1,7 @@
-"""Guards: transitions of one mode that can be enabled together need priorities (rule 3)."""
+"""Determinism check: transitions of one mode with equal priority need disjoint guards (rule 3).
+
+Guards are disjoint by form (`a < b` and `a >= b`), by linear bounds or by a proof of z3.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,18 @@ from language.smt.query_engine import QueryEngine, Witness
 from language.text.diagnostic import Problems, SpecError
 
 EXCLUSIVE_RELATIONS = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
-"""Relations that exclude each other between the same two sides."""
-
+"""Relations that exclude the relation of the key between the same two sides."""
 
 MAX_OVERLAPS = 1000
-"""Pairs told of in one mode; who has so many gives priorities to all."""
+"""Largest number of pairs that are reported in one mode."""
 
 
 def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Report pairs of one priority that are not proven disjoint, with a witness if one is found."""
+    """Report pairs of transitions with equal priority whose guards are not proven disjoint.
+
+    The problem shows a witness if one is found. At most `MAX_OVERLAPS` pairs of a mode are
+    reported.
+    """
     for mode in automaton.all_modes:
         reported = 0
         for earlier, later in _overlap_candidates(mode):
@@ -30,20 +36,31 @@ def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: P
 
 
 def _overlap_candidates(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
+    """Yield pairs of transitions of a mode that can be enabled together.
+
+    They have equal priority, no disjoint events, and guards that are not exclusive by form. The
+    earlier one in the file comes first.
+    """
     for position, later in enumerate(mode.transitions):
         for earlier in mode.transitions[:position]:
-            same = (later.priority or 0) == (earlier.priority or 0)
-            apart = earlier.events and later.events and not {*earlier.events} & {*later.events}
+            same_priority = (later.priority or 0) == (earlier.priority or 0)
+            disjoint_events = (
+                earlier.events and later.events and not {*earlier.events} & {*later.events}
+            )
             if (
-                same
-                and not apart
+                same_priority
+                and not disjoint_events
                 and not are_syntactically_exclusive(earlier.when.tree, later.when.tree)
             ):
                 yield earlier, later
 
 
 def are_syntactically_exclusive(left: SyntaxTree, right: SyntaxTree) -> bool:
-    """Tell whether two guards exclude each other by their form: `a < b` and `a >= b`, `not g`."""
+    """Return whether two guards exclude each other by their form.
+
+    The forms are `not g` and `g`, and two opposed relations between the same sides, like `a < b`
+    and `a >= b`.
+    """
     if isinstance(right, Not) and is_same_expression(right.operand, left):
         return True
     if isinstance(left, Not) and is_same_expression(left.operand, right):
@@ -66,14 +83,14 @@ def _report_overlap(
     query_engine: QueryEngine,
     problems: Problems,
 ) -> bool:
-    """Report a pair unless it is proven disjoint; tell whether it was reported."""
+    """Report a pair unless it is proven disjoint; return whether it was reported."""
     query = _overlap_query(automaton, mode, earlier, later, query_engine)
-    found = query_engine.answer_for_all_tunables(query) if query else "open"
-    if found == "never":
+    answer = query_engine.answer_for_all_tunables(query) if query else "open"
+    if answer == "never":
         return False
     label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
-    if isinstance(found, Witness):
-        at = f"at {found.text}" if found.text else "at one instant"
+    if isinstance(answer, Witness):
+        at = f"at {answer.text}" if answer.text else "at one instant"
         label = f"`{earlier.name}` and `{later.name}` are both enabled {at}"
     hint = "give them different priorities: the smallest wins"
     problems.error("priority", later.when.span, label, hint)
@@ -87,10 +104,10 @@ def _overlap_query(
     later: Transition,
     query_engine: QueryEngine,
 ) -> SolverQuery | None:
-    """Return the question whether two guards can hold together; None where they have no form."""
+    """Return the query whether two guards can hold together; None if a guard cannot be lowered."""
     snapshot = GuardSnapshot(automaton, mode)
     try:
-        guards = [snapshot.lower_guard(way) for way in (earlier, later)]
+        guards = [snapshot.lower_guard(each) for each in (earlier, later)]
     except (KeyError, SpecError):
         return None
     return query_engine.build_query(snapshot.path, guards)

@@ -1,7 +1,8 @@
-"""Check of cycles: transitions that go round for ever at one instant (rules 7, 9 and 12).
+"""Instantaneous cycles: finds transitions that repeat for ever at one instant (rules 7, 9 and 12).
 
-A way round is reported where it is taken twice from some values and, from these, as often as the
-bound of micro-steps is passed: then a run stops there, for certain.
+Only continuous automata are checked here. A cycle is reported if it is taken twice from some values
+and, from the same values, more often than the bound of micro-steps allows. A run that reaches these
+values certainly stops.
 """
 
 from __future__ import annotations
@@ -22,15 +23,16 @@ from language.smt.query_engine import QueryEngine, Witness
 from language.text.diagnostic import Problems, SpecError
 
 MAX_CYCLE_LENGTH = 4
-"""Transitions of a way round that is looked for; longer ones are made of more than one mistake."""
+"""Largest number of transitions of a cycle that is searched."""
 MAX_CYCLES = 200
-"""Ways round of one automaton that are looked at."""
+"""Largest number of cycles of one automaton that are examined."""
 
 Cycle = tuple[Transition, ...]
+"""Transitions of a cycle; each leads to the source of the next, the last to that of the first."""
 
 
 def report_refiring(automaton: Automaton, problems: Problems) -> None:
-    """Report transitions to a mode and back that fire for ever at one instant, with a witness."""
+    """Report cycles of one or two transitions that repeat at one instant, with a witness."""
     for cycle, witness in _endless_cycles(automaton, range(1, 3)):
         label = f"this fires again at the same instant, for ever: {_format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}write the direction of motion too, like "
@@ -39,7 +41,7 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
 
 
 def check_cycles(automaton: Automaton, problems: Problems) -> None:
-    """Warn of longer ways round that are taken for ever at one instant: a run stops there."""
+    """Warn of cycles of three or more transitions that repeat at one instant, with a witness."""
     for cycle, witness in _endless_cycles(automaton, range(3, MAX_CYCLE_LENGTH + 1)):
         label = f"from here the modes change for ever at one instant: {_format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}let one of them wait, or its guard exclude the one before"
@@ -48,28 +50,36 @@ def check_cycles(automaton: Automaton, problems: Problems) -> None:
 
 
 def _endless_cycles(automaton: Automaton, lengths: range) -> Iterator[tuple[Cycle, Witness]]:
-    """Yield ways round of some lengths that are taken for ever, the first turn that shows it."""
+    """Yield cycles of some lengths that repeat for ever, each with a witness.
+
+    A cycle starts at its first transition from which this is shown. A sampled automaton has none
+    here.
+    """
     if automaton.is_sampled:
-        return  # language/checks/check_chart_cycles.py
-    inquiry = QueryEngine(automaton)
+        return  # see language/checks/check_chart_cycles.py
+    query_engine = QueryEngine(automaton)
     for way in instant_cycles(automaton):
         for turn in range(len(way) if len(way) in lengths else 0):
-            turned = (*way[turn:], *way[:turn])
-            found = _find_endless_witness(automaton, turned, inquiry)
-            if found:
-                yield turned, found
+            cycle = (*way[turn:], *way[:turn])
+            witness = _find_endless_witness(automaton, cycle, query_engine)
+            if witness:
+                yield cycle, witness
                 break
 
 
 @cache_on_owner
 def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
-    """Return the ways round of which each transition can follow the one before at one instant."""
-    inquiry = QueryEngine(automaton)
+    """Return the cycles in which each transition can follow its predecessor at one instant.
+
+    At most `MAX_CYCLES` cycles of at most `MAX_CYCLE_LENGTH` transitions are examined; the result
+    is cached.
+    """
+    query_engine = QueryEngine(automaton)
     ways = {way.key: way for way in instant_transitions(automaton)}
     after: dict[str, list[str]] = {key: [] for key in ways}
     for first, seconds in _candidate_successors(automaton, list(ways.values())):
         after[first.key] = [
-            way.key for way in _feasible_successors(automaton, first, seconds, inquiry)
+            way.key for way in _feasible_successors(automaton, first, seconds, query_engine)
         ]
     follows: dict[tuple[str, str], bool] = {}
     found: list[Cycle] = []
@@ -79,7 +89,7 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
         for first, second in pairs:
             key = first.key, second.key
             if key not in follows:
-                follows[key] = _can_follow(automaton, first, second, inquiry)
+                follows[key] = _can_follow(automaton, first, second, query_engine)
             if not follows[key]:
                 break
         else:
@@ -88,13 +98,17 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
 
 
 def instant_transitions(automaton: Automaton) -> list[Transition]:
-    """Return the transitions that need no time."""
+    """Return the transitions without a wait, or with a wait of 0."""
     found = [way for mode in automaton.all_modes for way in mode.transitions]
     return [way for way in found if not (way.wait and evaluate_exactly(way.wait, automaton))]
 
 
 def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
-    """Yield the cycles of at most `LONGEST` members, each once, from its first member on."""
+    """Yield the simple cycles of a graph with at most `MAX_CYCLE_LENGTH` nodes, each once.
+
+    `after` gives the successors of each node. A cycle starts with its first node in the order of
+    `after`.
+    """
     place = {name: number for number, name in enumerate(after)}
     for group in strongly_connected_components(after):
         inside = set(group)
@@ -112,7 +126,11 @@ def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
 def _candidate_successors(
     automaton: Automaton, transitions: list[Transition]
 ) -> Iterator[tuple[Transition, list[Transition]]]:
-    """Yield each transition with those that leave where it leads, on a way round of modes."""
+    """Yield each transition with those that leave its target within the same component of modes.
+
+    Components are the strongly connected components of the graph of modes; other transitions are in
+    no cycle.
+    """
     modes: dict[str, list[str]] = {f"{m.region} {m.name}": [] for m in automaton.all_modes}
     leaving: dict[str, list[Transition]] = {}
     for way in transitions:
@@ -133,16 +151,19 @@ def _candidate_successors(
 def _feasible_successors(
     automaton: Automaton, first: Transition, successors: list[Transition], query_engine: QueryEngine
 ) -> Iterator[Transition]:
-    """Yield the transitions that linear bounds let follow another one at the same instant."""
+    """Yield the successors that linear bounds do not exclude at the same instant.
+
+    Successors that cannot be lowered are left out.
+    """
     snapshot = GuardSnapshot(automaton, automaton.source_mode(first))
     try:
         guard = snapshot.lower_expression(first.when.tree)
-        there = snapshot.apply_transition(first)
+        successor = snapshot.apply_transition(first)
     except (KeyError, SpecError):
         return
     for second in successors:
         with suppress(KeyError, SpecError):
-            condition = there.lower_expression(second.when.tree)
+            condition = successor.lower_expression(second.when.tree)
             if not is_disproved_by_bounds(
                 query_engine.build_query(snapshot.path, (guard, condition))
             ):
@@ -152,7 +173,10 @@ def _feasible_successors(
 def _can_follow(
     automaton: Automaton, first: Transition, second: Transition, query_engine: QueryEngine
 ) -> bool:
-    """Tell whether a transition can be followed by another one at the same instant."""
+    """Return whether a transition may follow another one at the same instant.
+
+    The result is False if it is proven impossible or a guard cannot be lowered.
+    """
     try:
         path, guards = path_constraints(automaton, (first, second))
     except (KeyError, SpecError):
@@ -161,9 +185,9 @@ def _can_follow(
 
 
 def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, list[Expr]]:
-    """Return the story of transitions taken one after another at an instant, and what it needs.
+    """Return the symbolic path of consecutive transitions at one instant, and its conditions.
 
-    Of each the guard holds, and no guard of a smaller priority that needs no time.
+    Each guard holds, and no guard of a smaller priority without wait in the same mode holds.
     """
     path = SymbolicPath()
     snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
@@ -181,7 +205,10 @@ def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, 
 def _find_endless_witness(
     automaton: Automaton, cycle: Cycle, query_engine: QueryEngine
 ) -> Witness | None:
-    """Return values from which a way round is taken past the bound of micro-steps."""
+    """Return values from which a cycle is taken more often than the bound of micro-steps.
+
+    The result is None if there are none or if another region can interfere.
+    """
     try:
         found = query_engine.answer(
             query_engine.build_query(*path_constraints(automaton, cycle * 2))
@@ -199,7 +226,7 @@ def _find_endless_witness(
 
 
 def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> bool:
-    """Tell whether another region may change what the guards read: it moves at the same time."""
+    """Return whether another region can change a variable that the guards read."""
     if any(name.startswith("mode.") for name in witness.valuation):
         return True
     others = (m for m in automaton.all_modes if m.region != cycle[0].region)
@@ -208,28 +235,30 @@ def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> b
 
 
 def _assigned_names(mode: Mode) -> Iterator[str]:
+    """Yield the names that entry, exit and resets of a mode assign."""
     for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):
         yield from formulas
 
 
 def _format_cycle(cycle: Cycle) -> str:
+    """Return the sources of a cycle as text: `a` -> `b` -> `a`."""
     return " -> ".join(f"`{transition.source}`" for transition in (*cycle, cycle[0]))
 
 
 def _range_hint(automaton: Automaton) -> str:
-    """Return the help for states whose values have no bounds."""
+    """Return the hint to declare ranges of states without one; an empty text if there are none."""
     names = [f"`{name}`" for name, state in automaton.states.items() if state.range is None]
     return f", or give {', '.join(names)} a `range` if this is out of reach" if names else ""
 
 
 def _boundary_transition(automaton: Automaton, cycle: Cycle) -> Transition:
-    """Return the transition to point at: one whose guard holds on a boundary."""
+    """Return the last transition whose guard holds on a boundary; else the last one."""
     bare = (t for t in reversed(cycle) if _has_boundary(t.when.tree, automaton.states))
     return next(bare, cycle[-1])
 
 
 def _has_boundary(guard: SyntaxTree, states: Mapping[str, object]) -> bool:
-    """Tell whether a guard holds where a state sits exactly on a limit: `x >= limit`."""
+    """Return whether a guard compares a state by `<=` or `>=`."""
     for part in walk(guard):
         if isinstance(part, Relation) and part.operator in ("<=", ">="):
             sides = (part.left, part.right)

@@ -1,4 +1,4 @@
-"""Check of functions with memory: fixed times, bounded delays, arguments that every mode has."""
+"""Check of functions with memory: constant times, bounded delays, arguments known in every mode."""
 
 from __future__ import annotations
 
@@ -27,11 +27,15 @@ from language.model.region_queries import equation_names
 from language.text.diagnostic import Problems
 
 MAX_AFTER_TICKS = 65535
-"""Longest `after` in ticks: its counter is a uint16."""
+"""Largest `after` in ticks: its counter is a uint16."""
 
 
 def check_memory(automaton: Automaton, problems: Problems) -> None:
-    """Report what `previous`, `delay`, `rising`, `falling` and `after` cannot do."""
+    """Report invalid uses of functions with memory.
+
+    Checked are the argument type, the time argument, the length in ticks, names without a value in
+    some mode, and edges on transitions with a wait.
+    """
     for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
         _check_known_in_every_mode(automaton, tree, problems)
         if not automaton.is_sampled and expression_type(automaton, tree.arguments[0]) != "real":
@@ -57,6 +61,10 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
 def _check_time(
     automaton: Automaton, tree: FunctionCall, time: SyntaxTree, longest: int, problems: Problems
 ) -> None:
+    """Report a time argument that is not constant, negative, or longer than `longest` ticks.
+
+    A tunable `delay` of a continuous automaton is limited by the end of its range instead.
+    """
     kinds = parameter_kinds(automaton)
     tuned = tunable_delay_of(automaton, time) if tree.function == "delay" else None
     if tuned and not automaton.is_sampled:
@@ -82,7 +90,10 @@ def _check_time(
 
 
 def _check_period(automaton: Automaton, tree: FunctionCall, problems: Problems) -> None:
-    """What comes again and again is not rounded: it would drift."""
+    """Report a time of `every` that is zero or not a whole number of periods.
+
+    Rounding the time to ticks would let it drift.
+    """
     time = tree.arguments[0]
     value = evaluate_exactly(Formula(time, ""), automaton)
     if value == 0:
@@ -96,7 +107,10 @@ def _check_period(automaton: Automaton, tree: FunctionCall, problems: Problems) 
 def _check_continuous_delay(
     automaton: Automaton, time: SyntaxTree, value: Fraction, problems: Problems
 ) -> None:
-    """The value of a stage is looked up, so it must not lie inside the step that is taken."""
+    """Report a delay shorter than one major step or longer than `MAX_DELAY` major steps.
+
+    A stage of a method reads the delayed value, so the value must not lie inside the current step.
+    """
     if 0 <= value < automaton.step:
         label = "a delay of a continuous automaton is at least one major step"
         problems.error("wait", time.span, label, f"a `step` of at most {float(value)} s")
@@ -108,6 +122,7 @@ def _check_continuous_delay(
 def _check_known_in_every_mode(
     automaton: Automaton, tree: FunctionCall, problems: Problems
 ) -> None:
+    """Report names in the argument of a delay that have no equation in some mode."""
     everywhere = {*automaton.parameters, *automaton.inputs, *automaton.state_variables}
     for read in names(tree.arguments[0]):
         modes = automaton.modes.values()
@@ -121,6 +136,7 @@ def _check_known_in_every_mode(
 def _check_edge_has_no_wait(
     automaton: Automaton, transition: Transition, problems: Problems
 ) -> None:
+    """Report an edge or `every` in the guard of a transition with a positive wait."""
     edges = [
         part
         for part in walk(transition.when.tree)

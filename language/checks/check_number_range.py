@@ -1,4 +1,4 @@
-"""Check of numbers: every number of a spec has a value near it in the automaton's number type."""
+"""Check of numbers: every number of a spec has a finite value near it in the number type."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from language.text.diagnostic import Problems, Span
 
 
 def check_numbers(automaton: Automaton, problems: Problems) -> None:
-    """Report numbers that the type turns into an infinity or into 0. Raises SpecError."""
+    """Report numbers that are infinite or 0 in the number type, and coinciding points of an axis.
+
+    Automata of type `float64` have none. Raises SpecError if there are errors.
+    """
     number = automaton.numbers
     if number == "float64":
         return
@@ -43,7 +46,7 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
 
 
 def check_ranges(automaton: Automaton, problems: Problems) -> None:
-    """Report ranges that the type turns into an infinity."""
+    """Report ranges whose bounds are infinite in the number type."""
     for thing in _ranged_declarations(automaton):
         if any(math.isinf(round_to_type(bound, automaton.numbers)) for bound in thing.range or ()):
             label = f"the range of `{thing.name}` goes beyond the largest {automaton.numbers}"
@@ -51,7 +54,7 @@ def check_ranges(automaton: Automaton, problems: Problems) -> None:
 
 
 def _ranged_declarations(automaton: Automaton) -> Iterator[Input | State | Parameter]:
-    """Yield what an automaton, and the model that it knows, declare with a range."""
+    """Yield the inputs, states and parameters of an automaton and of its model."""
     yield from automaton.inputs.values()
     yield from automaton.state_variables.values()
     yield from automaton.parameters.values()
@@ -60,7 +63,7 @@ def _ranged_declarations(automaton: Automaton) -> Iterator[Input | State | Param
 
 
 def _numbers_in(part: object) -> Iterator[tuple[Fraction, Span]]:
-    """Yield every number below a part of a model, with its place."""
+    """Yield every number in a part of a model with its place, recursively."""
     match part:
         case NumberLiteral(value, _, span):
             yield value, span
@@ -80,8 +83,10 @@ def _numbers_in(part: object) -> Iterator[tuple[Fraction, Span]]:
 
 
 def _largest_float32() -> float:
+    """Return the largest finite float32."""
     return (2.0 - 2.0**-23) * 2.0**127
 
 
 def _format_short(value: Fraction) -> str:
+    """Return a number with four significant digits."""
     return f"{float(value):.4g}"

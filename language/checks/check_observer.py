@@ -1,4 +1,4 @@
-"""Check of an observer: its names, and the dimensions of its matrices, vectors and noises."""
+"""Check of an observer: names, and dimensions of its matrices, vectors and noise densities."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from language.typecheck.types import ExprType
 def check_observer(
     automaton: Automaton, observer: Observer, kinds: Mapping[str, ExprType], check: TypeChecker
 ) -> None:
-    """Report unknown names, and entries that do not fit dx/dt = A x + B u + f, y = C x."""
+    """Report unknown names of an observer, and entries whose dimension does not fit its equations.
+
+    The equations are dx/dt = A x + B u + f, y = C x. `kinds` are the types of all names of the
+    automaton.
+    """
     problems = check.problems
     for listed, known, what in (
         (observer.states, automaton.states, "a state"),
@@ -61,6 +65,7 @@ def check_observer(
 def _check_reads(
     automaton: Automaton, observer: Observer, kinds: Mapping[str, ExprType], problems: Problems
 ) -> None:
+    """Report states of the observer in `f`, and equations in `f` and in the process noise."""
     for formula in observer.f.values():
         for read in names_of(formula.tree):
             if read.path in observer.states:
@@ -75,6 +80,7 @@ def _check_reads(
 
 
 def _check_instants(automaton: Automaton, observer: Observer, check: TypeChecker) -> None:
+    """Report `unknown_instant` entries that name no real input or are not a time."""
     known = [name for name, thing in automaton.inputs.items() if thing.type == "real"]
     for name, formula in observer.unknown_instant.items():
         if name not in known:
@@ -84,7 +90,10 @@ def _check_instants(automaton: Automaton, observer: Observer, check: TypeChecker
 
 
 def _observed_equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:
-    """Equations of the observer's mode of the model: a measurement may be of one of these."""
+    """Return the dimensions of the equations of the observed mode of the model.
+
+    A measurement may be one of these equations.
+    """
     model = automaton.model
     if observer.of is None or model is None:
         return {}
@@ -93,6 +102,7 @@ def _observed_equations(automaton: Automaton, observer: Observer) -> dict[str, D
 
 
 def _check_point(automaton: Automaton, observer: Observer, check: TypeChecker) -> None:
+    """Report entries of the linearisation point whose dimension differs from that of the name."""
     known = automaton.model.dimensions if automaton.model else {}
     for name, formula in observer.at.items():
         if name in known:
@@ -100,6 +110,7 @@ def _check_point(automaton: Automaton, observer: Observer, check: TypeChecker) -
 
 
 def _check_matrices(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
+    """Report entries of A, B and C whose dimension does not fit their row and column."""
     for matrix, per_second in ((observer.a, True), (observer.b, True), (observer.c, False)):
         for row, entries in matrix.items():
             result = _rate_dimension(sizes[row]) if per_second else sizes[row]
@@ -108,6 +119,10 @@ def _check_matrices(observer: Observer, sizes: Mapping[str, Dimension], check: T
 
 
 def _check_vectors(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
+    """Report entries of `f` and of the noise densities with a wrong dimension.
+
+    Process noise of a recursive gain may call `previous`.
+    """
     for row, formula in observer.f.items():
         _check_entry(check, formula, _rate_dimension(sizes[row]))
     memory = frozenset({"previous"} if observer.gain == "recursive" else ())
@@ -121,15 +136,20 @@ def _check_vectors(observer: Observer, sizes: Mapping[str, Dimension], check: Ty
 
 
 def _check_limits(observer: Observer, sizes: Mapping[str, Dimension], check: TypeChecker) -> None:
+    """Report variance limits whose dimension is not that of the squared state."""
     for name, limits in observer.variance_limits.items():
         for formula in limits:
             _check_entry(check, formula, dimension_product(sizes[name], sizes[name]))
 
 
 def _check_entry(check: TypeChecker, formula: Formula, expected: Dimension) -> None:
-    """Entries are quotients of quantities: their power of the angle is free."""
+    """Report an entry of a wrong dimension.
+
+    Its power of the angle is free because entries are quotients.
+    """
     check.check_quantity(formula.tree, Dimension(expected.powers, None), formula.key)
 
 
 def _rate_dimension(dimension: Dimension) -> Dimension:
+    """Return the dimension per second, with the same power of the angle."""
     return Dimension(dimension_product(dimension, SECOND, -1).powers, dimension.angle)

@@ -1,8 +1,8 @@
-"""Check of values past their range: what an assignment may give beyond what its target may have.
+"""Check of range violations: warns of assigned values that can exceed the range of their target.
 
-Looked at are values that are made of inputs alone: these may be anything within their ranges. How
-far a state gets is not known here, so what reads one gives no alarm; nor does a target with an
-`on_range`, a fault or a fallback of its own.
+Only values that depend on inputs and parameters alone are checked, because inputs can have any
+value in their ranges. The reachable values of states are unknown. Targets with `on_range`, a fault
+or a fallback are left out.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from language.smt.query_engine import QueryEngine, Witness
 from language.text.diagnostic import Problems, SpecError
 
 STATE_PREFIXES = ("state.", "discrete.", "memory.")
-"""What is carried: how far it gets is not known."""
+"""Prefixes of variables whose reachable values are unknown."""
 
 
 def check_range_violations(
     automaton: Automaton, query_engine: QueryEngine, problems: Problems
 ) -> None:
-    """Warn of assignments that may give a value past the range of their target, with a witness."""
+    """Warn of assignments that can exceed the range of their target; the hint shows a witness."""
     for mode in automaton.all_modes:
         for formulas, guard in _assignments(mode):
             for name, formula in formulas.items():
@@ -44,7 +44,11 @@ def check_range_violations(
 
 
 def _assignments(mode: Mode) -> Iterator[tuple[Mapping[str, Formula], Formula | None]]:
-    """Yield what a mode assigns, with the guard that holds then."""
+    """Yield the assignments of a mode with the guard that holds when they are executed.
+
+    The guard is None for entry, exit and update. Resets of transitions with events or completions
+    are left out.
+    """
     for formulas in (mode.entry, mode.exit, mode.update):
         yield formulas, None
     for transition in mode.transitions:
@@ -53,7 +57,7 @@ def _assignments(mode: Mode) -> Iterator[tuple[Mapping[str, Formula], Formula | 
 
 
 def _is_checked(target: State) -> bool:
-    """Tell whether a range is that of a real value, and nothing more is said about leaving it."""
+    """Return whether a variable is real, has a range and the default range policy."""
     return (
         target.range is not None and target.type == "real" and target.range_policy == RangePolicy()
     )
@@ -67,6 +71,11 @@ def _find_violation(
     target: State,
     query_engine: QueryEngine,
 ) -> Witness | None:
+    """Return a witness at which a formula exceeds the range of its target.
+
+    The result is None if there is none, if the query is undecided, or if the value depends on a
+    state.
+    """
     snapshot = GuardSnapshot(automaton, mode)
     conditions: list[Expr] = [snapshot.lower_expression(guard.tree)] if guard else []
     snapshot.lower_expression(formula.tree)
@@ -86,7 +95,7 @@ def _find_violation(
 
 
 def _format_range(target: State) -> str:
-    """Return a range in the unit of its declaration."""
+    """Return a range in the unit of its declaration as text."""
     assert target.range
     unit = target.unit
     low, high = (float((bound - unit.offset) / unit.factor) for bound in target.range)

@@ -1,4 +1,4 @@
-"""Check of what is reached: modes that no chain of transitions enters."""
+"""Reachability check: warns of modes that no sequence of transitions enters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from language.text.diagnostic import Problems
 
 
 def check_reachability(automaton: Automaton, problems: Problems) -> None:
-    """Warn of modes that are never entered."""
+    """Warn of modes that no path of transitions from an initial or fault mode enters."""
     for mode in _unreachable_modes(automaton, set()):
         problems.warning("unreached", mode.span, f"mode `{mode.name}` is never entered")
 
@@ -20,7 +20,10 @@ def check_reachability(automaton: Automaton, problems: Problems) -> None:
 def check_blocked_modes(
     automaton: Automaton, dead_transitions: set[str], problems: Problems
 ) -> None:
-    """Warn of modes that only transitions which never fire lead to."""
+    """Warn of modes that are reachable only by dead transitions, given by their keys.
+
+    Modes that `check_reachability` reports are left out.
+    """
     reported = {mode.key for mode in _unreachable_modes(automaton, set())}
     for mode in _unreachable_modes(automaton, dead_transitions) if dead_transitions else ():
         if mode.key not in reported:
@@ -29,7 +32,10 @@ def check_blocked_modes(
 
 
 def _unreachable_modes(automaton: Automaton, dead_transitions: set[str]) -> list[Mode]:
-    """Return the modes that neither an initial mode nor a fault leads to."""
+    """Return the modes that neither an initial mode nor the fault mode leads to.
+
+    Transitions with keys in `dead_transitions` are ignored.
+    """
     if automaton.statechart:
         return unreachable_chart_modes(automaton, automaton.statechart, dead_transitions)
     return [
@@ -42,6 +48,7 @@ def _unreachable_modes(automaton: Automaton, dead_transitions: set[str]) -> list
 def _unreachable_in_region(
     automaton: Automaton, region: Region, dead_transitions: set[str]
 ) -> list[str]:
+    """Return the names of the unreachable modes of a region."""
     found = unreachable_modes(region.modes, region.initial, dead_transitions)
     fault_mode = automaton.fault_mode
     if fault_mode is not None and fault_mode in region.modes:
@@ -54,7 +61,11 @@ def _unreachable_in_region(
 
 
 def check_final_modes(automaton: Automaton, problems: Problems) -> None:
-    """Warn of final modes from which nothing goes on; those of a region of the root end it."""
+    """Warn of final modes whose completion has no effect.
+
+    A completion has an effect if a completion transition leaves the enclosing mode or `in(...)`
+    reads the final mode. Regions of the root are left out.
+    """
     chart = automaton.statechart
     if chart is None:
         return
@@ -73,7 +84,7 @@ def check_final_modes(automaton: Automaton, problems: Problems) -> None:
 
 
 def _completed_mode(chart: Chart, node: ChartNode) -> ChartNode | None:
-    """Return the mode that a final one may bring to its end, None for a region of the root."""
+    """Return the mode that a final mode completes; None for a region of the root."""
     outer = chart.nodes[node.parent]
     if outer.is_region:
         outer = chart.nodes[outer.parent]
@@ -81,7 +92,7 @@ def _completed_mode(chart: Chart, node: ChartNode) -> ChartNode | None:
 
 
 def _queried_nodes(automaton: Automaton, chart: Chart) -> set[int]:
-    """Return the nodes that some guard or equation asks for by `in(...)`."""
+    """Return the indices of the nodes that a guard or an equation reads by `in(...)`."""
     paths = mode_paths(chart)
     trees = [way.when.tree for mode in automaton.all_modes for way in mode.transitions]
     trees += [each.tree for mode in automaton.all_modes for each in mode.equations.values()]

@@ -1,4 +1,4 @@
-"""Check of parallel regions: whole in each region, disjoint between them (rule 14)."""
+"""Check of parallel regions: complete equations and flows, disjoint writers (rule 14)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from language.text.diagnostic import Problems, Span
 
 
 def check_regions(automaton: Automaton, problems: Problems) -> None:
-    """Report what only the chart may have, what a mode lacks, and what two regions write."""
+    """Report duplicate mode labels, incomplete modes, and names that two regions write."""
     labels: dict[str, Span] = {}
     for mode in automaton.all_modes:
         if mode.label in labels:
@@ -24,8 +24,12 @@ def check_regions(automaton: Automaton, problems: Problems) -> None:
 
 
 def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
+    """Report an observer or run of a parallel mode, and missing equations and balances.
+
+    A mode needs every equation and balance that another mode of its region has.
+    """
     if region.inactive is not None and mode.equations:
-        return  # check_chart.py says that it has none
+        return  # check_chart.py reports these equations
     for what, thing in (("observer", mode.observer), ("runs", mode.run)):
         if thing is not None:
             label = f"`{what}` belongs to a mode of the chart, not to one of region `{region.name}`"
@@ -43,7 +47,10 @@ def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
 
 
 def _check_writers(automaton: Automaton, problems: Problems) -> None:
-    """One region defines, balances or assigns to a name, whatever the stage."""
+    """Report names that two regions define, balance or assign.
+
+    Assignments of a chart are checked in check_chart.py.
+    """
     for what in ("equation", "balance", "assignment"):
         if automaton.statechart and what == "assignment":
             continue
@@ -60,6 +67,10 @@ def _check_writers(automaton: Automaton, problems: Problems) -> None:
 
 
 def _written_names(region: Region, what: str) -> Iterator[tuple[str, Span]]:
+    """Yield the names that a region writes in one way, with their places.
+
+    `what` is the way: `equation`, `balance` or `assignment`.
+    """
     for mode in region.modes.values():
         if what == "equation":
             yield from ((name, formula.span) for name, formula in mode.equations.items())

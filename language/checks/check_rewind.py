@@ -1,4 +1,4 @@
-"""Check of a rewind: how far it goes back, along which flow, and what carries on."""
+"""Check of rewinds: depth, flow of the source, condition `until` and run of the target."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from language.text.diagnostic import Problems
 
 
 def check_rewind(automaton: Automaton, transition: Transition, problems: Problems) -> None:
-    """Report what the rewind of a transition cannot do."""
+    """Report why a transition cannot rewind; a transition without `rewind` has no problem.
+
+    Rewinds need a sampled automaton without parallel regions, a reversible source and a target that
+    runs the model.
+    """
     rewind = transition.rewind
     if rewind is None:
         return
@@ -35,7 +39,10 @@ def check_rewind(automaton: Automaton, transition: Transition, problems: Problem
 
 
 def check_rewind_depth(automaton: Automaton, problems: Problems) -> None:
-    """Report how far the rewinds of a checked automaton cannot go."""
+    """Report rewinds whose `within` is not positive or longer than `MAX_REWIND` ticks.
+
+    Rewinds of a continuous automaton are skipped.
+    """
     for mode in automaton.all_modes:
         for transition in mode.transitions:
             if transition.rewind and automaton.period is not None:
@@ -46,6 +53,7 @@ def check_rewind_depth(automaton: Automaton, problems: Problems) -> None:
 def _check_depth(
     automaton: Automaton, period: Fraction, within: Formula, problems: Problems
 ) -> None:
+    """Report a `within` that is not positive or longer than `MAX_REWIND` ticks."""
     time = evaluate_exactly(within, automaton)
     ticks = math.ceil(time / period)
     if time <= 0:
@@ -56,7 +64,10 @@ def _check_depth(
 
 
 def _check_no_regions(automaton: Automaton, rewind: Rewind, problems: Problems) -> None:
-    """What runs beside the chart has acted meanwhile: it is not taken back."""
+    """Report parallel regions of the automaton or its model.
+
+    Their actions since the crossing cannot be rolled back.
+    """
     for thing in (automaton, automaton.model):
         if thing and thing.regions:
             label = f"`{thing.name}` has parallel regions: what they did meanwhile stays done"
@@ -66,7 +77,7 @@ def _check_no_regions(automaton: Automaton, rewind: Rewind, problems: Problems) 
 def _check_until_varies(
     automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems
 ) -> None:
-    """`until` is looked for where it turned true: what never changes does not."""
+    """Report an `until` that reads parameters only, because it never becomes true."""
     read = {*rewind.until.reads, *equation_closure(source, rewind.until.reads)}
     if read <= set(automaton.parameters):
         label = "`until` never changes: it reads neither states nor inputs"
@@ -74,12 +85,15 @@ def _check_until_varies(
 
 
 def _check_until_memory(source: Mode, rewind: Rewind, problems: Problems) -> None:
-    """`until` is looked up in the past: what remembers has no past of its own."""
-    found: Mapping[str, tuple[SyntaxTree, ...]] = {
+    """Report a function with memory in `until`, directly or in the equations that it reads.
+
+    `until` is evaluated on earlier ticks, for which the state of such functions is not stored.
+    """
+    trees: Mapping[str, tuple[SyntaxTree, ...]] = {
         name: tuple(formula.tree for formula in formulas)
         for name, formulas in equation_formulas(source).items()
     }
-    read = [tree for name in equation_closure(source, rewind.until.reads) for tree in found[name]]
+    read = [tree for name in equation_closure(source, rewind.until.reads) for tree in trees[name]]
     for tree in (rewind.until.tree, *read):
         for part in walk(tree):
             if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
@@ -91,7 +105,11 @@ def _check_until_memory(source: Mode, rewind: Rewind, problems: Problems) -> Non
 def _check_source_flow(
     automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems
 ) -> None:
-    """Between two ticks the source has one flow, or its states stand still."""
+    """Report a source whose states cannot be followed backwards within a tick.
+
+    Such sources are runs with several substeps or that may leave their flow, observers with written
+    matrices, and updates of states of the model.
+    """
     if source.run:
         _check_one_substep(source, rewind, problems)
         model = automaton.model
@@ -110,6 +128,7 @@ def _check_source_flow(
 def _check_target_run(
     automaton: Automaton, target: Mode, rewind: Rewind, problems: Problems
 ) -> None:
+    """Report a target without a run, with several substeps, or with updates of model states."""
     if target.run is None:
         label = f"mode `{target.name}` has no `runs`: nothing carries the states on from there"
         problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
@@ -119,6 +138,7 @@ def _check_target_run(
 
 
 def _check_one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
+    """Report a run with more than one substep."""
     run: ModelRun | None = mode.run
     if run and run.substeps != 1:
         label = (
@@ -128,7 +148,7 @@ def _check_one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
 
 
 def _check_no_update(automaton: Automaton, mode: Mode, rewind: Rewind, problems: Problems) -> None:
-    """What is taken back are the states of the model: a flow moves them, nothing else."""
+    """Report an `update` that writes a state of the model, because it is not rolled back."""
     written = [name for name in mode.update if automaton.model and name in automaton.model.states]
     if written:
         label = f"`update` of mode `{mode.name}` writes `{written[0]}`: it is not taken back"

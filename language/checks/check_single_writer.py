@@ -1,4 +1,4 @@
-"""Check of what carries and shows: one writer for a state, outputs in every mode."""
+"""Check of writers and outputs: one writer for each state, outputs with a value in every mode."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from language.text.diagnostic import Problems, suggest_name
 
 
 def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
-    """Report what carries a state beside something else that does, or belongs elsewhere."""
+    """Report states of a mode with several writers, and keys of the other kind of automaton.
+
+    Writers are the observer, the run and `update`. A run needs every state of its model in the
+    automaton.
+    """
     if mode.observer and mode.run and not mode.observer.predicts_by_run:
         label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
         help = "or the run predicts for the observer: `predict: runs`"
@@ -43,7 +47,7 @@ def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
 
 
 def check_memory_continue(automaton: Automaton, transition: Transition, problems: Problems) -> None:
-    """`memory: continue` keeps the wait counters of the target: there have to be some."""
+    """Report `memory: continue` to a mode without wait counters or in a continuous automaton."""
     modes = automaton.region(transition.region).modes
     target = modes.get(transition.target)
     if not automaton.is_sampled:
@@ -56,7 +60,11 @@ def check_memory_continue(automaton: Automaton, transition: Transition, problems
 
 
 def check_outputs(automaton: Automaton, problems: Problems) -> None:
-    """Report outputs that are not known, or have no value in some mode."""
+    """Report outputs with an unknown name and outputs without a value in some mode.
+
+    An output names a state, an equation, a region, `mode` or, if the automaton is sampled,
+    `faults`.
+    """
     equations = equation_names_of(automaton.all_modes)
     for output, span in automaton.outputs.items():
         name = automaton.output_source(output)
@@ -78,7 +86,10 @@ def check_outputs(automaton: Automaton, problems: Problems) -> None:
 
 
 def check_scaling_ranges(automaton: Automaton, problems: Problems) -> None:
-    """Report states without a range where the method of integration scales with it."""
+    """Report states without a range if a method of integration scales the states by their ranges.
+
+    The methods are `exponential` and `exact`.
+    """
     used = {m.run.method for m in automaton.modes.values() if m.run}
     used |= set() if automaton.is_sampled else {automaton.method}
     scaling = next((name for name in ("exponential", "exact") if name in used), None)
@@ -90,5 +101,5 @@ def check_scaling_ranges(automaton: Automaton, problems: Problems) -> None:
 
 
 def equation_names_of(modes: Iterable[Mode]) -> list[str]:
-    """Return the names of the equations of some modes, each once."""
+    """Return the names of the equations of some modes, each once, in order of appearance."""
     return list(dict.fromkeys(name for mode in modes for name in mode.equations))

@@ -1,4 +1,4 @@
-"""Check of truth tables: complete, free of overlap, one table for each variable."""
+"""Check of truth tables: complete and disjoint rows, one table for each variable."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from language.text.diagnostic import Problems
 from language.typecheck.infer import TypeChecker
 
 MARK_TEXT = {True: "T", False: "F", None: "-"}
+"""Text of a required condition value; `-` accepts both."""
 
 
 def check_truth_tables(automaton: Automaton, check: TypeChecker, problems: Problems) -> None:
-    """Report what is wrong with the truth tables of an automaton."""
+    """Report truth tables with wrong types, shared variables, or missing or overlapping rows.
+
+    Tables of a continuous automaton are reported too.
+    """
     if automaton.tables and not automaton.is_sampled:
         label = "`tables` belongs to a sampled automaton"
         hint = "an equation holds at every time: `permit: ready and isolated`"
@@ -37,14 +41,18 @@ def check_truth_tables(automaton: Automaton, check: TypeChecker, problems: Probl
 
 
 def _row_assignments(table: TruthTable) -> Iterator[tuple[str, Formula]]:
+    """Yield the assigned names and formulas of all rows."""
     for row in table.rows:
         yield from row.assignments.items()
 
 
 def _check_rows(table: TruthTable, problems: Problems) -> None:
-    """Exactly one row holds, whatever the conditions are; else what they are is shown."""
+    """Report overlapping rows and combinations of conditions without a row.
+
+    An `else` row that never holds gives a warning. A table with an unreadable row is skipped.
+    """
     if any(not row.marks for row in table.rows):
-        return  # told as no row
+        return  # the reader has reported it
     rows = [row for row in table.rows if not row.is_else]
     for earlier, later in combinations(rows, 2):
         both = _row_overlap(earlier, later)
@@ -66,7 +74,7 @@ def _check_rows(table: TruthTable, problems: Problems) -> None:
 
 
 def _row_overlap(earlier: TruthRow, later: TruthRow) -> tuple[bool | None, ...] | None:
-    """Return where two rows both hold, None where nowhere."""
+    """Return marks at which two rows both hold; None if they are disjoint."""
     pairs = tuple(zip(earlier.marks, later.marks, strict=True))
     if any(None not in pair and pair[0] != pair[1] for pair in pairs):
         return None
@@ -76,7 +84,11 @@ def _row_overlap(earlier: TruthRow, later: TruthRow) -> tuple[bool | None, ...] 
 def _find_uncovered(
     rows: Sequence[TruthRow], before: tuple[bool | None, ...], width: int
 ) -> tuple[bool | None, ...] | None:
-    """Return what no row is for, condition by condition, None where there is a row for all."""
+    """Return condition values that no row covers; None if the rows are complete.
+
+    `before` has the values of the first conditions, and `rows` agree with them. `width` is the
+    number of conditions. A value of None means that the condition does not matter.
+    """
     place = len(before)
     if not rows:
         return before + (None,) * (width - place)
@@ -93,11 +105,12 @@ def _find_uncovered(
 
 
 def _format_marks(marks: Sequence[bool | None]) -> str:
+    """Return marks as text: `T F -`."""
     return " ".join(MARK_TEXT[mark] for mark in marks)
 
 
 def _describe_marks(table: TruthTable, marks: Sequence[bool | None]) -> str:
-    """Return a row in words: `T F -`, that is ready and not isolated."""
+    """Return marks as text and in words: `T F -` (ready and not isolated)."""
     words = [
         name if mark else f"not {name}"
         for name, mark in zip(table.conditions, marks, strict=True)

@@ -1,4 +1,4 @@
-"""Check of what nobody reads and what nothing writes: warnings, it may be meant for later."""
+"""Check for unused names: warns of names that nothing reads and of states that nothing writes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from language.model.names_read import names_read_by
 from language.text.diagnostic import Problems, suggest_name
 
 UNUSED_HINT = "make it an output, or remove it"
+"""Hint for a state or equation that nothing reads."""
 
 
 def check_unused(automaton: Automaton, problems: Problems) -> None:
-    """Warn of parameters, inputs, states and equations without a reader, and of states without a
-    writer. What an automaton has from its model is looked at there.
+    """Warn of parameters, inputs, states and equations without reader, and states without writer.
+
+    Parameters that an automaton has from its model are left to the check of the model.
     """
     model = automaton.model
     read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
@@ -34,6 +36,7 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
 
 
 def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -> None:
+    """Warn once of each equation that nothing reads."""
     reported = set()
     for mode in automaton.all_modes:
         for name, formula in mode.equations.items():
@@ -44,6 +47,7 @@ def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -
 
 
 def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
+    """Warn of states and discrete variables that nothing writes."""
     written = {name for mode in automaton.all_modes for name in _written_names(automaton, mode)}
     written |= {name for table in automaton.tables for name in table.assigned_names}
     for name, state in automaton.state_variables.items():
@@ -53,7 +57,7 @@ def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
 
 
 def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
-    """Yield what a mode or a transition out of it writes."""
+    """Yield the names that a mode or its transitions write, observers and runs included."""
     for group in (mode.update, mode.entry, mode.exit, mode.flow):
         yield from group
     for transition in mode.transitions:
@@ -65,7 +69,7 @@ def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
 
 
 def _observer_names(automaton: Automaton) -> Iterator[str]:
-    """Yield the inputs and states that observers name beside their formulas."""
+    """Yield the inputs and states that observers name outside of their formulas."""
     for mode in automaton.modes.values():
         if mode.observer:
             yield from mode.observer.states
@@ -77,7 +81,7 @@ def _observer_names(automaton: Automaton) -> Iterator[str]:
 
 
 def _run_names(automaton: Automaton) -> Iterator[str]:
-    """Yield the inputs and states that runs share with the model by name."""
+    """Yield the inputs and states of the model if a mode runs it; a run shares them by name."""
     assert automaton.model
     if any(mode.run for mode in automaton.modes.values()):
         yield from automaton.model.inputs

@@ -1,6 +1,7 @@
-"""Examine: what is not wrong but hardly meant - warnings of a checked automaton.
+"""Warnings of a checked automaton: reports constructs that are valid and probably not intended.
 
-It runs where a spec is checked, not where it is only used: what has errors never gets here.
+They are computed by `check` and not when a spec is only loaded. An automaton with errors has no
+warnings.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ from language.text.diagnostic import Problems
 
 
 def check_warnings(automaton: Automaton, problems: Problems) -> None:
-    """Warn of what never fires or is never left, and of modes that change for ever."""
+    """Report the warnings of a checked automaton.
+
+    They are dead transitions, blocked and stuck modes, final modes without effect, close waits,
+    cycles, Zeno behaviour and assignments past a range.
+    """
     query_engine = QueryEngine(automaton)
     dead_transitions = check_dead_transitions(automaton, query_engine, problems)
     check_blocked_modes(automaton, dead_transitions, problems)

@@ -1,8 +1,8 @@
-"""Check of chatter: modes that can change infinitely often in a finite time (rule 12).
+"""Zeno check: finds cycles of modes that repeat infinitely often in a finite time (rule 12).
 
-A point is looked for at which each flow of a way round makes the next guard true at once, and the
-resets change nothing: a Zeno equilibrium (Lamperski and Ames, IEEE TAC 58 (2013), section III). A
-bouncing ball has one where it rests, a thermostat with one limit at that limit.
+The check searches a Zeno equilibrium (Lamperski and Ames, IEEE TAC 58 (2013), section III): a point
+at which the flow of each mode of the cycle enables the next guard at once and the resets change no
+state. A bouncing ball has one at rest; a thermostat with a single limit has one at that limit.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from language.smt.query_engine import QueryEngine, Witness
 from language.text.diagnostic import Problems, SpecError
 
 TIMED_FUNCTIONS = ("after", "every", "rising", "falling", "changed", "delay")
-"""Functions by which a guard needs time, or an earlier instant."""
+"""Functions whose guards need elapsed time or an earlier instant."""
 EQUALITY_TOLERANCE = 1.0e-9
-"""Relative; a witness lies on a boundary up to rounding, which z3 finds exactly."""
+"""Relative tolerance of equalities: z3 solves them exactly, and the solution is rounded."""
 SECANT_STEP = 1.0e-3
-"""Relative; how far beside the point resets are tried: the step of a secant."""
+"""Relative distance from the equilibrium at which resets are evaluated for a secant."""
 NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+"""Relation that holds where the relation of the key does not."""
 
 
 def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of ways to a mode and back that can be taken infinitely often in a finite time."""
+    """Warn of cycles of one or two modes that have a Zeno equilibrium; the warning shows it."""
     for cycle in _two_mode_cycles(automaton):
         try:
             witness = _find_zeno_equilibrium(automaton, cycle, query_engine)
@@ -44,20 +45,24 @@ def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Proble
 
 
 def _two_mode_cycles(automaton: Automaton) -> Iterator[Cycle]:
-    """Yield the transitions that lead back to their source, and pairs there and back."""
+    """Yield self-transitions and pairs of opposite transitions that need no time.
+
+    There are none in a sampled automaton or in one with parallel regions.
+    """
     if automaton.is_sampled or automaton.regions:
         return
-    quick = [way for way in instant_transitions(automaton) if not _is_timed(way)]
-    for place, first in enumerate(quick):
+    untimed = [each for each in instant_transitions(automaton) if not _is_timed(each)]
+    for position, first in enumerate(untimed):
         if first.source == first.target:
             yield (first,)
             continue
-        for second in quick[place + 1 :]:
+        for second in untimed[position + 1 :]:
             if (first.source, first.target) == (second.target, second.source):
                 yield first, second
 
 
 def _is_timed(transition: Transition) -> bool:
+    """Return whether a guard calls one of `TIMED_FUNCTIONS`."""
     parts = (part for part in walk(transition.when.tree) if isinstance(part, FunctionCall))
     return any(part.function in TIMED_FUNCTIONS for part in parts)
 
@@ -65,7 +70,12 @@ def _is_timed(transition: Transition) -> bool:
 def _find_zeno_equilibrium(
     automaton: Automaton, cycle: Cycle, query_engine: QueryEngine
 ) -> Witness | None:
-    """Return a point that the flows and resets of a way round lead to for ever, if there is one."""
+    """Return a Zeno equilibrium of a cycle.
+
+    None if none is found or the resets are not contracting. At the equilibrium each guard is
+    enabled at once along the flow of its mode, and no reset changes a state. z3 solves the exact
+    conditions; the witness is confirmed with equalities relaxed to a tolerance.
+    """
     path = SymbolicPath()
     start = snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
     exact: list[Expr] = []
@@ -87,18 +97,22 @@ def _find_zeno_equilibrium(
                 exact.append(same)
                 near.append(_relax_equalities(same))
         snapshot = after
-    found = query_engine.find_confirmed_witness(
+    witness = query_engine.find_confirmed_witness(
         query_engine.build_query(path, exact), query_engine.build_query(path, near)
     )
     return (
-        found
-        if found and _is_contracting(assigned, query_engine.build_query(path, near), found)
+        witness
+        if witness and _is_contracting(assigned, query_engine.build_query(path, near), witness)
         else None
     )
 
 
 def _is_contracting(assigned: Mapping[str, Expr], query: SolverQuery, witness: Witness) -> bool:
-    """Tell whether resets bring a state nearer to the point: a bounce without loss does not."""
+    """Return whether every reset reduces the distance of its state to the equilibrium.
+
+    The slope of the reset is a secant over `SECANT_STEP`. A bounce without loss of energy has slope
+    1 and is not contracting.
+    """
     for name, value in assigned.items():
         place = float(witness.valuation.get(name, 0.0))
         moved = place + SECANT_STEP * (1.0 + abs(place))
@@ -110,13 +124,18 @@ def _is_contracting(assigned: Mapping[str, Expr], query: SolverQuery, witness: W
 
 
 class _EnablingCondition:
-    """What makes a condition true now, or at once along the flow of a moment's mode."""
+    """Conditions that are true now, or become true at once along the flow of a mode."""
 
     def __init__(self, snapshot: GuardSnapshot) -> None:
         self.snapshot = snapshot
         self.lie_derivative = LieDerivative(snapshot)
 
     def condition_for(self, condition: Expr, is_true: bool) -> Expr:
+        """Return when a condition has a truth value now or at once along the flow.
+
+        Relations are replaced by `_relation`; assigned names are expanded. Equalities and Boolean
+        names are taken as they are.
+        """
         match condition:
             case Unary("not", operand):
                 return self.condition_for(operand, not is_true)
@@ -135,7 +154,11 @@ class _EnablingCondition:
         return condition if is_true else Unary("not", condition)
 
     def _relation(self, operator: str, left: Expr, right: Expr) -> Expr:
-        """Sides are apart; or they are equal and move apart, or begin to."""
+        """Return when a relation holds now, or when both sides are equal and separate at once.
+
+        The sides separate if the first derivative of the difference is positive, or if it is zero
+        and the second is positive.
+        """
         larger, smaller = (left, right) if operator in (">", ">=") else (right, left)
         now = Compare(">", larger, smaller)
         first = self.lie_derivative.differentiate(subtract(larger, smaller))
@@ -151,7 +174,7 @@ class _EnablingCondition:
 
 
 def _relax_equalities(condition: Expr) -> Expr:
-    """Return a condition in which real sides that have to be equal are so up to rounding."""
+    """Return a condition with equalities of reals relaxed to a relative tolerance."""
     match condition:
         case Binary("and" | "or" as operator, left, right):
             return Binary(operator, _relax_equalities(left), _relax_equalities(right))

@@ -1,4 +1,4 @@
-"""Declared: the kinds of value that declarations say, and each name once."""
+"""Declared names: collects the types of declarations and reports names that are used twice."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from language.text.diagnostic import Problems, Span
 from language.typecheck.types import EnumType, ExprType, IntType
 
 BUILTIN_NAMES = ("mode", "faults")
+"""Names that the language defines."""
 
 
 def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprType:
-    """Return the kind that a declaration says; a whole number lies in its range."""
+    """Return the type of a declaration: truth, enumeration, integer interval or dimension.
+
+    A fixed integer parameter has the interval of its value; other integers that of their range.
+    """
     if declaration.type == "bool":
         return "truth"
     if declaration.type == "enum":
@@ -34,14 +38,17 @@ def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprT
 def declared_names(
     automaton: Automaton, problems: Problems
 ) -> tuple[dict[str, ExprType], dict[str, ExprType]]:
-    """Return the kinds of all names that are declared, and of the names in enumerations."""
-    declared = _DeclarationTable(automaton, problems)
-    declared.declare()
-    return declared.kinds, declared.literal_kinds
+    """Return the types of all declared names, and those of the values of enumerations.
+
+    Report names that are declared twice, reserved, or that differ in case only.
+    """
+    table = _DeclarationTable(automaton, problems)
+    table.declare()
+    return table.kinds, table.literal_kinds
 
 
 class _DeclarationTable:
-    """What was declared so far, and where each name was given first."""
+    """Types of the declared names and the place of the first declaration of each."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
         self.automaton = automaton
@@ -51,6 +58,7 @@ class _DeclarationTable:
         self.first_spans: dict[str, Span] = {}
 
     def declare(self) -> None:
+        """Collect the declarations and report clashes with equations and regions."""
         automaton = self.automaton
         groups = (automaton.parameters, automaton.inputs, automaton.state_variables)
         for group in groups:
@@ -67,9 +75,10 @@ class _DeclarationTable:
                     break
         for region in automaton.regions:
             self._report_clash(region.name, region.span)
-        self._report_case_twins()
+        self._report_case_collisions()
 
-    def _report_case_twins(self) -> None:
+    def _report_case_collisions(self) -> None:
+        """Report names, and modes, that differ in case only."""
         automaton = self.automaton
         named = list(self.first_spans.items())
         for mode in automaton.all_modes:
@@ -78,12 +87,16 @@ class _DeclarationTable:
         report_case_collisions([(m.name, m.span) for m in automaton.all_modes], self.problems)
 
     def _declare_name(self, name: str, kind: ExprType, span: Span) -> None:
+        """Add a name with its type; report it if it exists already."""
         self._report_clash(name, span)
         self.kinds[name] = kind
         self.first_spans.setdefault(name, span)
 
     def _declare_literals(self, declaration: Parameter | Input | State) -> None:
-        """The names of an enumeration are known; two that share a name have the same list."""
+        """Add the values of an enumeration.
+
+        Two enumerations that share a value need equal lists.
+        """
         kind = EnumType(declaration.values)
         for value in declaration.values:
             known = self.kinds.get(value)
@@ -95,6 +108,7 @@ class _DeclarationTable:
                 self._report_clash(value, declaration.span)
 
     def _report_clash(self, name: str, span: Span) -> None:
+        """Report a name that is declared before or reserved."""
         if name in self.first_spans:
             hint = f"it is given first at {self.first_spans[name]}"
             self.problems.error(
