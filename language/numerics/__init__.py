@@ -1,1 +1,1 @@
-"""Numbers computed at check time, and elementary functions with fixed bits."""
+"""Numerics: elementary functions with fixed bits, evaluation, and small matrices at check time."""

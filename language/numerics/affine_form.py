@@ -1,4 +1,4 @@
-"""Affine: the terms of a mode's rates that are linear in the states with constant coefficients."""
+"""Affine forms: the parts of rates that are linear in the states with constant coefficients."""
 
 from __future__ import annotations
 
@@ -13,33 +13,38 @@ from language.numerics.matrix import Matrix
 
 @dataclass(frozen=True)
 class AffineForm:
-    """`sum(slopes) + constant`; the constant is None where there is anything else besides."""
+    """The form `sum(coefficients[x] * x) + constant` of a value in the states x.
+
+    `constant` is None if the value has further terms that are not affine or not known at check
+    time.
+    """
 
     coefficients: Mapping[str, float] = field(default_factory=dict)
     constant: float | None = None
 
     @property
     def is_constant(self) -> bool:
-        """Tell whether there is nothing but a known constant."""
+        """Return whether the form is a known constant without any state."""
         return not self.coefficients and self.constant is not None
 
 
 NOT_AFFINE = AffineForm()
-"""Something that is not affine, or not known before the program runs."""
+"""The form of a value that is not affine in the states, or not known at check time."""
 
 
 def jacobian(
     rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar | tuple[float, ...]]
 ) -> Matrix:
-    """Return A (n, n) of the terms of `work.rate_<state>` linear in `work.at_<state>`.
+    """Return the matrix A (n, n) of the linear part of `work.rate_<state>` in `work.at_<state>`.
 
-    Entry i j in unit_i/(unit_j s). What is not linear, or has no constant coefficient, is left out.
+    Entry i, j has the unit unit_i/(unit_j s). Terms that are not linear, or whose coefficient is
+    not constant, are left out.
     """
     return coefficient_matrix(affine_forms(rates, states, constants), states)
 
 
 def coefficient_matrix(forms: Mapping[str, AffineForm], states: tuple[str, ...]) -> Matrix:
-    """Return A (n, n) of rates whose affine parts are known."""
+    """Return the matrix A (n, n) of the coefficients of all rates; a missing coefficient is 0."""
     rows = [forms[f"work.rate_{name}"].coefficients for name in states]
     return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
 
@@ -47,13 +52,17 @@ def coefficient_matrix(forms: Mapping[str, AffineForm], states: tuple[str, ...])
 def affine_forms(
     rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar | tuple[float, ...]]
 ) -> dict[str, AffineForm]:
-    """Return what each name of a block of rates is in the states `work.at_<state>`."""
+    """Return the affine form in the states `work.at_<state>` of each name that a block assigns.
+
+    The result also has the constants and the states. Names assigned inside a Switch are NOT_AFFINE,
+    because the mode of a region is not known at check time; so are arrays.
+    """
     forms: dict[str, AffineForm] = {}
     for name, value in constants.items():
         forms[name] = NOT_AFFINE if isinstance(value, tuple) else AffineForm({}, float(value))
     forms.update({f"work.at_{name}": AffineForm({name: 1.0}, 0.0) for name in states})
     for op in rates:
-        if isinstance(op, Switch):  # it depends on a region's mode: not known before
+        if isinstance(op, Switch):  # the mode of a region is not known at check time
             forms.update({target: NOT_AFFINE for target in _targets(op)})
             continue
         assert isinstance(op, Assign)
@@ -62,11 +71,16 @@ def affine_forms(
 
 
 def _targets(choice: Switch) -> list[str]:
+    """Return the variables that the cases of a switch assign."""
     return [op.target for _, block in choice.cases for op in block if isinstance(op, Assign)]
 
 
 def to_affine_form(expr: Expr, forms: Mapping[str, AffineForm]) -> AffineForm:
-    """Return what an expression is in the states; `OTHER` where it is not linear in them."""
+    """Return the affine form of an expression; NOT_AFFINE if it is not linear in the states.
+
+    A sum with a term that is not affine keeps the coefficients of its other terms and has no
+    constant.
+    """
     match expr:
         case Ref(name):
             return forms.get(name, NOT_AFFINE)
@@ -97,6 +111,7 @@ def to_affine_form(expr: Expr, forms: Mapping[str, AffineForm]) -> AffineForm:
 
 
 def _fold_constant(expr: Expr, forms: Mapping[str, AffineForm]) -> AffineForm:
+    """Return the constant form of an expression; NOT_AFFINE if a name is not a known constant."""
     values: dict[str, Scalar] = {}
     for name in expr_names(expr):
         part = forms.get(name, NOT_AFFINE)
@@ -109,6 +124,7 @@ def _fold_constant(expr: Expr, forms: Mapping[str, AffineForm]) -> AffineForm:
 
 
 def _sum(a: AffineForm, b: AffineForm) -> AffineForm:
+    """Return a + b; the constant is None if one of both is."""
     slopes = dict(a.coefficients)
     for name, slope in b.coefficients.items():
         slopes[name] = slopes.get(name, 0.0) + slope
@@ -117,11 +133,13 @@ def _sum(a: AffineForm, b: AffineForm) -> AffineForm:
 
 
 def _scale(a: AffineForm, factor: float) -> AffineForm:
+    """Return a times a factor."""
     slopes = {name: slope * factor for name, slope in a.coefficients.items()}
     return AffineForm(slopes, None if a.constant is None else a.constant * factor)
 
 
 def _product(a: AffineForm, b: AffineForm) -> AffineForm:
+    """Return a b if one of both is a known constant, else NOT_AFFINE."""
     if a.is_constant and a.constant is not None:
         return _scale(b, a.constant)
     if b.is_constant and b.constant is not None:
@@ -130,6 +148,7 @@ def _product(a: AffineForm, b: AffineForm) -> AffineForm:
 
 
 def _quotient(a: AffineForm, b: AffineForm) -> AffineForm:
+    """Return a / b if b is a known constant, else NOT_AFFINE."""
     if not b.is_constant or b.constant is None:
         return NOT_AFFINE
     slopes = {name: divide(slope, b.constant) for name, slope in a.coefficients.items()}

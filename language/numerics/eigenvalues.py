@@ -1,6 +1,7 @@
-"""Eigen: eigenvalues of a small matrix of floats, and which entry sets one of them.
+"""Eigenvalues: the eigenvalues of a small matrix, and the entry that determines one of them.
 
-Same arithmetic, and for the same reason, as `language.numerics.matrix`: plain loops in a fixed order.
+The arithmetic is that of `language.numerics.matrix` for the same reason: plain loops in a fixed
+order (rule 17f).
 """
 
 from __future__ import annotations
@@ -12,19 +13,22 @@ from language.numerics.matrix import Matrix, balancing_exponents, require_finite
 ComplexRow = list[complex]
 
 MAX_QR_SWEEPS = 60
-"""Shifted QR steps per eigenvalue: a few are needed; the bound only makes the end certain."""
+"""Largest number of shifted QR steps per eigenvalue; a few suffice, the bound guarantees an end."""
 DEFLATION_TOLERANCE = 2.0**-53
-"""A subdiagonal entry of that size beside its diagonal is rounding (Golub and Van Loan, 7.5.1)."""
+"""Relative size of a subdiagonal entry that counts as rounding (Golub, Van Loan, section 7.5.1)."""
 SHIFT_PERTURBATION = 2.0**-40
-"""Part of an eigenvalue by which inverse iteration stays away from it: A - lambda is singular."""
+"""Relative distance of the shift of inverse iteration from the eigenvalue.
+
+A - lambda I itself is singular.
+"""
 
 
 def eigenvalues(a: Matrix) -> tuple[complex, ...]:
-    """Return the eigenvalues of A (n, n), each as often as it occurs, in no order.
+    """Return the eigenvalues of A (n, n) with their multiplicities, in no particular order.
 
-    QR steps with Wilkinson's shift on the balanced Hessenberg matrix, with rotations: Golub and
-    Van Loan, Matrix Computations (4th ed. 2013), sections 7.4 and 7.5. ValueError: A not square
-    or not finite.
+    QR steps with Wilkinson's shift on the balanced Hessenberg matrix, with rotations: Golub and Van
+    Loan, Matrix Computations (4th ed. 2013), sections 7.4 and 7.5. Raises ValueError if A is not
+    square or not finite.
     """
     require_finite("eigenvalues: A", a)
     if len(a[0]) != len(a):
@@ -46,10 +50,10 @@ def eigenvalues(a: Matrix) -> tuple[complex, ...]:
 
 
 def dominant_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
-    """Return row and column of the entry that an eigenvalue of A (n, n) hangs on most.
+    """Return row and column of the entry of A (n, n) that contributes most to an eigenvalue.
 
-    lambda = sum of y_i A_ij x_j / (y' x) with its left and right vectors: the largest summand,
-    which no change of units alters.
+    With its right eigenvector x and left eigenvector y, lambda is the sum of y_i A_ij x_j / (y' x).
+    The entry with the largest summand in size is returned. The choice does not depend on units.
     """
     right = _eigenvector(a, eigenvalue)
     left = _eigenvector(tuple(zip(*a, strict=True)), eigenvalue)
@@ -62,7 +66,10 @@ def dominant_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
 
 
 def _reduce_to_hessenberg(rows: list[ComplexRow]) -> list[ComplexRow]:
-    """Eliminate below the subdiagonal by similarity, with pivoting (elmhes of EISPACK)."""
+    """Return a similar matrix in Hessenberg form by elimination with pivoting (elmhes of EISPACK).
+
+    `rows` is changed in place and returned.
+    """
     n = len(rows)
     for m in range(1, n - 1):
         pivot = max(range(m, n), key=lambda i: abs(rows[i][m - 1]))
@@ -81,7 +88,10 @@ def _reduce_to_hessenberg(rows: list[ComplexRow]) -> list[ComplexRow]:
 
 
 def _active_block_start(rows: list[ComplexRow]) -> int:
-    """Return where the last block begins that is not split off yet."""
+    """Return the first row of the last block that is not split off.
+
+    The negligible subdiagonal entry before that row is set to 0.
+    """
     for k in range(len(rows) - 1, 0, -1):
         beside = abs(rows[k][k]) + abs(rows[k - 1][k - 1])
         if abs(rows[k][k - 1]) <= DEFLATION_TOLERANCE * beside or rows[k][k - 1] == 0:
@@ -91,7 +101,7 @@ def _active_block_start(rows: list[ComplexRow]) -> int:
 
 
 def _qr_step(rows: list[ComplexRow], start: int) -> None:
-    """A - mu I = Q R, then R Q + mu I, on the rows and columns from `start`."""
+    """Replace the active block, from row `start`, in place by R Q + mu I with A - mu I = Q R."""
     n = len(rows)
     mu = _wilkinson_shift(rows)
     for k in range(start, n):
@@ -116,7 +126,7 @@ def _qr_step(rows: list[ComplexRow], start: int) -> None:
 
 
 def _wilkinson_shift(rows: list[ComplexRow]) -> complex:
-    """Return the eigenvalue of the last 2 x 2 block that is nearer to its last entry."""
+    """Return the eigenvalue of the last 2 x 2 block that is nearer to its last diagonal entry."""
     (a, b), (c, d) = rows[-2][-2:], rows[-1][-2:]
     half = 0.5 * (a - d)
     root = (half * half + b * c) ** 0.5
@@ -125,7 +135,10 @@ def _wilkinson_shift(rows: list[ComplexRow]) -> complex:
 
 
 def _eigenvector(a: Matrix, eigenvalue: complex) -> ComplexRow:
-    """Return the vector of an eigenvalue by two steps of inverse iteration."""
+    """Return the eigenvector of an eigenvalue by two steps of inverse iteration.
+
+    Largest entry 1 in size.
+    """
     n = len(a)
     scale = max(abs(eigenvalue), max(abs(x) for row in a for x in row), 1e-300)
     shifted = eigenvalue + SHIFT_PERTURBATION * scale
@@ -144,7 +157,10 @@ def _eigenvector(a: Matrix, eigenvalue: complex) -> ComplexRow:
 
 
 def _solve_linear(rows: list[ComplexRow], rhs: ComplexRow) -> ComplexRow:
-    """Solve by elimination with partial pivoting; a pivot of zero is taken as a tiny one."""
+    """Return the solution x (n) of A x = b by elimination with partial pivoting.
+
+    A pivot of zero is replaced by SHIFT_PERTURBATION.
+    """
     n = len(rows)
     work = [[*row, value] for row, value in zip(rows, rhs, strict=True)]
     for k in range(n):

@@ -1,4 +1,4 @@
-"""Evaluate: the meaning of each elementary operation, and of a constant expression (rule 17b)."""
+"""Evaluation: the meaning of each elementary operation and of an expression (rule 17b)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "*": operator.mul,
     "/": operator.truediv,
 }
-"""Of fractions and terms of a solver; floats divide by `evaluate.divide`, as C does."""
+"""Operators for fractions and solver terms; floats use `divide`, as C does."""
 
 RELATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "<": operator.lt,
@@ -34,7 +34,7 @@ Scalar = float | int | bool
 
 
 def divide(a: float, b: float) -> float:
-    """IEEE 754 division: x/0 is an infinity or NaN, never an exception."""
+    """Return a / b by IEEE 754: x/0 is an infinity, 0/0 is NaN; no exception is raised."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -44,56 +44,68 @@ def divide(a: float, b: float) -> float:
 
 
 def square_root(a: float) -> float:
-    """IEEE 754 square root: NaN below zero."""
+    """Return the IEEE 754 square root: NaN below zero, -0.0 for -0.0."""
     return math.sqrt(a) if a >= 0.0 else (a if a == 0.0 else math.nan)
 
 
 def minimum(a: float, b: float) -> float:
-    """Return `b if b < a else a` (rule C7)."""
+    """Return `b if b < a else a`; a NaN in either gives a (rule C7)."""
     return b if b < a else a
 
 
 def maximum(a: float, b: float) -> float:
-    """Return `b if b > a else a` (rule C7)."""
+    """Return `b if b > a else a`; a NaN in either gives a (rule C7)."""
     return b if b > a else a
 
 
 def clip(x: float, low: float, high: float) -> float:
-    """Return x within [low, high]; NaN becomes low (rule C7)."""
+    """Return x limited to [low, high]; a NaN gives low (rule C7)."""
     return (x if x < high else high) if x > low else low
 
 
 def sign(x: float) -> float:
-    """Return -1, 0 or 1; 0 for NaN."""
+    """Return -1, 0 or 1 as a float; 0 for NaN."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
 def floor(x: float) -> float:
-    """Return the largest whole number not above x; -0.0, infinities and NaN as they are."""
+    """Return the largest whole number not above x.
+
+    -0.0, infinities and NaN are returned unchanged.
+    """
     return x if x == 0.0 or not math.isfinite(x) else float(math.floor(x))
 
 
 def power_of_two(k: float) -> float:
-    """Return 2^k exactly for a whole-valued k from -1022 to 1023, anything else as it is."""
+    """Return 2^k exactly for a whole-valued k from -1022 to 1023.
+
+    Any other k is returned unchanged.
+    """
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
 MAX_FLOAT32_INTEGER = 2147483520
-"""Largest whole number made of a real: it is one in 32-bit floats too, with 24 bits."""
+"""Largest result of a conversion to a whole number: 2^31 - 128, which is exact in float32."""
 
 INTEGER_OF_NAN = -(2**31)
-"""What a NaN becomes: outside every range, so that the clip of the target sees it."""
+"""Result of the conversion of a NaN: outside every range, so that a saturation detects it."""
 
 
 def to_integer(x: float) -> int:
-    """Return a whole-valued real as a whole number, the nearest of 32 bits (rule C8)."""
+    """Return a real, truncated, as a whole number limited to MAX_FLOAT32_INTEGER in size (rule C8).
+
+    A NaN gives INTEGER_OF_NAN.
+    """
     if -MAX_FLOAT32_INTEGER <= x <= MAX_FLOAT32_INTEGER:
         return int(x)
     return MAX_FLOAT32_INTEGER if x > 0.0 else (-MAX_FLOAT32_INTEGER if x < 0.0 else INTEGER_OF_NAN)
 
 
 def power_of_two_float32(k: float) -> float:
-    """Return 2^k exactly for a whole-valued k from -126 to 127, anything else as it is."""
+    """Return 2^k exactly for a whole-valued k from -126 to 127.
+
+    Any other k is returned unchanged.
+    """
     return math.ldexp(1.0, int(k)) if -126.0 <= k <= 127.0 else k
 
 
@@ -113,7 +125,10 @@ ELEMENTARY: FunctionMap = {
     "lookup": Interpolation(float).lookup,
     "lookup2": Interpolation(float).lookup2,
 }
-"""In double: exact or rounded once, so that rounding once more gives the result of float32."""
+"""Elementary operations in double; each is exact or rounded once.
+
+One further rounding of a result therefore gives the result in float32.
+"""
 
 ELEMENTARY_BY_TYPE: Mapping[NumberType, FunctionMap] = {
     "float64": ELEMENTARY,
@@ -124,7 +139,7 @@ ELEMENTARY_BY_TYPE: Mapping[NumberType, FunctionMap] = {
         "lookup2": Interpolation(round_to_float32).lookup2,
     },
 }
-"""By number type, before the rounding to it."""
+"""Elementary operations of each number type, before the rounding of their result to the type."""
 
 BINARY_OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     **ARITHMETIC,
@@ -138,9 +153,10 @@ BINARY_OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
 def evaluate(
     expr: Expr, values: Mapping[str, Scalar], number_type: NumberType = "float64"
 ) -> Scalar:
-    """Return the value of an expression of scalars, each operation rounded to the number type.
+    """Return the value of a scalar expression, each operation rounded to the number type.
 
-    Slow and plain: for check time only.
+    `values` gives the values of names. Raises KeyError for an unknown name and TypeError for an
+    array element. The function is slow and is meant for check time.
     """
 
     def value(part: Expr) -> Scalar:
@@ -172,11 +188,11 @@ def evaluate(
 def apply_function(
     function: str, arguments: list[Scalar], number_type: NumberType = "float64"
 ) -> Scalar:
-    """Return the value of an elementary operation or function."""
+    """Return the value of an elementary operation or of a function that is an operation list."""
     if function in ELEMENTARY:
         return round_if_real(ELEMENTARY_BY_TYPE[number_type][function](*arguments), number_type)
     values = tuple(arguments)
-    if 0.0 in values:  # a cache takes -0.0 for 0.0
+    if 0.0 in values:  # the cache does not distinguish -0.0 from 0.0
         return _evaluate_function.__wrapped__(function, values, number_type)
     return _evaluate_function(function, values, number_type)
 
@@ -185,7 +201,7 @@ def apply_function(
 def _evaluate_function(
     function: str, arguments: tuple[Scalar, ...], number_type: NumberType
 ) -> Scalar:
-    """Return the value of a function that is an operation list; samples come again and again."""
+    """Return the value of a function that is an operation list; results are cached."""
     definition = FUNCTIONS_BY_TYPE[number_type][function]
     names = [f"work.{name}" for name in definition.parameters]
     values: dict[str, Scalar] = dict(zip(names, arguments, strict=True))
@@ -196,5 +212,8 @@ def _evaluate_function(
 
 
 def round_if_real(value: Scalar, number_type: NumberType) -> Scalar:
-    """Return a result rounded to the type if it is a real; truth and whole numbers are exact."""
+    """Return a real rounded to the number type.
+
+    Whole numbers and truth values are returned unchanged.
+    """
     return ROUNDING_FUNCTIONS[number_type](value) if isinstance(value, float) else value

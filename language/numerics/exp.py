@@ -1,4 +1,4 @@
-"""Exponent: exp as operations, of the same kind as those in elementary.py."""
+"""Exponential: exp as a list of exact operations, as described in sin_cos_tanh.py (rule C5)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from language.numerics.sin_cos_tanh import (
 )
 
 EXP_LOWEST, EXP_HIGHEST = real(-708.0), real(709.0)
-"""Within them e^x is finite and normal, and its power of two is within -1021 and 1023."""
+"""Bounds of the argument: within them e^x is finite and normal, its power of two in -1021..1023."""
 PER_LN_2 = real(1.4426950408889634)
 LN_2 = real(0.6931471805598903), real(5.497923018708371e-14)
 """ln 2 in two parts; the first is a multiple of 2^-42, so its multiples up to 2^10 are exact."""
@@ -32,18 +32,20 @@ EXP_SERIES = (
     2.763019225057943e-07,
     2.5007202378603645e-08,
 )
-"""(e^r - 1 - r) / r^2, degree 9 in r, |r| <= ln 2 / 2; error of e^r 2^-57.9 relative.
+"""Coefficients of (e^r - 1 - r) / r^2, degree 9 in r, |r| <= ln 2 / 2.
 
-Minimax by mpmath at 60 digits (Lawson's weights), the lowest coefficient rounded to double and
-fixed, the rest fitted anew, and so on upwards; the error is that of the rounded coefficients.
+Error of e^r 2^-57.9 relative. Minimax by mpmath at 60 digits (Lawson's weights). The lowest
+coefficient is rounded to double and fixed, the others are fitted again, and so on upwards. The
+error is that of the rounded coefficients.
 """
 
 
 @dataclass(frozen=True)
 class ExpConstants:
-    """The numbers of exp in one type: within `lowest` and `highest` its value is normal.
+    """The constants of exp for one number type.
 
-    `least` is the exponent of 2 at the lowest; `rounding` rounds to whole numbers.
+    Between `lowest` and `highest` the result is normal. `lowest_exponent` is the power of two at
+    `lowest`; `rounding_constant` rounds to whole numbers.
     """
 
     lowest: Value
@@ -61,11 +63,12 @@ EXP_FLOAT64 = ExpConstants(
 
 
 def build_exp(constants: ExpConstants = EXP_FLOAT64) -> Function:
-    """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2 (Cody & Waite 1980, Software Manual).
+    """Return exp as a function of operations: e^x = 2^k e^r, k whole, |r| <= ln 2 / 2.
 
-    ln 2 has two parts; head = x - k ln2_1 is exact, r = head - tail, and the sum
-    1 + (head + (r^2 p(r) - tail)) adds the large terms last (Muller 2016, Elementary Functions).
-    x is clamped to [-708, 709]: the result is never infinite, zero or subnormal.
+    Cody and Waite 1980, Software Manual for the Elementary Functions. ln 2 has two parts; head = x
+    - k ln2_1 is exact and r = head - tail. The sum 1 + (head + (r^2 p(r) - tail)) adds the large
+    terms last (Muller 2016, Elementary Functions). x is clamped to [lowest, highest], in float64
+    [-708, 709]: the result is never infinite, zero or subnormal.
     """
     body = FunctionBuilder()
     bounded = body.let("bounded", clamp(X, constants.lowest, constants.highest))
@@ -77,9 +80,12 @@ def build_exp(constants: ExpConstants = EXP_FLOAT64) -> Function:
 def emit_exp(
     body: FunctionBuilder, bounded: Ref, rest: Expr | None, constants: ExpConstants
 ) -> Expr:
-    """Return e^(bounded + rest), `bounded` within the bounds of exp and `rest` far smaller."""
+    """Append the operations of e^(bounded + rest) to a function and return the result expression.
+
+    `bounded` lies within the bounds of exp; `rest` is much smaller, None for 0.
+    """
     power = round_to_nearest(multiply(bounded, constants.per_ln_2), constants.rounding_constant)
-    # The comparison is for NaN: pow2 gets a whole number always.
+    # The comparison is false for a NaN, so that pow2 always gets a whole number.
     is_known = Compare(">", bounded, constants.lowest)
     exponent = body.let("exponent", Select(is_known, power, constants.lowest_exponent))
     head = body.let("head", subtract(bounded, multiply(exponent, constants.ln_2[0])))

@@ -1,8 +1,9 @@
-"""Elementary functions in float32 as operations: those of elementary.py with fewer terms.
+"""Float32 constants: the numbers of the elementary functions in float32 (rule C5).
 
-The same methods, clamps and symmetries; every number here is a float32. sin and cos are reduced by
-four parts of pi/2, for 24 bits leave less room for exact products. The errors that `about` states,
-in ULP of the exact result, were measured at every float32 of the domain (tests/language).
+The methods, clamps and symmetries are those of float64; the series have fewer terms, and every
+number is a float32. sin and cos are reduced by four parts of pi/2, because 24 bits leave less room
+for exact products. The errors in `about`, in ULP of the exact result, were measured at every
+float32 of the domain (tests/language).
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ from language.numerics.tan_atan2 import Atan2Constants
 ROUNDING_CONSTANT = real(1.5 * 2.0**23)
 """Adding and subtracting it rounds |x| < 2^22 to the nearest integer, ties to even (rule C5)."""
 TINY_ARGUMENT = real(2.0**-13)
-"""Below it sin x and tanh x are x to 2^-26 / 3 relative; keeps -0.0 and the subnormals."""
+"""Below it sin x and tanh x equal x to 2^-26 / 3 relative; -0.0 and subnormals are kept."""
 
 EXP_LOWEST, EXP_HIGHEST = real(-87.0), real(88.0)
-"""Within them e^x is finite and normal, and its power of two is within -126 and 127."""
+"""Bounds of the argument: within them e^x is finite and normal, its power of two in -126..127."""
 PER_LN_2 = real(1.4426950216293335)
 LN_2 = real(0.693145751953125), real(1.428606765330187e-06)
 """ln 2 in two parts; the first is a multiple of 2^-15, so its multiples up to 2^8 are exact."""
@@ -38,10 +39,11 @@ EXP_SERIES = (
     0.008369989693164825,
     0.0013847037917003036,
 )
-"""(e^r - 1 - r) / r^2, degree 4 in r, |r| <= ln 2 / 2; error of e^r 2^-28.1 relative.
+"""Coefficients of (e^r - 1 - r) / r^2, degree 4 in r, |r| <= ln 2 / 2.
 
-This and the next two: minimax by mpmath at 40 digits (Remez exchange), the lowest coefficient
-rounded to float32 and fixed, the rest fitted anew, and so on upwards.
+Error of e^r 2^-28.1 relative. This and the next two: minimax by mpmath at 40 digits (Remez
+exchange). The lowest coefficient is rounded to float32 and fixed, the others are fitted again, and
+so on upwards.
 """
 
 MAX_ANGLE = 1000.0
@@ -53,26 +55,38 @@ HALF_PI_PARTS = (
     real(9.922587196342647e-10),
     real(-1.6513995574653217e-13),
 )
-"""pi/2 in four parts, together within 2^-68; the first three are multiples of 2^-13, 2^-27 and
-2^-41 with at most 14 bits, so their products with a number of quarters are exact."""
+"""pi/2 in four parts, together within 2^-68.
+
+The first three are multiples of 2^-13, 2^-27 and 2^-41 with at most 14 bits, so their products with
+a number of quarter turns are exact.
+"""
 SIN_SERIES = (-0.16666653752326965, 0.00833209604024887, -0.00019505627278704196)
-"""(sin r / r - 1) / r^2, degree 2 in r^2, |r| <= pi/4; error of sin r / r 2^-27.7."""
+"""Coefficients of (sin r / r - 1) / r^2, degree 2 in r^2, |r| <= pi/4.
+
+Error of sin r / r 2^-27.7.
+"""
 COS_SERIES = (0.04166664555668831, -0.0013887288514524698, 2.4428207325399853e-05)
-"""(cos r - 1 + r^2 / 2) / r^4, degree 2 in r^2, |r| <= pi/4; error of cos r 2^-32.8."""
+"""Coefficients of (cos r - 1 + r^2 / 2) / r^4, degree 2 in r^2, |r| <= pi/4.
+
+Error of cos r 2^-32.8.
+"""
 
 TANH_SATURATION = real(10.0)
-"""tanh x rounds to 1 from x = 9.02 on."""
+"""tanh x rounds to 1 for x >= 9.02."""
 LAMBERT_NUMERATOR = (315.0, 14.0)
 LAMBERT_DENOMINATOR = (945.0, 420.0, 15.0)
-"""x - tanh x = x z above(z) / below(z), z = x^2, within 2^-30 of x up to 0.625: Lambert's
-continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9))))."""
+"""Coefficients of numerator and denominator of (x - tanh x) / (x z), z = x^2.
+
+Lambert's continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9)))), within 2^-30 of x up to 0.625.
+"""
 
 
 def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
-    """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
+    """Append the reduction of x by multiples of pi/2 and return (quadrant 0 1 2 3, head, tail).
 
-    `coarse`, `fine` and `finer` are exact. Two differences with their rounding errors (Dekker's
-    fast two-sum) leave head + tail within 2^-56 of the rest of x, which is 2^-30 or more.
+    x is head + tail beyond a multiple of pi/2. `coarse`, `fine` and `finer` are exact. Two
+    differences with their rounding errors (Dekker's fast two-sum) leave head + tail within 2^-56 of
+    the reduced argument, which is 2^-30 or more.
     """
     bounded, quarters, quadrant = count_quarter_turns(
         body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
@@ -89,7 +103,10 @@ def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
 
 
 def sin_cos_kernels_float32(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
-    """Return (sin, cos) of head + tail, |head| <= pi/4, as in elementary.py."""
+    """Append the series and return (sin, cos) of head + tail, |head| <= pi/4.
+
+    The method is that of `sin_cos_kernels`.
+    """
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))
     crest = body.let("crest", subtract(real(1.0), half))
@@ -143,7 +160,10 @@ ATAN2_FLOAT32 = Atan2Constants(
     scale=2.0**-20,
     largest=(2.0 - 2.0**-23) * 2.0**127,
 )
-"""As in tangent.py; (atan r / r - 1) / r^2, degree 4 in r^2, error of atan r / r 2^-29.4."""
+"""Constants of atan2 as in tan_atan2.py.
+
+The series is (atan r / r - 1) / r^2, degree 4 in r^2; error of atan r / r 2^-29.4.
+"""
 LOG_FLOAT32 = LogConstants(
     -126,
     (64, 32, 16, 8, 4, 2, 1),
@@ -152,5 +172,5 @@ LOG_FLOAT32 = LogConstants(
     LOG_SERIES_FLOAT32,
     LN_2,
 )
-"""Of log in float32."""
+"""Constants of log in float32."""
 POW_FLOAT32 = PowConstants("float32", LOG_FLOAT32, EXP_FLOAT32, 6, 2.0**12 + 1.0)

@@ -13,12 +13,18 @@ Points = Sequence[float]
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Tables in one number type: linear between points, held outside, NaN at NaN."""
+    """Linear interpolation in tables; outside of the axis the end value is held, a NaN gives a NaN.
+
+    `round_value` rounds the double result of an operation to the number type.
+    """
 
     round_value: Callable[[float], float]
 
     def lookup(self, axis: Points, size: int, values: Points, x: float) -> float:
-        """Return the value of a table at x."""
+        """Return the value of a one-dimensional table at x.
+
+        `axis` and `values` have `size` points; the points of the axis ascend.
+        """
         low, part = self._find_cell(axis, size, x)
         return self._interpolate(values[low], values[low + 1], part)
 
@@ -32,7 +38,11 @@ class Interpolation:
         x: float,
         y: float,
     ) -> float:
-        """Return the value of a table at (x, y): linear in y along both rows, then in x."""
+        """Return the value of a two-dimensional table at (x, y).
+
+        The interpolation is linear in y along both rows, then in x. `rows` has `count` points,
+        `columns` has `width`; `values` are stored row by row.
+        """
         row, down = self._find_cell(rows, count, x)
         column, along = self._find_cell(columns, width, y)
         first = row * width + column
@@ -41,9 +51,10 @@ class Interpolation:
         return self._interpolate(upper, lower, down)
 
     def _find_cell(self, axis: Points, size: int, x: float) -> tuple[int, float]:
-        """Return the interval of an axis that x is in, by bisection, and the part of it before x.
+        """Return the index of the interval of an axis that contains x, and x's fraction of it.
 
-        Outside, the part is 0 or 1; of NaN it is NaN.
+        The interval is found by bisection. The fraction is 0 below the axis, 1 above it and NaN for
+        a NaN.
         """
         low, high = 0, size - 1
         if x <= axis[low]:
@@ -60,7 +71,7 @@ class Interpolation:
         return low, self.round_value(before / whole)
 
     def _interpolate(self, a: float, b: float, fraction: float) -> float:
-        """Return a at 0, b at 1, linear between."""
+        """Return a at fraction 0, b at 1 and above, and the linear interpolation between."""
         if fraction >= 1.0:
             return b
         return self.round_value(a + self.round_value(fraction * self.round_value(b - a)))

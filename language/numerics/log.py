@@ -1,7 +1,7 @@
-"""Logarithm: log, the natural one, as operations, of the same kind as those in elementary.py.
+"""Logarithm: the natural logarithm as a list of exact operations (rule C5), as in sin_cos_tanh.py.
 
-The errors that `about` states were measured against mpmath by the tests, in float32 at every number
-of the domain (0.84 ULP) and in float64 at 6 * 10^7 against the 64 bits of x87 (0.86 ULP), once.
+The errors in `about` were measured: in float32 by the tests against mpmath at every number of the
+domain (0.84 ULP), in float64 once at 6 * 10^7 numbers against the 64 bits of x87 (0.86 ULP).
 """
 
 from __future__ import annotations
@@ -23,21 +23,23 @@ LOG_SERIES = (
     0.15313895728652202,
     0.1479736350587642,
 )
-"""(log((1 + s) / (1 - s)) - 2 s) / s^3, degree 6 in s^2, |s| <= 3 - 2 sqrt 2; error of log 2^-59.4.
+"""Coefficients of (log((1 + s) / (1 - s)) - 2 s) / s^3, degree 6 in s^2, |s| <= 3 - 2 sqrt 2.
 
-Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight s^2; the lowest coefficient
-rounded to double and fixed, the rest fitted anew, and so on upwards.
+The error of log is 2^-59.4. Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight s^2.
+The lowest coefficient is rounded to double and fixed, the others are fitted again, and so on
+upwards.
 """
 LOG_SERIES_FLOAT32 = (0.6666677594184875, 0.399775892496109, 0.29870572686195374)
-"""The same with degree 2, rounded to float32; error of log 2^-30.2."""
+"""The same series with degree 2, rounded to float32; error of log 2^-30.2."""
 
 
 @dataclass(frozen=True)
 class LogConstants:
-    """The numbers of log in one type: `lowest` is the exponent of the smallest normal number.
+    """The constants of log for one number type.
 
-    `steps` are the powers of two by which a number from 1 on is brought below 2; `ln_2` in two
-    parts, the first times any exponent exact.
+    `lowest_exponent` is the exponent of the smallest normal number. `steps` are the exponents of
+    the powers of two that bring a number from 1 on below 2. `ln_2` has two parts; the product of
+    the first one and any exponent is exact.
     """
 
     lowest_exponent: int
@@ -59,11 +61,11 @@ LOG_FLOAT64 = LogConstants(
 
 
 def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
-    """log x = k ln 2 + log m, sqrt 1/2 < m <= sqrt 2 (fdlibm e_log.c, Sun Microsystems 1993).
+    """Return log as a function of operations: log x = k ln 2 + log m, sqrt 1/2 < m <= sqrt 2.
 
-    With f = m - 1, which is exact, and s = f / (2 + f) log m is f - (f^2/2 - s (f^2/2 + r)), where
-    s r is the rest of the series of log((1 + s) / (1 - s)). What is below 1 is made larger by a
-    power of two; then halving finds k. x is clamped to the normal numbers above 0.
+    Method of fdlibm, e_log.c (Sun Microsystems 1993). With f = m - 1, which is exact, and s = f /
+    (2 + f), log m is f - (f^2/2 - s (f^2/2 + r)), where s r is the remainder of the series of
+    log((1 + s) / (1 - s)). x is clamped to the positive normal numbers.
     """
     body = FunctionBuilder()
     k, f = emit_frexp(body, X, constants)
@@ -78,7 +80,11 @@ def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
 
 
 def emit_frexp(body: FunctionBuilder, x: Expr, constants: LogConstants) -> tuple[Ref, Ref]:
-    """Return (k, f): x within its bounds is 2^k (1 + f), sqrt 1/2 < 1 + f <= sqrt 2, exactly."""
+    """Append the decomposition of x and return (k, f): clamped x = 2^k (1 + f), exactly.
+
+    sqrt 1/2 < 1 + f <= sqrt 2. A number below 1 is first multiplied by a power of two; then
+    repeated comparison and scaling finds k.
+    """
     smallest = real(2.0**constants.lowest_exponent)
     m = body.let("bounded", clamp(x, smallest, real(constants.largest)))
     is_large = Compare(">=", m, real(1.0))

@@ -1,9 +1,10 @@
 """Small matrices of floats: arithmetic, linear solve, exponential and its integral (rule 17f).
 
-The results are printed into ECU C code, so their bits may depend neither on the CPU nor on a
-library: one IEEE 754 binary64 rounding per operation, products summed from left to right by plain
-loops (`sum` compensates since Python 3.12), scaling by powers of two, which is exact. Arithmetic
-lets inf and nan pass; whatever solves refuses them. A matrix is a tuple of rows, a vector is n x 1.
+The results are printed into ECU C code, so their bits must not depend on the processor or on a
+library. Each operation is rounded once to IEEE 754 binary64, products are summed from left to right
+by plain loops (`sum` compensates since Python 3.12), and scaling by powers of two is exact.
+Arithmetic passes inf and nan through; solvers raise ValueError for them. A matrix is a tuple of
+rows, a vector is (n, 1).
 """
 
 from __future__ import annotations
@@ -14,17 +15,26 @@ from collections.abc import Iterable
 Matrix = tuple[tuple[float, ...], ...]
 
 SERIES_TERMS = 19
-"""Terms of a Taylor sum of (e^z - 1)/z, |z| <= 1: the rest is below 2^-60, under the rounding."""
+"""Terms of the Taylor sum of (e^z - 1)/z, |z| <= 1.
+
+The remainder is below 2^-60, less than the rounding.
+"""
 MAX_SWEEPS = 50
-"""Balancing settles in a few sweeps; the bound only makes its end certain. Any exponents serve."""
+"""Largest number of sweeps of balancing; a few suffice, and any exponents are admissible."""
 MAX_SCALE_EXPONENT = 256
-"""Largest exponent of the scale of a state: beyond it a noise, scaled twice, would overflow."""
+"""Largest exponent of a state's scale.
+
+Beyond it a covariance, which is scaled twice, would overflow.
+"""
 BALANCE_FACTOR = 0.95
-"""A state is scaled if that shrinks its row plus column by 5 % (Parlett and Reinsch's gamma)."""
+"""A state is scaled if its row plus column sum shrinks by 5 % (gamma of Parlett and Reinsch)."""
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
-    """Return A B, (n, k) times (k, m) -> (n, m), summed left to right; ValueError if k differs."""
+    """Return A B, (n, k) times (k, m) -> (n, m), summed from left to right.
+
+    Raises ValueError if the shapes do not match.
+    """
     if len(a[0]) != len(b):
         raise ValueError(f"multiply: {format_shape(a)} times {format_shape(b)}")
     columns = transpose(b)
@@ -32,19 +42,19 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def add(a: Matrix, b: Matrix) -> Matrix:
-    """Return A + B, both (n, m); ValueError if the shapes differ."""
+    """Return A + B, both (n, m). Raises ValueError if the shapes differ."""
     if format_shape(a) != format_shape(b):
         raise ValueError(f"add: {format_shape(a)} and {format_shape(b)}")
     return tuple(tuple(x + y for x, y in zip(p, q, strict=True)) for p, q in zip(a, b, strict=True))
 
 
 def subtract(a: Matrix, b: Matrix) -> Matrix:
-    """Return A - B, both (n, m); ValueError if the shapes differ."""
+    """Return A - B, both (n, m). Raises ValueError if the shapes differ."""
     return add(a, scale(-1.0, b))
 
 
 def scale(factor: float, a: Matrix) -> Matrix:
-    """Return factor A, (n, m) -> (n, m)."""
+    """Return factor * A, (n, m) -> (n, m)."""
     return tuple(tuple(factor * x for x in row) for row in a)
 
 
@@ -54,7 +64,7 @@ def transpose(a: Matrix) -> Matrix:
 
 
 def identity(n: int) -> Matrix:
-    """Return I, (n, n)."""
+    """Return the identity matrix (n, n)."""
     return tuple(tuple(1.0 if i == j else 0.0 for j in range(n)) for i in range(n))
 
 
@@ -64,10 +74,11 @@ def symmetrise(a: Matrix) -> Matrix:
 
 
 def solve(a: Matrix, b: Matrix) -> Matrix:
-    """Return X of A X = B, (n, n) and (n, m) -> (n, m), by elimination with partial pivoting.
+    """Return X with A X = B, (n, n) and (n, m) -> (n, m), by elimination with partial pivoting.
 
-    Gauss; Golub and Van Loan, Matrix Computations (4th ed. 2013), section 3.4. ValueError: shapes,
-    a non-finite entry, overflow, a pivot that is exactly zero. A nearly singular A is not noticed.
+    Golub and Van Loan, Matrix Computations (4th ed. 2013), section 3.4. Raises ValueError for wrong
+    shapes, an entry that is not finite, overflow, or a pivot that is exactly zero. A nearly
+    singular A is not detected.
     """
     require_finite("solve: A", a)
     require_finite("solve: B", b)
@@ -87,30 +98,31 @@ def solve(a: Matrix, b: Matrix) -> Matrix:
 
 
 def expm(a: Matrix, h: float) -> Matrix:
-    """Return the transition matrix e^(A h), (n, n), of x' = A x over h [s]; h of any sign.
+    """Return the transition matrix e^(A h), (n, n), of x' = A x over h [s]; h may have any sign.
 
-    A (n, n): entry i j in unit_i/(unit_j s). Scaling and squaring (Higham 2005, SIAM J. Matrix
-    Anal. Appl. 26, section 2) of the balanced A h, with a Taylor sum for Pade's quotient.
-    ValueError: A not square, a non-finite entry, overflow.
+    Entry i, j of A (n, n) has the unit unit_i/(unit_j s). Scaling and squaring (Higham 2005, SIAM
+    J. Matrix Anal. Appl. 26, section 2) of the balanced A h, with a Taylor sum instead of the Pade
+    quotient. Raises ValueError if A is not square, for an entry that is not finite, and on
+    overflow.
     """
-    return _expm_and_integral("exponential", a, h)[0]
+    return _expm_and_integral("expm", a, h)[0]
 
 
 def expm_integral(a: Matrix, h: float) -> Matrix:
-    """Return the integral of e^(A s) over s from 0 to h [s], (n, n): h phi_1(A h).
+    """Return the integral of e^(A s) over s from 0 to h [s], (n, n), which is h phi_1(A h).
 
-    Times B it is the input matrix of an input that is held. The block H of Van Loan 1978 (IEEE
-    Trans. Autom. Control 23, 395-404), doubled as there: F(2t) = F(t) + Phi(t) F(t).
-    A and errors as for `exponential`.
+    Its product with B is the input matrix for an input that is held. Block H of Van Loan 1978 (IEEE
+    Trans. Autom. Control 23, 395-404), with his doubling F(2t) = F(t) + Phi(t) F(t). A and errors
+    are as for `expm`.
     """
-    return _expm_and_integral("exponential_integral", a, h)[1]
+    return _expm_and_integral("expm_integral", a, h)[1]
 
 
 def balance_and_scale(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int, ...], int]:
-    """Return X = D^-1 A D h / 2^halvings with row sums below 1/2, the exponents of D, halvings.
+    """Return X = D^-1 A D h / 2^halvings with row sums below 1/2, the exponents of D, and halvings.
 
-    A (n, n) in 1/s, h in s, X (n, n) a pure number; `name` opens the text of a ValueError: A not
-    square, a non-finite entry of A or A h.
+    A (n, n) in 1/s, h in s, X (n, n) without unit. Raises ValueError, with a text that begins with
+    `name`, if A is not square, or if an entry of A or A h is not finite.
     """
     require_finite(f"{name}: A", a)
     if len(a[0]) != len(a):
@@ -126,7 +138,7 @@ def balancing_exponents(a: Matrix) -> tuple[int, ...]:
     """Return the exponents e of D = diag(2^e) for which D^-1 A D has rows as large as its columns.
 
     A (n, n), finite. Parlett and Reinsch 1969 (Numer. Math. 13, 293-304), radix 2, no permutation.
-    A state that only acts, or is only acted upon, has no balance: it is scaled until that is < 1,
+    A state with an empty row or column cannot be balanced: it is scaled until its sum is below 1,
     by 2^256 at most.
     """
     work = [[abs(x) for x in row] for row in a]
@@ -151,7 +163,7 @@ def balancing_exponents(a: Matrix) -> tuple[int, ...]:
 def scale_by_powers(
     a: Matrix, row_exponents: tuple[int, ...], column_exponents: tuple[int, ...]
 ) -> Matrix:
-    """Return diag(2^rows) A diag(2^columns), (n, m), exact unless it over- or underflows."""
+    """Return diag(2^rows) A diag(2^columns), (n, m); exact unless an entry over- or underflows."""
     return tuple(
         tuple(ldexp_or_inf(x, r + c) for x, c in zip(row, column_exponents, strict=True))
         for row, r in zip(a, row_exponents, strict=True)
@@ -159,7 +171,7 @@ def scale_by_powers(
 
 
 def ldexp_or_inf(x: float, exponent: int) -> float:
-    """Return x 2^exponent; infinite instead of OverflowError, to be refused with its place."""
+    """Return x 2^exponent, or an infinity of the sign of x on overflow."""
     try:
         return math.ldexp(x, exponent)
     except OverflowError:
@@ -167,7 +179,7 @@ def ldexp_or_inf(x: float, exponent: int) -> float:
 
 
 def require_finite(name: str, a: Matrix) -> Matrix:
-    """Return A; ValueError naming the entry if A is empty, ragged or holds inf or nan."""
+    """Return A. Raises ValueError if A is empty or ragged or has an entry that is not finite."""
     if not a or not a[0] or any(len(row) != len(a[0]) for row in a):
         raise ValueError(f"{name} is empty or its rows differ in length: {a!r}")
     for i, row in enumerate(a):
@@ -178,7 +190,7 @@ def require_finite(name: str, a: Matrix) -> Matrix:
 
 
 def abs_sum(values: Iterable[float]) -> float:
-    """Return |x_0| + |x_1| + ..., from left to right."""
+    """Return |x_0| + |x_1| + ..., added from left to right."""
     total = 0.0
     for x in values:
         total += abs(x)
@@ -186,12 +198,12 @@ def abs_sum(values: Iterable[float]) -> float:
 
 
 def format_shape(a: Matrix) -> str:
-    """Return the shape for messages: `(2, 3)`."""
+    """Return the shape of a matrix for messages: `(2, 3)`."""
     return f"({len(a)}, {len(a[0]) if a else 0})"
 
 
 def _expm_and_integral(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
-    """Return e^(A h) and its integral: Horner's rule for phi_1, small terms first; doubling."""
+    """Return e^(A h) and its integral, both (n, n): Horner's rule for phi_1, then doubling."""
     x, exponents, halvings = balance_and_scale(name, a, h)
     unit = identity(len(a))
     series = unit
@@ -210,7 +222,10 @@ def _expm_and_integral(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
 
 
 def _balancing_exponent(work: list[list[float]], i: int) -> int:
-    """Return the power of two for state i: sizes in `work` (n, n), the diagonal does not count."""
+    """Return the change of the exponent of state i.
+
+    `work` (n, n) holds sizes, the diagonal is ignored.
+    """
     row = abs_sum(x for j, x in enumerate(work[i]) if j != i)
     column = abs_sum(other[i] for j, other in enumerate(work) if j != i)
     if row == 0.0 or column == 0.0:
@@ -221,7 +236,10 @@ def _balancing_exponent(work: list[list[float]], i: int) -> int:
 
 
 def _eliminate(rows: list[list[float]], k: int) -> None:
-    """Bring the largest entry of column k into row k and clear that column in the rows below."""
+    """Bring the row with the largest entry of column k to row k, then clear column k below it.
+
+    `rows` is changed in place. Raises ValueError if that entry is zero.
+    """
     best = k
     for i in range(k + 1, len(rows)):
         if abs(rows[i][k]) > abs(rows[best][k]):
@@ -237,6 +255,7 @@ def _eliminate(rows: list[list[float]], k: int) -> None:
 
 
 def _dot(row: tuple[float, ...], column: tuple[float, ...]) -> float:
+    """Return the sum of the products, added from left to right."""
     total = 0.0
     for x, y in zip(row, column, strict=True):
         total += x * y

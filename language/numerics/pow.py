@@ -1,9 +1,10 @@
-"""Power: pow(base, degree) as operations, of the same kind as those in elementary.py.
+"""Power: pow(base, degree) as a list of exact operations (rule C5), as in sin_cos_tanh.py.
 
-It is e^(y log x) with log x and its product with y as sums of two numbers, of which the second one
-is the rounding error of the first: one number would lose as many bits as y log x has before its
-point. Sums and products with their errors are those of Dekker 1971 (Numerische Mathematik 18): they
-need no fused multiplication. The errors that `about` states were measured against mpmath.
+It is e^(y log x). log x and its product with y are double words: sums of two numbers, the second of
+which is the rounding error of the first. A single number would lose as many bits as y log x has
+before its binary point. Sums and products with their errors are those of Dekker 1971 (Numerische
+Mathematik 18), which need no fused multiplication. The errors in `about` were measured against
+mpmath.
 """
 
 from __future__ import annotations
@@ -32,13 +33,15 @@ from language.numerics.sin_cos_tanh import FunctionBuilder, clamp, horner
 
 BASE, DEGREE = Ref("work.base"), Ref("work.degree")
 MAX_DEGREE = 2.0**60
-"""Larger degrees are clamped: of the nearest numbers to 1 they overflow in float64, too."""
+"""Largest size of the exponent; beyond it even the neighbours of 1 overflow in float64."""
 
 
 @dataclass(frozen=True)
 class PowConstants:
-    """The numbers of pow in one type: of its log and exp, of `terms` of the series of the log, and
-    the factor that splits a number in two halves whose products are exact.
+    """The constants of pow for one number type.
+
+    `terms` is the number of terms of the series of log; `splitter` splits a number into two halves
+    whose products are exact.
     """
 
     number_type: NumberType
@@ -52,10 +55,10 @@ POW_FLOAT64 = PowConstants("float64", LOG_FLOAT64, EXP_FLOAT64, 12, 2.0**27 + 1.
 
 
 def build_pow(constants: PowConstants = POW_FLOAT64) -> Function:
-    """x^y = e^(y log x) of x >= 0, y within its bound; 0^y is 0 for y > 0.
+    """Return pow as a function of operations: x^y = e^(y log x) for x >= 0; 0^y is 0 for y > 0.
 
-    log x = k ln 2 + log m as in logarithm.py, log m = 2 s + s^3 (2/3 + 2/5 s^2 + ...), where
-    s = (m - 1) / (m + 1): its first two terms with their errors, what follows without.
+    y is clamped to +-2^60. log x = k ln 2 + log m as in log.py, log m = 2 s + s^3 (2/3 + 2/5 s^2 +
+    ...) with s = (m - 1) / (m + 1). The first two terms are double words, the others are not.
     """
     body = FunctionBuilder()
     double_words = _DoubleWordBuilder(body, constants.splitter)
@@ -76,8 +79,9 @@ def build_pow(constants: PowConstants = POW_FLOAT64) -> Function:
 def _emit_log(
     body: FunctionBuilder, double_words: _DoubleWordBuilder, constants: PowConstants
 ) -> tuple[Ref, Ref]:
-    """Return (head, tail), whose sum is log of the base but for 2^-63 of it, in float32 2^-34: the
-    largest errors among 40 000 and 20 000 bases.
+    """Append log of the base and return it as (head, tail), whose sum is the logarithm.
+
+    The largest relative error among 40 000 bases is 2^-63, in float32 2^-34 among 20 000 bases.
     """
     k, f = emit_frexp(body, BASE, constants.log)
     first, *more = (Fraction(2, 2 * n + 3) for n in range(constants.terms))
@@ -105,13 +109,13 @@ def _emit_log(
 
 
 def _split_constant(value: Fraction, number_type: NumberType) -> tuple[Value, Value]:
-    """Return a number in two parts."""
+    """Return a constant as the sum of two numbers of a type."""
     large = round_to_type(value, number_type)
     return real(large), real(round_to_type(value - Fraction(large), number_type))
 
 
 class _DoubleWordBuilder:
-    """Sums, products and a quotient, each with its rounding error as a second number."""
+    """Builder of sums, products and a quotient that come with their rounding errors."""
 
     def __init__(self, body: FunctionBuilder, splitter: float) -> None:
         self.body = body
@@ -119,12 +123,15 @@ class _DoubleWordBuilder:
         self.halves: dict[Ref, tuple[Ref, Ref]] = {}
 
     def fast_two_sum(self, name: str, larger: Expr, smaller: Expr) -> tuple[Ref, Ref]:
-        """Return a sum of a number and one that is no larger; also of 0 and any number."""
+        """Append larger + smaller and its rounding error, and return both.
+
+        It needs |larger| >= |smaller| or larger = 0 (Dekker 1971).
+        """
         result = self.body.let(name, add(larger, smaller))
         return result, self.body.let(f"{name}_lost", subtract(smaller, subtract(result, larger)))
 
     def two_product(self, name: str, a: Ref, b: Ref) -> tuple[Ref, Ref]:
-        """Return a product."""
+        """Append a b and its rounding error, and return both (Dekker 1971)."""
         (a_1, a_2), (b_1, b_2) = self._split(a), self._split(b)
         result = self.body.let(name, multiply(a, b))
         lost = add(subtract(multiply(a_1, b_1), result), multiply(a_1, b_2))
@@ -132,7 +139,7 @@ class _DoubleWordBuilder:
         return result, self.body.let(f"{name}_lost", lost)
 
     def double_word_quotient(self, name: str, f: Ref) -> tuple[Ref, Ref]:
-        """Return f / (2 + f)."""
+        """Append f / (2 + f) and its rounding error, and return both."""
         below, below_lost = self.fast_two_sum(f"{name}_below", real(2.0), f)
         result = self.body.let(name, divide(f, below))
         back, back_lost = self.two_product(f"{name}_back", result, below)
@@ -140,7 +147,7 @@ class _DoubleWordBuilder:
         return result, self.body.let(f"{name}_lost", divide(left, below))
 
     def _split(self, x: Ref) -> tuple[Ref, Ref]:
-        """Return two numbers of half as many digits whose sum is x."""
+        """Return two numbers of half as many digits whose sum is x; each x is split once."""
         if x not in self.halves:
             name = x.name.partition(".")[2]
             wide = self.body.let(f"{name}_wide", multiply(self.splitter, x))

@@ -1,6 +1,6 @@
-"""Covariances of a sampled observer: noise of one period, steady gain by a Riccati equation.
+"""Covariances of a sampled observer: noise of a period, steady gain by a Riccati equation.
 
-Same arithmetic, and for the same reason, as `language.numerics.matrix`.
+The arithmetic is that of `language.numerics.matrix` for the same reason (rule 17f).
 """
 
 from __future__ import annotations
@@ -29,26 +29,30 @@ from language.numerics.matrix import (
 )
 
 MAX_DOUBLINGS = 32
-"""Bound of the doublings: 2^32 periods, five days at 10 kHz; an observer that slow is a mistake."""
+"""Largest number of doublings: 2^32 periods, five days at 10 kHz."""
 DECAY_TOLERANCE = math.ldexp(1.0, -54)
-"""Row sums of A_k at which doubling stops: the next one would add 2^-108 of P's largest entry."""
+"""Largest row sum of A_k at which doubling stops.
+
+The next step would add 2^-108 of P's largest entry.
+"""
 
 
 def discretise_noise(a: Matrix, q: Matrix, h: float) -> Matrix:
-    """Return Qd, integral of e^(A s) Q e^(A' s) over s from 0 to h [s], (n, n): noise of a period.
+    """Return Qd, the integral of e^(A s) Q e^(A' s) over s from 0 to h [s], (n, n).
 
-    dx = A x dt + w, w white of spectral density Q (n, n) [unit_i unit_j/s], exactly symmetric; so
-    is Qd [unit_i unit_j]. Van Loan 1978 (IEEE Trans. Autom. Control 23, 395-404), block Q, doubled
-    as there: Qd(2t) = Qd(t) + Phi(t) Qd(t) Phi(t)'. The short step is the Taylor sum of
-    t phi_1(t L) Q with L(Q) = A Q + Q A', not his block matrix: that one's e^(-A t) is not needed.
-    ValueError: A not square, h <= 0, Q no covariance, a non-finite entry, overflow.
+    dx = A x dt + w, with white noise w of spectral density Q (n, n) [unit_i unit_j/s]; Qd [unit_i
+    unit_j] is exactly symmetric. Block Q of Van Loan 1978 (IEEE Trans. Autom. Control 23, 395-404),
+    with his doubling Qd(2t) = Qd(t) + Phi(t) Qd(t) Phi(t)'. The short step is the Taylor sum of t
+    phi_1(t L) Q with L(Q) = A Q + Q A' instead of his block matrix, so that e^(-A t) is not needed.
+    Raises ValueError if A is not square, h <= 0, Q is not a covariance, an entry is not finite, and
+    on overflow.
     """
-    require_covariance("discrete_noise: Q", q)
+    require_covariance("discretise_noise: Q", q)
     if len(q) != len(a) or not h > 0.0:
         raise ValueError(
-            f"discrete_noise: A is {format_shape(a)}, Q is {format_shape(q)}, h is {h!r}"
+            f"discretise_noise: A is {format_shape(a)}, Q is {format_shape(q)}, h is {h!r}"
         )
-    x, exponents, halvings = balance_and_scale("discrete_noise", a, h)
+    x, exponents, halvings = balance_and_scale("discretise_noise", a, h)
     down = tuple(-e for e in exponents)
     rate = scale(ldexp_or_inf(h, -halvings), scale_by_powers(q, down, down))
     noise = rate
@@ -60,18 +64,19 @@ def discretise_noise(a: Matrix, q: Matrix, h: float) -> Matrix:
         propagated = multiply(multiply(phi, noise), transpose(phi))
         noise = add(noise, symmetrise(propagated))
         phi = multiply(phi, phi)
-    return require_finite("discrete_noise: result", scale_by_powers(noise, exponents, exponents))
+    return require_finite("discretise_noise: result", scale_by_powers(noise, exponents, exponents))
 
 
 def steady_kalman_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[Matrix, Matrix]:
-    """Return gain L = P C'(C P C' + R)^-1, (n, m), and a-priori covariance P, (n, n), symmetric.
+    """Return the gain L = P C'(C P C' + R)^-1, (n, m), and the a-priori covariance P, (n, n).
 
-    x(k+1) = Phi x(k) + w, y = C x + v; Phi (n, n) per period, Qd (n, n) [unit_i unit_j] of w, C
-    (m, n), R (m, m) of v per sample; L corrects the prediction: x + L (y - C x). P solves
-    P = Phi P (I + G P)^-1 Phi' + Qd, G = C' R^-1 C: structure-preserving doubling, which may lose
-    digits where P is far above Qd, then one step of Newton's method, which restores them.
-    ValueError: shapes, a non-finite entry, Qd no covariance, R not positive definite, no steady
-    gain because a mode that does not decay is not seen by C or not driven by Qd.
+    x(k+1) = Phi x(k) + w, y = C x + v. Phi (n, n) per period, Qd (n, n) [unit_i unit_j] of w, C (m,
+    n), R (m, m) of v per sample. L corrects the prediction: x + L (y - C x). P is symmetric and
+    solves P = Phi P (I + G P)^-1 Phi' + Qd, G = C' R^-1 C. The method is structure-preserving
+    doubling, which may lose digits where P is much larger than Qd, followed by one step of Newton's
+    method, which restores them. Raises ValueError for wrong shapes, an entry that is not finite, Qd
+    that is not a covariance, R that is not positive definite, and if there is no steady gain
+    because a mode that does not decay is not observed through C or not driven by Qd.
     """
     _check_shapes(phi, qd, c, r)
     information = symmetrise(multiply(transpose(c), solve(r, c)))
@@ -93,7 +98,7 @@ def steady_kalman_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[M
 
 
 def require_covariance(name: str, a: Matrix) -> Matrix:
-    """Return A; ValueError unless finite, square, symmetric to the last bit, diagonal >= 0."""
+    """Return A. Raises ValueError unless A is finite, square, exactly symmetric, diagonal >= 0."""
     require_finite(name, a)
     if len(a[0]) != len(a):
         raise ValueError(f"{name} is {format_shape(a)}, not square")
@@ -108,19 +113,21 @@ def require_covariance(name: str, a: Matrix) -> Matrix:
 
 
 def _check_shapes(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> None:
+    """Raise ValueError unless the arguments of `steady_kalman_gain` are valid."""
     require_finite("steady_gain: Phi", phi)
     require_finite("steady_gain: C", c)
     require_covariance("steady_gain: Qd", qd)
     require_covariance("steady_gain: R", r)
     n, m = len(qd), len(r)
     if (format_shape(phi), format_shape(c)) != (f"({n}, {n})", f"({m}, {n})"):
-        shapes = f"Phi {format_shape(phi)}, Qd {format_shape(qd)}, C {format_shape(c)}, R {format_shape(r)}"
+        named = {"Phi": phi, "Qd": qd, "C": c, "R": r}
+        shapes = ", ".join(f"{name} {format_shape(a)}" for name, a in named.items())
         raise ValueError(f"steady_gain: {shapes}")
     _require_positive_definite("steady_gain: R", r)
 
 
 def _require_positive_definite(name: str, a: Matrix) -> None:
-    """Raise ValueError unless A (n, n), symmetric, is positive definite: no pivot is <= 0."""
+    """Raise ValueError unless the symmetric A (n, n) is positive definite: every pivot is > 0."""
     rows = [list(row) for row in a]
     for k, row in enumerate(rows):
         if not row[k] > 0.0:
@@ -132,29 +139,34 @@ def _require_positive_definite(name: str, a: Matrix) -> None:
 
 
 def _require_converged(memory: float, p: Matrix) -> None:
+    """Raise ValueError if the memory after the doublings is above DECAY_TOLERANCE.
+
+    P is for the message.
+    """
     if not memory <= DECAY_TOLERANCE:
         raise ValueError(
-            f"steady_gain: not settled within 2^{MAX_DOUBLINGS} periods, memory {memory!r}, variances "
-            f"{[row[i] for i, row in enumerate(p)]}: a mode that does not decay is not seen by C "
-            "(not detectable) or not driven by Qd"
+            f"steady_gain: no convergence within 2^{MAX_DOUBLINGS} periods, memory {memory!r}, "
+            f"variances {[row[i] for i, row in enumerate(p)]}: a mode that does not decay "
+            "is not observed through C (not detectable) or not driven by Qd"
         )
 
 
 def _coupling(a: Matrix, b: Matrix) -> Matrix:
-    """Return |A| + |B|, (n, n): how strongly state j acts on state i, for the balancing."""
+    """Return |A| + |B| entry by entry, (n, n): how strongly state j acts on state i."""
     return tuple(
         tuple(abs(x) + abs(y) for x, y in zip(p, q, strict=True)) for p, q in zip(a, b, strict=True)
     )
 
 
 def _solve_by_doubling(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
-    """Return the memory left and H_k, (n, n), from A_0 = Phi', G_0 = G, H_0 = Qd.
+    """Return the remaining memory and the solution H_k, (n, n), from A_0 = Phi', G_0 = G, H_0 = Qd.
 
-    Chu, Fan, Lin and Wang 2004 (Int. J. Control 77, 767-788, "SDA algorithm"; the recursion of
-    Chu, Fan and Lin 2005, Linear Algebra Appl. 396, 55-80; before them Anderson 1978). W = I + G H:
-    A <- A W^-1 A, G <- G + A W^-1 G A', H <- H + A' H W^-1 A double the periods that H accounts
-    for. The memory, the largest row sum of A, bounds what the next doubling adds by memory^2
-    max|H|. Stop: memory <= DECAYED; DOUBLINGS; W singular or not finite (memory inf).
+    Structure-preserving doubling: Chu, Fan, Lin and Wang 2004 (Int. J. Control 77, 767-788, "SDA
+    algorithm"; the recursion of Chu, Fan and Lin 2005, Linear Algebra Appl. 396, 55-80; before them
+    Anderson 1978). With W = I + G H, each step A <- A W^-1 A, G <- G + A W^-1 G A', H <- H + A' H
+    W^-1 A doubles the number of periods that H accounts for. The memory is the largest row sum of
+    A; the next doubling adds at most memory^2 max|H|. The loop stops if memory <= DECAY_TOLERANCE,
+    after MAX_DOUBLINGS, and if W is singular or not finite (memory inf).
     """
     unit = identity(len(a))
     memory = math.inf
@@ -177,11 +189,12 @@ def _solve_by_doubling(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
 def _refine_covariance(
     phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix
 ) -> tuple[float, Matrix]:
-    """Return the memory left and the covariance, (n, n), that an observer with this gain reaches.
+    """Return the remaining memory and the covariance, (n, n), of an observer with this gain.
 
-    Newton's method on the Riccati equation, one step (Hewer 1971, IEEE Trans. Autom. Control 16,
-    382-384): P = S P S' + Qd + K R K' with K = Phi L, S = Phi - K C. Only covariances are added:
-    nothing cancels; doubled as in Smith 1968 (SIAM J. Appl. Math. 16). Stop: as `_doubled`.
+    One step of Newton's method on the Riccati equation (Hewer 1971, IEEE Trans. Autom. Control 16,
+    382-384): P = S P S' + Qd + K R K' with K = Phi L, S = Phi - K C, solved by doubling as in Smith
+    1968 (SIAM J. Appl. Math. 16). Only covariances are added, so there is no cancellation. The loop
+    stops as in `_solve_by_doubling`.
     """
     k = multiply(phi, gain)
     s = subtract(phi, multiply(k, c))

@@ -1,14 +1,15 @@
-"""Elementary: sin, cos and tanh in float64 as operations, for the engine and for codegen.
+"""Sine, cosine, hyperbolic tangent: elementary functions as lists of exact operations (rule C5).
 
-No libm: its results depend on the CPU and on the C library. Here are only + - * /, comparisons,
-selection, abs and exact powers of two (rules C5 and C6), each of which IEEE 754 defines to
-the last bit; compiled without contraction (rule C3), C gives the bits that Python gives.
+No library of mathematics is used, because its results depend on the processor and on the C library
+(rule C6). The operations are + - * /, comparisons, selections, absolute values and exact powers of
+two. IEEE 754 defines each of them to the last bit; compiled without contraction (rule C3), C gives
+the bits of Python.
 
-Arguments are clamped to the declared domain. NaN passes the clamp and comes out as NaN, but never
-reaches `pow2`. sin and tanh are odd and cos is even, bit for bit; sin and tanh of -0.0 are -0.0.
-The errors that `about` states, in ULP of the exact result, were measured: against mpmath by the
-test of this module, and once against libquadmath at 10^8 arguments of each function. They hold on
-the whole domain, at the zeros of sin and cos too.
+Arguments are clamped to the declared domain. A NaN gives a NaN, but never reaches `pow2`. sin and
+tanh are odd and cos is even, bit for bit; sin and tanh of -0.0 are -0.0. The errors in `about`, in
+ULP of the exact result, were measured: against mpmath by the test of this module, and once against
+libquadmath at 10^8 arguments of each function. They hold on the whole domain, also at the zeros of
+sin and cos.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from language.ir.program import Function
 ROUNDING_CONSTANT = real(1.5 * 2.0**52)
 """Adding and subtracting it rounds |x| < 2^51 to the nearest integer, ties to even (rule C5)."""
 TINY_ARGUMENT = real(2.0**-27)
-"""Below it sin x and tanh x are x to 2^-54 / 3 relative; keeps -0.0 and the subnormals."""
+"""Below it sin x and tanh x equal x to 2^-54 / 3 relative; -0.0 and subnormals are kept."""
 
 MAX_ANGLE = 1e5
 """Bound of the argument of sin and cos [rad]: 63 662 quarter turns, fewer than 2^16."""
@@ -52,11 +53,11 @@ SIN_SERIES = (
     -2.5050760240823352e-08,
     1.5896909130064357e-10,
 )
-"""(sin r / r - 1) / r^2, degree 5 in r^2, |r| <= pi/4; error of sin r / r 2^-58.0.
+"""Coefficients of (sin r / r - 1) / r^2, degree 5 in r^2, |r| <= pi/4; error of sin r / r 2^-58.0.
 
-This and the next one: minimax by mpmath at 60 digits (Remez exchange), the lowest coefficient
-rounded to double and fixed, the rest fitted anew, and so on upwards; the errors are those of the
-rounded coefficients.
+This and the next one: minimax by mpmath at 60 digits (Remez exchange). The lowest coefficient is
+rounded to double and fixed, the others are fitted again, and so on upwards. The errors are those of
+the rounded coefficients.
 """
 COS_SERIES = (
     0.0416666666666666,
@@ -66,31 +67,37 @@ COS_SERIES = (
     2.0875729280773627e-09,
     -1.135993421169908e-11,
 )
-"""(cos r - 1 + r^2 / 2) / r^4, degree 5 in r^2, |r| <= pi/4; error of cos r 2^-64.1."""
+"""Coefficients of (cos r - 1 + r^2 / 2) / r^4, degree 5 in r^2, |r| <= pi/4.
+
+Error of cos r 2^-64.1.
+"""
 
 TANH_SATURATION = real(20.0)
-"""tanh x rounds to 1 from x = 19.07 on."""
+"""tanh x rounds to 1 for x >= 19.07."""
 TANH_SPLIT = real(0.625)
 LAMBERT_NUMERATOR = (675675.0, 45045.0, 594.0, 1.0)
 LAMBERT_DENOMINATOR = (2027025.0, 945945.0, 51975.0, 630.0, 1.0)
-"""x - tanh x = x z above(z) / below(z), z = x^2, within 2^-56.9 of x up to 0.625: Lambert's
-continued fraction x/(1 + z/(3 + z/(5 + ... + z/15))), whose coefficients are whole numbers."""
+"""Coefficients of numerator and denominator of (x - tanh x) / (x z), z = x^2.
+
+Lambert's continued fraction x/(1 + z/(3 + z/(5 + ... + z/15))), within 2^-56.9 of x up to 0.625;
+its coefficients are whole numbers.
+"""
 
 PIECE_NAMES = ("series", "centre", "upper")
-"""Locals of a series, four coefficients each."""
+"""Local variables of a series, each with four coefficients."""
 
 X = Ref("work.x")
 
 
 @dataclass
 class FunctionBuilder:
-    """The assignments of a function, each to a local of its own, which `let` returns."""
+    """The assignments of a function under construction; each assigns a new local variable."""
 
     ops: list[Op] = field(default_factory=list)
     locals: list[str] = field(default_factory=list)
 
     def let(self, name: str, value: Expr) -> Ref:
-        """Append `work.name = value`."""
+        """Append `work.name := value` and return a reference to the local."""
         self.locals.append(name)
         self.ops.append(Assign(f"work.{name}", value))
         return Ref(f"work.{name}")
@@ -102,10 +109,10 @@ class FunctionBuilder:
 
 @dataclass(frozen=True)
 class TrigConstants:
-    """What sin, cos and tan of a number type are made of.
+    """The constants and steps of sin, cos and tan for one number type.
 
-    `reduced` gives quadrant, head and tail of x, `kernels` sin and cos of head + tail; below
-    `tiny` sin and tan of x are x. `bound` is that of |x| [rad].
+    `reduce_angle` appends the argument reduction, `kernels` sin and cos of head + tail. Below
+    `tiny`, sin and tan of x are x. `bound_text` is the bound of |x| [rad].
     """
 
     reduce_angle: Callable[[FunctionBuilder], tuple[Ref, Ref, Ref]]
@@ -116,9 +123,10 @@ class TrigConstants:
 
 @dataclass(frozen=True)
 class TanhConstants:
-    """The numbers of tanh in one type: x - tanh x = x z above(z) / below(z), z = x^2.
+    """The constants of tanh for one number type.
 
-    From `full` on tanh x rounds to 1, below `tiny` it is x.
+    x - tanh x = x z numerator(z) / denominator(z), z = x^2. tanh x rounds to 1 from `saturation` on
+    and is x below `tiny`.
     """
 
     numerator: tuple[float, ...]
@@ -128,17 +136,20 @@ class TanhConstants:
 
 
 def round_to_nearest(x: Expr, rounding_constant: Value = ROUNDING_CONSTANT) -> Expr:
-    """Return the whole number nearest to x, ties to even; `rounding_constant` is that of its type."""
+    """Return the expression of the whole number nearest to x, ties to even.
+
+    The rounding constant of the type is added and subtracted.
+    """
     return subtract(add(x, rounding_constant), rounding_constant)
 
 
 def clamp(x: Expr, low: Expr, high: Expr) -> Expr:
-    """Return x clamped; NaN stays NaN, unlike `clip` (rule C7)."""
+    """Return x limited to [low, high]; a NaN stays a NaN, unlike with `clip` (rule C7)."""
     return Select(Compare(">", x, high), high, Select(Compare("<", x, low), low, x))
 
 
 def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -> Expr:
-    """Return c0 + x (c1 + x (c2 + ... + x rest)); a last coefficient of 1 costs no product."""
+    """Return c0 + x (c1 + x (c2 + ... + x rest)); a last coefficient of 1 needs no product."""
     *lower, last = coefficients
     result: Expr = real(last) if rest is None else add(real(last), multiply(x, rest))
     for number in reversed(lower):
@@ -147,7 +158,10 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
 
 
 def horner_in_pieces(body: FunctionBuilder, coefficients: tuple[float, ...], x: Expr) -> Expr:
-    """Return c0 + x (c1 + x (c2 + ...)), at most four coefficients a local."""
+    """Append a polynomial c0 + x (c1 + ...) as locals of at most four coefficients.
+
+    Return the last.
+    """
     rest: Expr | None = None
     for k in reversed(range(0, len(coefficients), 4)):
         rest = body.let(PIECE_NAMES[k // 4], horner(coefficients[k : k + 4], x, rest))
@@ -156,12 +170,13 @@ def horner_in_pieces(body: FunctionBuilder, coefficients: tuple[float, ...], x: 
 
 
 def reduce_angle(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
-    """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
+    """Append the reduction of x by multiples of pi/2 and return (quadrant 0 1 2 3, head, tail).
 
-    Cody & Waite 1980, with three parts of pi/2; |head| <= pi/4. `coarse` and `fine` are
-    exact, and so is (coarse - head) - fine, the rounding error of head: by Dekker's fast two-sum
-    where |coarse| >= |fine|; else coarse - fine has at most 52 bits. Near a multiple of pi/2 the
-    rest of x may be as small as 2^-60.5 (x = 45.553...); head + tail has it to 2^-110.
+    x is head + tail beyond a multiple of pi/2, |head| <= pi/4 (Cody and Waite 1980, with three
+    parts of pi/2). `coarse` and `fine` are exact. The rounding error (coarse - head) - fine of head
+    is exact, too: by Dekker's fast two-sum where |coarse| >= |fine|; else coarse - fine has at most
+    52 bits. Near a multiple of pi/2 the reduced argument may be as small as 2^-60.5 (x =
+    45.553...); head + tail has it to 2^-110.
     """
     bounded, quarters, quadrant = count_quarter_turns(
         body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
@@ -177,7 +192,10 @@ def reduce_angle(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
 def count_quarter_turns(
     body: FunctionBuilder, bound: float, two_over_pi: Value, rounding_constant: Value
 ) -> tuple[Ref, Ref, Ref]:
-    """Return x within its bound, the whole number of quarter turns next to it, and its quadrant."""
+    """Append and return the clamped x, the nearest whole number of quarter turns, the quadrant.
+
+    The quadrant is 0, 1, 2 or 3.
+    """
     bounded = body.let("bounded", clamp(X, real(-bound), real(bound)))
     quarters = body.let(
         "quarters", round_to_nearest(multiply(bounded, two_over_pi), rounding_constant)
@@ -190,10 +208,10 @@ def count_quarter_turns(
 
 
 def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
-    """Return (sin, cos) of head + tail, |head| <= pi/4; tail counts to first order.
+    """Append the series and return (sin, cos) of head + tail, |head| <= pi/4; tail to first order.
 
-    Largest terms last (Muller 2016); crest = 1 - half, near cos, has the exact rounding error
-    1 - crest - half, and is the slope by which tail moves sin.
+    The largest terms are added last (Muller 2016). crest = 1 - half, near cos, has the exact
+    rounding error 1 - crest - half and is the slope of sin with respect to tail.
     """
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))
@@ -212,7 +230,7 @@ def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, R
 
 
 def select_by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
-    """Return the one of four values that belongs to quadrant 0, 1, 2 or 3."""
+    """Return the expression that selects one of four values by quadrant 0, 1, 2 or 3."""
     result = values[3]
     for number in (2, 1, 0):
         result = Select(Compare("<", quadrant, real(number + 0.5)), values[number], result)
@@ -223,7 +241,10 @@ TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT, "1e5"
 
 
 def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """sin x, x clamped; x itself where tiny, so that sin -0.0 is -0.0."""
+    """Return sin as a function of operations.
+
+    X is clamped, and the result is x itself for tiny x.
+    """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
     sin, cos = constants.kernels(body, head, tail)
@@ -233,7 +254,7 @@ def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
 
 
 def build_cos(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """cos x, x clamped."""
+    """Return cos as a function of operations; x is clamped."""
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
     sin, cos = constants.kernels(body, head, tail)
@@ -247,9 +268,10 @@ TANH_FLOAT64 = TanhConstants(LAMBERT_NUMERATOR, LAMBERT_DENOMINATOR, TANH_SATURA
 
 
 def build_tanh(constants: TanhConstants = TANH_FLOAT64) -> Function:
-    """tanh x by Lambert's fraction below 0.625, above as 1 - 2 / (e^2x + 1) (Cody & Waite 1980).
+    """Return tanh as a function of operations (Cody and Waite 1980).
 
-    Formed of |x| and given the sign of x; x itself where tiny, so that tanh -0.0 is -0.0.
+    Lambert's fraction below 0.625, above it 1 - 2 / (e^2x + 1). Both are computed for |x| and get
+    the sign of x; the result is x itself for tiny x, so that tanh -0.0 is -0.0.
     """
     body = FunctionBuilder()
     full = constants.saturation

@@ -1,4 +1,7 @@
-"""Tangent: tan and atan2 in float64 as operations, of the same kind as those in elementary.py."""
+"""Tangent and arctangent: tan and atan2 as lists of exact operations (rule C5).
+
+The methods are described in sin_cos_tanh.py.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +46,11 @@ ATAN_SERIES = (
     -0.03191434577731975,
     0.013690660605251368,
 )
-"""(atan r / r - 1) / r^2, degree 11 in r^2, |r| <= 7/16; error of atan r / r 2^-62.3.
+"""Coefficients of (atan r / r - 1) / r^2, degree 11 in r^2, |r| <= 7/16.
 
-Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight r^2; the lowest coefficient
-rounded to double and fixed, the rest fitted anew, and so on upwards.
+Error of atan r / r 2^-62.3. Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight r^2.
+The lowest coefficient is rounded to double and fixed, the others are fitted again, and so on
+upwards.
 """
 ATAN_BASES = {
     "ahead": (
@@ -70,14 +74,14 @@ ATAN_BASES = {
         (2.356194490192345, 9.184850993605148e-17),
     ),
 }
-"""0, pi, pi/2, pi/2, plus or minus 0, atan 1/2, pi/4: each in two parts, together within 2^-106."""
+"""0, pi, pi/2 and pi/2, plus or minus 0, atan 1/2 and pi/4, each in two parts within 2^-106."""
 
 
 @dataclass(frozen=True)
 class Atan2Constants:
-    """The numbers of atan2 in one type; above `largest` are only infinities.
+    """The constants of atan2 for one number type; only infinities are above `largest`.
 
-    Sizes above `huge` are made smaller by the factor `smaller`: then they may be added up.
+    Sizes above `huge` are multiplied by `scale`, so that their sum is finite.
     """
 
     series: tuple[float, ...]
@@ -92,7 +96,10 @@ RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
 def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """tan x = sin / cos of the reduced argument, -cos / sin in odd quadrants."""
+    """Return tan as a function of operations; x is clamped.
+
+    sin / cos of the reduced argument, -cos / sin in odd quadrants.
+    """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
     sin, cos = constants.kernels(body, head, tail)
@@ -105,12 +112,13 @@ def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
 
 
 def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.5") -> Function:
-    """atan2(rise, run) by atan t, t in [0, 1], about 0, 1/2 or 1 (Cody & Waite 1980, chapter 11).
+    """Return atan2(rise, run) as a function of operations; the value is in (-pi, pi].
 
-    t is the smaller size over the larger. For a whole a, atan t = atan a + atan r with
-    r = (t - a) / (1 + t a), formed of the sizes: its numerator is exact (Sterbenz). The sizes are
-    scaled down where their sum would be infinite. The value is in (-pi, pi]: the sign of a zero
-    counts only where it is the value, atan2(-0.0, 1) = -0.0.
+    atan t, t in [0, 1], about 0, 1/2 or 1 (Cody and Waite 1980, chapter 11); t is the smaller size
+    over the larger one. atan t = atan a + atan r with r = (t - a) / (1 + t a), computed from the
+    sizes: its numerator is exact (Sterbenz). The sizes are scaled down where their sum would be
+    infinite. The sign of a zero counts only where the zero is the value: atan2(-0.0, 1) = -0.0.
+    `error_text` is the error in ULP for the comment.
     """
     body = FunctionBuilder()
     up, along = body.let("up", Call("abs", (RISE,))), body.let("along", Call("abs", (RUN,)))
@@ -122,7 +130,7 @@ def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.
     one = subtract(low, high), add(high, low)
     top = body.let("top", Select(near, low, Select(middle, half[0], one[0])))
     below = body.let("below", Select(near, high, Select(middle, half[1], one[1])))
-    # Both sizes are 0: the quotient is made 0 / 1. NaN stays NaN.
+    # If both sizes are 0 the quotient becomes 0 / 1. A NaN stays a NaN.
     safe = Select(Compare("<=", high, real(0.0)), real(1.0), below)
     r = body.let("r", divide(top, safe))
     square = body.let("square", multiply(r, r))
@@ -132,6 +140,7 @@ def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.
     arc = body.let("arc", Select(behind, Unary("-", turn), turn))
 
     def base(part: int) -> Expr:
+        """Return the expression of one part of the angle at which the series starts."""
         by_bracket = {
             name: Select(near, real(a[part]), Select(middle, real(b[part]), real(c[part])))
             for name, (a, b, c) in constants.bases.items()
@@ -151,7 +160,10 @@ def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.
 def scale_pair(
     body: FunctionBuilder, constants: Atan2Constants, smaller: Expr, larger: Expr
 ) -> tuple[Ref, Ref]:
-    """Return two sizes of the same quotient that may be added up; infinite ones become 1."""
+    """Append and return two sizes with the quotient of `smaller` and `larger` and a finite sum.
+
+    If both are infinite both become 1; if only `larger` is, the sizes become 0 and 1.
+    """
     least, most = body.let("least", smaller), body.let("most", larger)
     factor = body.let(
         "factor", Select(Compare(">", most, real(constants.huge)), real(constants.scale), real(1.0))
