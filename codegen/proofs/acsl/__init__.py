@@ -1,1 +1,1 @@
-"""Contracts of generated functions in ACSL, proved by the WP plug-in of Frama-C."""
+"""ACSL contracts of generated functions, proven by the WP plug-in of Frama-C."""

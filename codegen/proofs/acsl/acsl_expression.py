@@ -1,7 +1,7 @@
-"""ACSL: expressions of a Program in the language of Frama-C's contracts, as numbers or predicates.
+"""ACSL expressions: prints expressions of a Program as terms and predicates of Frama-C's contracts.
 
-Its reals are numbers without rounding, as are those of WP's model of memory that they are proven
-in. What a function of `ha_math` gives is not said.
+Reals of ACSL have no rounding, as in the memory model of WP in which contracts are proven. Calls of
+functions of `ha_math` have no translation.
 """
 
 from __future__ import annotations
@@ -14,23 +14,25 @@ from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 
 Look = Callable[[str], str]
-"""The text of a variable: of a truth value a predicate, of anything else a term."""
+"""A function from a variable to its text: a predicate for a truth value, else a term."""
 LOGIC = {"and": "&&", "or": "||"}
 
 
 class Unsaid(Exception):
-    """An expression that is not said in ACSL."""
+    """An expression has no translation to ACSL."""
 
 
 @dataclass(frozen=True)
 class Speech:
-    """How expressions are said: the type of reals, and the variables that are `truths`."""
+    """A printer of expressions, given the type of reals and the names of truth values
+    (`truths`).
+    """
 
     number: NumberType
     truths: Collection[str]
 
     def predicate(self, expr: Expr, look: Look) -> str:
-        """Return a truth value. Raises Unsaid."""
+        """Return a truth value as a predicate. Raises Unsaid."""
         match expr:
             case Value(value):
                 return "\\true" if value else "\\false"
@@ -53,7 +55,7 @@ class Speech:
         raise Unsaid(expr)
 
     def term(self, expr: Expr, look: Look) -> str:
-        """Return a number. Raises Unsaid."""
+        """Return a number as a term. Raises Unsaid."""
         match expr:
             case Value():
                 text = format_literal(expr.round_to_type(self.number).value, self.number)

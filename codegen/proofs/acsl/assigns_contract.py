@@ -1,8 +1,9 @@
-"""Effect: what the functions write that a mode's transitions run, as contracts of their own.
+"""Assigns contracts: the variables that functions may write which the transitions of a mode run.
 
-WP takes a function by its contract where it is called, so that the numbers that a rewind computes
-are cut off. `assigns` says all that it may write, from the Program; it is proven of the function
-itself, and so is what each turn of a loop writes. All values of a step are one place here.
+WP replaces a call by the contract of the called function. The numbers that a rewind computes
+therefore do not enter the proof of a mode. The clause `assigns` lists all variables that the
+function may write, from the Program; it is proven for the function and for its loops. All work
+variables of a step are one location.
 """
 
 from __future__ import annotations
@@ -17,16 +18,19 @@ from language.ir.program import Program
 from language.ir.traversal import block_writes, reachable_blocks
 
 SCRATCH = "_Work *const work = &self->work;"
-"""In the C of an automaton that keeps the values of a step in its instance."""
+"""A line of C that occurs if the work variables of a step are in the instance."""
 
 
 def is_inside(text: str) -> bool:
-    """Tell whether C keeps the values of a step in its instance."""
+    """Tell whether the C of a module keeps the work variables of a step in the instance."""
     return SCRATCH in text
 
 
 def required(parameters: str, work_is_inside: bool) -> Iterator[str]:
-    """Yield that pointers are valid, and what they point to apart: `work` maybe in `self`."""
+    """Yield `requires` clauses: the pointers of a function are valid and do not overlap.
+
+    With `work_is_inside` the pointer `work` points into `self`.
+    """
     pointers = re.findall(r"(const [^,*]*)?\*(\w+)", parameters)
     names = [name for _, name in pointers]
     for constant, name in pointers:
@@ -45,18 +49,20 @@ LOCAL = re.compile(r"^    (?!const |return )\w+ (\w+)(?: = [^;]+)?;$", re.M)
 NOTHING = "\\nothing"
 
 STEP = "*work"
-"""The values of a step."""
+"""The location of all work variables of a step."""
 
 
 def called_by(program: Program, blocks: Iterable[str]) -> list[str]:
-    """Return the blocks that some blocks run, directly or not."""
+    """Return the sorted names of the blocks that some blocks run, directly or indirectly,
+    without these.
+    """
     given = tuple(blocks)
     inside = {name for block in given for name in reachable_blocks(block, program.blocks)}
     return sorted(inside - set(given))
 
 
 def places_of(program: Program, block: str) -> list[str]:
-    """Return the places that a block may write, and those that it runs."""
+    """Return the sorted C locations that a block and the blocks that it runs may write."""
     local = locals_of(program)
     names = {
         name
@@ -71,7 +77,9 @@ def places_of(program: Program, block: str) -> list[str]:
 
 
 def add_effect_contracts(program: Program, text: str, called: Iterable[str]) -> str:
-    """Return the C of a Program with a contract before each function that is `called`."""
+    """Return the C of a Program with an `assigns` contract before each function named in
+    `called`.
+    """
     inside = is_inside(text)
     for name in called:
         function, places = function_of(text, name), places_of(program, name)
@@ -83,24 +91,27 @@ def add_effect_contracts(program: Program, text: str, called: Iterable[str]) -> 
 
 
 def seen_of(function: Function, places: Iterable[str]) -> list[str]:
-    """Return the places that a caller sees: values of a step may be the function's own."""
+    """Return the locations that a caller can observe: the work variables only if they are a
+    parameter.
+    """
     has_step = re.search(r"\bwork\b", function.parameters) is not None
     return [place for place in places if place != STEP or has_step]
 
 
 def assigned(places: Iterable[str]) -> str:
-    """Return that nothing else is written than some places."""
+    """Return the `assigns` clause for some locations; `\\nothing` if there are none."""
     return f"assigns {', '.join(places) or NOTHING};"
 
 
 def contract_text(lines: Iterable[str]) -> str:
-    """Return the contract of a function."""
+    """Return a contract as a C comment with the given clauses."""
     return "\n  ".join(["/*@", *lines]) + "\n*/\n"
 
 
 def add_loop_assigns(function: Function, places: Iterable[str], held: Iterable[str] = ()) -> str:
-    """Return a function as C with what each turn of its loops may write: what it may itself, and
-    with what is `held` before each.
+    """Return the C of a function with invariants and `assigns` clauses of its loops.
+
+    A loop may write its index, local variables and `places`; `held` are further loop invariants.
     """
     own, more = LOCAL.findall(function.body), [f"loop invariant {said};" for said in held]
 

@@ -1,7 +1,8 @@
-"""Chart commit: the modes that are active after the transitions of a micro-step, as a contract.
+"""Chart commit contract: the active modes after the transitions of a micro-step.
 
-A region is in the mode that the transition enters which leaves what is around it: the target, its
-initial mode, or what the history keeps of it; a region that none leaves stays in its mode.
+A region is in the mode that the transition enters which leaves an ancestor of it: the target, its
+initial mode, or the mode that a history remembers. A region that no transition leaves stays in its
+mode.
 """
 
 from __future__ import annotations
@@ -22,27 +23,31 @@ from language.lowering.event_queue import QUEUE, QUEUE_TAIL
 from language.model.statechart import Chart, ChartNode, ChartTransition
 
 Moved: TypeAlias = Callable[[ChartNode], bool]
-"""Whether a node is left, or entered, in a case."""
+"""A predicate of nodes: whether a node is left, or entered, in a case."""
 
 
 @dataclass(frozen=True)
 class Commit:
-    """What is asked of `commit`, and of the functions whose work that is."""
+    """The contract of `commit`, and of the functions that it consists of."""
 
     words: Configuration
 
     def ensured(self) -> Iterator[str]:
-        """Yield what `commit` leaves."""
+        """Yield the postconditions of `commit`."""
         for part in (self._fired, self._modes, self._facts, self._raised, self.grown):
             yield from (f"ensures {said};" for said in part())
 
     def required(self) -> Iterator[str]:
-        """Yield what is asked before."""
+        """Yield the preconditions."""
         yield from self.takeable()
         yield from self._counted()
 
     def takeable(self) -> Iterator[str]:
-        """Yield that modes fit together, and that what is taken leaves active modes, each once."""
+        """Yield that the configuration is valid and that the selected transitions leave active
+        modes, each
+
+        once.
+        """
         words = self.words
         yield from words.valid(words.now)
         yield from Hearing(words).consistent(words.now)
@@ -56,7 +61,9 @@ class Commit:
             yield any_of(taken)
 
     def grown(self) -> Iterator[str]:
-        """Yield that places of the log and of the queue are places; the queue gets no shorter."""
+        """Yield that indices of the log and of the event queue are valid; the queue gets no
+        shorter.
+        """
         words = self.words
         yield from self._counted()
         if any(transition.raises for transition, _ in words.charting.all_transitions):

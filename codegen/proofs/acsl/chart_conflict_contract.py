@@ -1,8 +1,8 @@
-"""Chart hearing: which wishes of regions a chart takes, as a contract of `hear` (rule 15).
+"""Chart conflict contract: which transition requests of regions are taken, for `hear` (rule 15).
 
-What is heard are the wishes of the innermost modes, each the first by `order` of the regions around
-it. Of two that leave the same mode the one from further inside is taken, else the one heard first
-(W3C's SCXML, 2015, `removeConflictingTransitions`).
+The requests of innermost modes are considered, in the `order` of the regions around them. Of two
+that leave the same mode, the one from further inside is taken, else the earlier one (W3C, SCXML,
+2015, `removeConflictingTransitions`).
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from language.model.statechart import ChartNode
 
 @dataclass(frozen=True)
 class Hearing:
-    """What is asked of `hear`: wishes and modes stay as they are, so all is said of now."""
+    """The contract of `hear`. Requests and modes do not change, so all clauses refer to the
+    final state.
+    """
 
     words: Configuration
 
     def ensured(self) -> Iterator[str]:
-        """Yield what `hear` leaves."""
+        """Yield the postconditions of `hear`."""
         for said in self.consistent(self.words.now):
             yield f"ensures {said};"
         for region in self.words.charting.chart.regions:
@@ -41,7 +43,7 @@ class Hearing:
             yield f"ensures ({heard} && {wished} != 0 && {own} == 0) ==> {beaten};"
 
     def consistent(self, at: Look) -> Iterator[str]:
-        """Yield that no two transitions that are taken leave the same."""
+        """Yield that no two of the taken transitions leave the same mode."""
         regions = self.words.charting.chart.regions
         for number, region in enumerate(regions):
             for other in regions[number + 1 :]:

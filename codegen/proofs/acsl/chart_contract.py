@@ -1,8 +1,9 @@
-"""Chart contract: what the functions of a micro-step of a chart may do, before each of them in C.
+"""Chart contracts: contracts of the functions of a micro-step, inserted before each of them in C.
 
-What is asked follows from the chart: of `select_transitions`, `hear` and `commit`, and of what
-counts and chooses in a mode. The others, and the choices that these three are made of, have lemmas
-from the Program (`summary.py`): what they leave, and that they write nothing else.
+The contracts of `select_transitions`, `hear` and `commit`, and of the functions that count and
+choose in a mode, follow from the chart. All other functions, and the parts into which these are
+split, have lemmas from the Program (`symbolic_summary.py`): the values that they leave, and that
+they write nothing else.
 """
 
 from __future__ import annotations
@@ -59,18 +60,22 @@ from language.model.statechart import ChartNode
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
 STEP, JUMP = "micro_step", "jump"
 MODEL = ("-wp-model", "Typed+real")
-"""Reals are numbers without rounding, of which guards are comparisons. Accesses and sums are looked
-at by the value analysis (values.py).
+"""Options of WP: reals have no rounding, which suffices because guards only compare them. Accesses
+and
+
+overflows are checked by the value analysis (eva.py).
 """
 OF_PARTS = (*MODEL, "-wp-split")
 OF_CHART = MODEL
-"""Functions in which others are run one after the other."""
+"""Options for functions that run others one after the other."""
 ONE_BY_ONE = (SELECT, HEAR, COMMIT, JUMP, *(f"{name}_{k}" for name in (STEP, JUMP) for k in (1, 2)))
 OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
 def write_chart_contracts(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
-    """Write C with its contracts into a folder; return the names of the functions that have one."""
+    """Write the C with its contracts into a folder; return the names of the functions that have
+    one.
+    """
     name = made.made.name
     text, names = made.annotated(files[f"{name}.c"])
     head = made.with_apart(files[f"{name}.h"])
@@ -80,7 +85,10 @@ def write_chart_contracts(made: ChartContract, files: Mapping[str, str], folder:
 
 
 def prove_chart_contracts(name: str, functions: Sequence[str], folder: Path) -> Asked:
-    """Prove the contracts of functions of a module. Raises ToolMissing, BuildError."""
+    """Prove the contracts of functions of a module and return the goals.
+
+    Raises MissingToolError, BuildError.
+    """
     detected(folder)
     chart = [one for one in functions if one in ONE_BY_ONE]
     parts = [one for one in functions if one not in chart]
@@ -92,14 +100,14 @@ def prove_chart_contracts(name: str, functions: Sequence[str], folder: Path) -> 
 
 @dataclass(frozen=True)
 class ChartContract:
-    """The contracts of a chart; `made` is the Program that the C is printed of."""
+    """The contracts of a chart; `made` is the Program after the passes of the C generator."""
 
     charting: ChartContext
     made: Program
 
     @cached_property
     def words(self) -> Configuration:
-        """The words of the contracts."""
+        """The predicates of the contracts."""
         return Configuration(self.charting, self.made)
 
     @property
@@ -110,13 +118,15 @@ class ChartContract:
 
     @property
     def unsaid(self) -> tuple[str, ...]:
-        """The functions that have a lemma only: what the chart asks of them is not said in ACSL."""
+        """The functions that have only a lemma, because their contract has no translation to
+        ACSL.
+        """
         places = [(name, name) for name in self.functions]
         places += [(SELECT, part) for part in self._selected]
         return tuple(part for block, part in places if self._said(block, part) is None)
 
     def annotated(self, text: str) -> tuple[str, list[str]]:
-        """Return C with contracts before its functions, and the names of these."""
+        """Return the C with contracts before its functions, and the names of these."""
         proven: list[str] = []
         work_is_inside = is_inside(text)
         text = move_scratch_to_parameter(text, JUMP)
@@ -135,8 +145,10 @@ class ChartContract:
         return [function] if function.name == JUMP else outline_choices(function)
 
     def with_apart(self, text: str) -> str:
-        """Return a header in which arrays of whole numbers are of a type of their own: what is
-        stored there is no value of a variable then, and every number fits.
+        """Return a header in which arrays of whole numbers have the element type int64_t or
+        uint64_t.
+
+        A store into an array then cannot alias a variable, and every number fits.
         """
         for variable in self.made.variables:
             if variable.size and variable.type == "whole":

@@ -1,7 +1,7 @@
-"""Chart entry: the modes that a transition enters, as terms of a contract.
+"""Chart entry terms: the modes that a transition enters, as terms of a contract.
 
-A compound node is entered at its target, its initial mode, or what a history keeps of it; a
-parallel one in all of its regions.
+A compound node is entered at the target, at its initial mode, or at the mode that a history
+remembers. A parallel node is entered in all of its regions.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from language.model.automaton import Transition
 from language.model.statechart import ChartNode, ChartTransition
 
 Modes: TypeAlias = Mapping[str, Found]
-"""The number of the active mode by region; None where a history keeps none."""
+"""The number of the active mode by region; None if no history remembers it."""
 
 
 def modes_after(words: Configuration, transition: Transition, way: ChartTransition) -> Modes:
-    """Return the modes of the regions that a transition moves, once it is done."""
+    """Return the modes of all regions that a transition changes, after the transition."""
     if way.domain is None:
         return {}
     chart, automaton = words.charting.chart, words.charting.automaton
@@ -41,7 +41,7 @@ class _Entered:
     none: Modes
 
     def inside(self, node: ChartNode, wanted: Iterable[int]) -> Modes:
-        """Return the modes inside a compound node: where targets, else `initial`, say."""
+        """Return the modes inside a compound node: those of the targets, else of `initial`."""
         nodes = self.words.charting.chart.nodes
         inner = [target for target in wanted if node.contains(target) and target != node.index]
         if not inner and self.transition.history and node.index in self.way.targets:
@@ -53,7 +53,7 @@ class _Entered:
         return self.into(child, wanted)
 
     def inside_at(self, node: ChartNode, wanted: Iterable[int]) -> Modes:
-        """Return the modes inside a compound node of which some are wanted."""
+        """Return the modes inside a compound node with given innermost targets."""
         wanted = list(wanted)
         nodes = self.words.charting.chart.nodes
         child = next(nodes[c] for c in node.children if nodes[c].contains(wanted[0]))
@@ -69,7 +69,7 @@ class _Entered:
         return own
 
     def side_by_side(self, node: ChartNode, wanted: list[int]) -> Modes:
-        """Return the modes of the regions of a parallel node; a history may tell them."""
+        """Return the modes of all regions of a parallel node; a history may determine them."""
         chart = self.words.charting.chart
         asked = self.transition.history if node.index in self.way.targets else ""
         usual: list[int] = []
@@ -88,7 +88,7 @@ class _Entered:
         )
 
     def recalled(self, node: ChartNode, how: str, usual: Modes) -> Modes:
-        """Return the modes inside a node as it was left, the usual ones where it never was."""
+        """Return the modes inside a node as it was left; `usual` if it never was."""
         chart, left = self.words.charting.chart, self.words.now(history_ref(node).name)
         found: Modes = dict.fromkeys(self._regions(node))
         for leaf in chart.leaves_of(node):
@@ -101,7 +101,7 @@ class _Entered:
         return self.either(f"{left} == {NEVER_LEFT}", usual, found)
 
     def as_left(self, leaf: ChartNode) -> Modes:
-        """Return the modes of an innermost mode of its region with all that was in it."""
+        """Return the mode of an innermost mode's region, with all modes that were active in it."""
         inner = self.words.charting.chart.child_regions(leaf)
         return {leaf.region: str(leaf.number), **self.merged(self.again(r) for r in inner)}
 
@@ -116,7 +116,7 @@ class _Entered:
         return {name: number for modes in found for name, number in modes.items()}
 
     def either(self, test: str, then: Modes, other: Modes) -> Modes:
-        """Return modes by a predicate; a region that is not entered is in none."""
+        """Return the modes by a predicate; a region that is not entered is inactive."""
         found: dict[str, Found] = {}
         for name in {**then, **other}:
             one, two = (modes.get(name, self.none.get(name)) for modes in (then, other))
@@ -130,7 +130,7 @@ class _Entered:
 
 
 def outcomes(found: Found) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the tests that lead to each mode, one after the other."""
+    """Yield the path conditions and values of a nested choice, one after the other."""
     match found:
         case Fork(test, then, other):
             yield from (((test, *tests), mode) for tests, mode in outcomes(then))

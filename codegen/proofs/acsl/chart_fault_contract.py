@@ -1,8 +1,8 @@
-"""Chart fault: what a chart says of its fault mode, as predicates of a contract (rules 13 and 18).
+"""Chart fault contract: transitions to the fault mode of a chart, as predicates (rules 13 and 18).
 
-When a fault happened, each mode of the chart outside of the fault mode wishes for that before all
-else, whatever its `order`; what stands inside such a mode wishes for nothing. It follows from the
-tree and from the name of the fault mode: a way there that is missing is asked for.
+When a fault occurs, each mode outside of the fault mode requests a transition to it before all
+others, whatever the `order` of the chart. Regions inside such a mode request nothing. The contract
+follows from the tree of modes and the name of the fault mode, so a missing transition is detected.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from language.model.statechart import ChartNode, ChartTransition
 
 @dataclass(frozen=True)
 class ChartFault:
-    """What is asked when a fault happened; nothing where a chart has no fault mode."""
+    """The predicates for a fault; there are none for a chart without a fault mode."""
 
     words: Configuration
 
     @property
     def happened(self) -> str:
-        """That a fault asks for the fault mode in this tick."""
+        """The predicate that a fault requests the fault mode in this tick."""
         return self.words.now(FAULT_HAPPENED)
 
     @cached_property
@@ -40,11 +40,11 @@ class ChartFault:
         return [leaf for leaf in chart.leaves(CHART) if not self._mode.contains(leaf.index)]
 
     def leaves(self, region: ChartNode) -> bool:
-        """Tell whether a region stands inside a mode that is not in the fault mode."""
+        """Tell whether a region is inside a mode that is not in the fault mode."""
         return any(leaf.contains(region.index) for leaf in self.outside)
 
     def ways(self, leaf: ChartNode) -> Iterator[tuple[Transition, ChartTransition]]:
-        """Yield the transitions of a mode that enter the fault mode before all others."""
+        """Yield the transitions of a mode that enter the fault mode when a fault occurs."""
         charting = self.words.charting
         for transition in charting.transitions_of(leaf):
             way = charting.chart.transitions[transition.key]
@@ -53,7 +53,7 @@ class ChartFault:
                 yield transition, way
 
     def numbers(self, leaf: ChartNode) -> list[int]:
-        """Return the numbers of these: one, or none by a mistake."""
+        """Return the numbers of these transitions: one, or none if the transition is missing."""
         return [self.words.number(transition) for transition, _ in self.ways(leaf)]
 
     @cached_property
@@ -63,5 +63,5 @@ class ChartFault:
 
 
 def is_of_fault(transition: Transition) -> bool:
-    """Tell whether a transition is taken when a fault happened, and never else."""
+    """Tell whether a transition was added for faults: it has the priority of faults."""
     return transition.priority == FAULT_PRIORITY

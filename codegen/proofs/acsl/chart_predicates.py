@@ -1,7 +1,7 @@
-"""Configuration: what a chart says of the modes that are active, as predicates of a contract.
+"""Chart predicates: statements about the active modes of a chart, as predicates of a contract.
 
-Everything here follows from the tree of modes and from where transitions lead (W3C's SCXML, 2015,
-appendix D), not from the operations that the chart was lowered to.
+They follow from the tree of modes and the ends of transitions (W3C, SCXML, 2015, appendix D), not
+from the operations to which the chart was lowered.
 """
 
 from __future__ import annotations
@@ -26,19 +26,21 @@ from language.model.statechart import ChartNode
 
 @dataclass(frozen=True)
 class Configuration:
-    """The words of a chart's contracts; `made` is the Program that the C is printed of."""
+    """The predicates of a chart's contracts; `made` is the Program after the passes of the C
+    generator.
+    """
 
     charting: ChartContext
     made: Program
 
     @cached_property
     def place(self) -> CNames:
-        """Where names are in C."""
+        """The C names of variables."""
         return CNames(self.made, frozenset(), SOLVED_PREFIX_ON_PAGE)
 
     @cached_property
     def speech(self) -> Speech:
-        """How expressions are said."""
+        """The printer of expressions."""
         truths = [v.name for v in self.made.variables if v.type == "truth"]
         truths += [c.name for c in self.made.constants if c.type == "truth"]
         return Speech(self.made.number_type, frozenset(truths))
@@ -49,11 +51,13 @@ class Configuration:
         return frozenset((*names, *(constant.name for constant in self.made.constants)))
 
     def knows(self, name: str) -> bool:
-        """Tell whether a variable is in C: one that nothing reads is not."""
+        """Tell whether a variable exists in C; one that nothing reads does not."""
         return name in self._known
 
     def now(self, name: str) -> str:
-        """Return the value of a variable at the end of a function. Raises Unsaid: not in C."""
+        """Return the value of a variable at the end of a function. Raises Unsaid if it is not in
+        C.
+        """
         array, _, index = name.partition(" ")
         if array not in self._known:
             raise Unsaid(name)
@@ -63,13 +67,15 @@ class Configuration:
         return f"({text} != 0)" if name in self.speech.truths else text
 
     def before(self, name: str) -> str:
-        """Return the value of a variable at the begin of a function."""
+        """Return the value of a variable at the start of a function. Raises Unsaid if it is not
+        in C.
+        """
         array, _, index = name.partition(" ")
         said = f"{self.place(array)}[{self.place(index)}]" if index else self.now(name)
         return f"\\old({said})"
 
     def mode(self, region: str) -> str:
-        """Return the variable of the mode of a region."""
+        """Return the mode variable of a region."""
         return mode_variable("memory.mode", region)
 
     def number(self, transition: Transition) -> int:
@@ -77,7 +83,7 @@ class Configuration:
         return self.charting.info_of(transition).number
 
     def chosen(self, region: str) -> str:
-        """Return the variable of what a region takes."""
+        """Return the variable with the number of the transition that a region takes."""
         return (
             selected_variable(region)
             if len(self.charting.chart.regions) > 1
@@ -85,26 +91,28 @@ class Configuration:
         )
 
     def is_in(self, region: str, numbers: Iterable[int], at: Look) -> str:
-        """Return that a region is in one of some modes."""
+        """Return the predicate that a region is in one of some modes."""
         return self.is_one(self.mode(region), numbers, at)
 
     def is_one(self, name: str, numbers: Iterable[int], at: Look) -> str:
-        """Return that a variable is one of some numbers."""
+        """Return the predicate that a variable has one of some numbers."""
         named = [self.place.integer_constant(name, number) for number in sorted(numbers)]
         return any_of(f"{at(name)} == {number}" for number in named)
 
     def is_active(self, node: ChartNode, at: Look) -> str:
-        """Return that a node is active."""
+        """Return the predicate that a node is active."""
         leaves = self.charting.chart.leaves_of(node)
         return self.is_in(node.region, (n.number for n in leaves if n.number is not None), at)
 
     def valid(self, at: Look) -> Iterator[str]:
-        """Yield what holds of all configurations: one mode in each region that is in one."""
+        """Yield the predicates of a valid configuration: each active region has one active mode."""
         for region in self.charting.chart.regions:
             yield from self.valid_in(region, at)
 
     def valid_in(self, region: ChartNode, at: Look) -> Iterator[str]:
-        """Yield what holds of a region: its mode, what is kept of it, its counters."""
+        """Yield the predicates of a valid region: its mode, its histories, the limits of its
+        counters.
+        """
         chart, automaton = self.charting.chart, self.charting.automaton
         inside = self.is_in(region.region, self._numbers(region), at)
         inactive = automaton.region(region.region).inactive
@@ -142,12 +150,12 @@ class Configuration:
 
 
 def any_of(parts: Iterable[str]) -> str:
-    """Return that one of some predicates holds."""
+    """Return the disjunction of predicates; `\\false` if there are none."""
     found = list(dict.fromkeys(parts))
     return "(" + " || ".join(found) + ")" if found else "\\false"
 
 
 def all_of(parts: Iterable[str]) -> str:
-    """Return that all of some predicates hold."""
+    """Return the conjunction of predicates; `\\true` if there are none."""
     found = list(dict.fromkeys(parts))
     return "(" + " && ".join(found) + ")" if found else "\\true"

@@ -1,8 +1,9 @@
-"""Chart choice: what a chart says of its counters, and of which transition each region wishes for.
+"""Chart selection contract: the counters of a chart, and the transition that each region requests.
 
-A region wishes for the first enabled transition, by priority, of the outermost or innermost of its
-active modes that has one; a wait is over when its guard was true in one tick more than it takes.
-When a fault happened it wishes for the fault mode, or for nothing (`chart_fault.py`).
+A region requests the first enabled transition, by priority, of the outermost or innermost of its
+active modes that has one. A wait has elapsed if its guard was true in one tick more than the wait
+takes. When a fault occurs, the region requests the fault mode, or nothing
+(`chart_fault_contract.py`).
 """
 
 from __future__ import annotations
@@ -32,22 +33,24 @@ from language.model.statechart import ChartNode
 
 @dataclass(frozen=True)
 class Choice:
-    """What is asked of counting and choosing; guards are said of the values of now."""
+    """The contracts of counting and choosing; guards refer to the final values."""
 
     words: Configuration
 
     def of_mode(self, node: ChartNode) -> Iterator[str]:
-        """Yield what `choose_<mode>` leaves. Raises Unsaid."""
+        """Yield the postconditions of `choose_<mode>`. Raises Unsaid."""
         name = request_variable(node.region)
         found = self._first(self._ordered([node]), self.words.before(name))
         yield f"ensures {self.words.now(name)} == {found};"
 
     def counted(self, node: ChartNode) -> Iterator[str]:
-        """Yield what `count_<mode>` leaves. Raises Unsaid."""
+        """Yield the postconditions of `count_<mode>`. Raises Unsaid."""
         yield from self._counts(node, "")
 
     def of_region(self, region: ChartNode) -> Iterator[str]:
-        """Yield what is wished for in a region, and what its modes count. Raises Unsaid."""
+        """Yield the postconditions for a region: its request and the counters of its modes.
+        Raises Unsaid.
+        """
         words = self.words
         name, mode = request_variable(region.region), words.mode(region.region)
         leaves = words.charting.chart.leaves(region.region)

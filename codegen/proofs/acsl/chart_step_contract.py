@@ -1,10 +1,9 @@
-"""Chart step: what a micro-step of a chart and the jump of a tick make of its modes, as contracts.
+"""Chart step contract: the effect of a micro-step, and of the jump of a tick, on the active modes.
 
-One mode is active in each region whose mode is active, before and after; nothing moves where
-nothing is taken; when a fault happened the fault mode is entered from all modes outside of it. A
-tick ends when nothing is taken and no event waits, or at its bound (rules 7, 15 and 18). The
-parts that a micro-step has in the copy that is proven, choosing, committing and what that is a
-part of, have lemmas.
+Before and after, each active region has one active mode. No mode changes if no transition is taken.
+When a fault occurs, the fault mode is entered from all modes outside of it. A tick ends if no
+transition is taken and no event waits, or at its bound (rules 7, 15 and 18). The parts of a
+micro-step in the copy that is proven have lemmas.
 """
 
 from __future__ import annotations
@@ -27,24 +26,24 @@ from language.model.statechart import ChartTransition
 
 @dataclass(frozen=True)
 class Step:
-    """What is asked of a micro-step, also where that is all that a jump does."""
+    """The contract of a micro-step, also if a jump consists of one."""
 
     words: Configuration
 
     def required(self) -> Iterator[str]:
-        """Yield what is asked before a micro-step: that modes fit together, and places."""
+        """Yield the preconditions of a micro-step: a valid configuration and valid indices."""
         yield from self.words.valid(self.words.now)
         yield from self.places()
         yield self.words.now(HAS_NEXT_STEP.name)
 
     def ensured(self) -> Iterator[str]:
-        """Yield what a micro-step leaves."""
+        """Yield the postconditions of a micro-step."""
         yield from self.moved()
         if self.words.charting.has_several_micro_steps and self.words.knows(IS_FIRST_STEP.name):
             yield f"!{self.words.now(IS_FIRST_STEP.name)}"
 
     def moved(self) -> Iterator[str]:
-        """Yield what it leaves once it is done with what is taken."""
+        """Yield the postconditions after the selected transitions were executed."""
         words = self.words
         yield from words.valid(words.now)
         yield from self.places()
@@ -57,7 +56,7 @@ class Step:
             yield from self._progress()
 
     def chosen(self) -> Iterator[str]:
-        """Yield what is taken, once regions have chosen and were heard: a lemma."""
+        """Yield the lemma on the selected transitions, after conflicts are resolved."""
         words, fault = self.words, ChartFault(self.words)
         yield from Commit(words).takeable()
         for leaf in fault.outside:
@@ -67,13 +66,13 @@ class Step:
             yield f"(({fault.happened} && {here}) ==> {asked})"
 
     def taking(self) -> Iterator[str]:
-        """Yield what is asked before what is taken is done."""
+        """Yield the preconditions of the execution of the selected transitions."""
         yield from self.required()
         yield from self.chosen()
         yield self.fired
 
     def committed(self) -> Iterator[str]:
-        """Yield what is active once what is taken is done: a lemma."""
+        """Yield the lemma on the active modes after the selected transitions were executed."""
         fault = ChartFault(self.words)
         yield from self.words.valid(self.words.now)
         yield from Commit(self.words).grown()
@@ -82,7 +81,9 @@ class Step:
             yield f"({taken} ==> {entered})"
 
     def places(self) -> Iterator[str]:
-        """Yield what holds of the places of the log and of the queue, and of the steps."""
+        """Yield the bounds of the indices of the log and of the queue, and of the number of
+        micro-steps.
+        """
         words, charting = self.words, self.words.charting
         if charting.has_several_micro_steps:
             steps, most = words.now(STEP_COUNT.name), charting.chart.micro_steps
@@ -90,11 +91,12 @@ class Step:
             yield f"0 <= {steps} <= {most}"
             yield f"({words.now(IS_STEP_LIMIT_REACHED.name)} <==> {steps} == {most})"
         if charting.queue_capacity:
-            yield f"0 <= {words.now(QUEUE_HEAD.name)} <= {words.now(QUEUE_TAIL.name)} <= {charting.queue_capacity}"
+            head, tail = words.now(QUEUE_HEAD.name), words.now(QUEUE_TAIL.name)
+            yield f"0 <= {head} <= {tail} <= {charting.queue_capacity}"
 
     @property
     def fired(self) -> str:
-        """That something is taken."""
+        """The predicate that at least one transition is taken."""
         words = self.words
         regions = [
             r for r in words.charting.chart.regions if words.charting.transitions_in(r.region)
@@ -163,7 +165,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Jump:
-    """What is asked of the jump of a tick."""
+    """The contract of the jump of a tick."""
 
     words: Configuration
 
@@ -172,11 +174,11 @@ class Jump:
         return Step(self.words)
 
     def required(self) -> Iterator[str]:
-        """Yield that modes fit together before."""
+        """Yield the precondition: a valid configuration."""
         yield from self.words.valid(self.words.now)
 
     def ensured(self) -> Iterator[str]:
-        """Yield what a jump leaves."""
+        """Yield the postconditions of a jump."""
         if not self.words.charting.has_several_micro_steps:
             yield from self._step.ensured()
             return
@@ -186,7 +188,7 @@ class Jump:
         yield self._ended()
 
     def turns(self) -> Iterator[str]:
-        """Yield what holds before each turn."""
+        """Yield the loop invariants."""
         words, charting = self.words, self.words.charting
         if not charting.has_several_micro_steps:
             return

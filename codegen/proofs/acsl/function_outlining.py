@@ -1,7 +1,7 @@
-"""Outline: a function of C in which each choice stands in a function of its own, for a prover.
+"""Function outlining: moves each choice of a C function into a function of its own, for the prover.
 
-WP goes through a function way by way: of choices one after the other it never sees the end. The
-statements stay those of the module, in the same order; what a part may do is a contract again.
+WP enumerates the paths of a function, whose number grows exponentially with successive choices. The
+statements and their order stay the same. Each part has its own contract.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from codegen.emit.c_module import STATIC_PATTERN
 CHOICE = re.compile(r"^    (?:if|switch|for) \(.*?^    }\n", re.M | re.S)
 INNER = re.compile(r"^( +)(?:if|switch|for) \(.*?^\1}\n", re.M | re.S)
 CHOSEN = re.compile(r"^    if \((?:.*\n)*?.*\) \{\n((?: {8}.*\n)+)", re.M)
-"""What the first choice does where its condition is true."""
+"""The statements of the first `if` of a function."""
 SCRATCH = re.compile(r"    (\w+) scratch;\n    \1 \*const work = &scratch;\n\n?")
-"""The scratch of a function, at its beginning."""
+"""The declaration of work variables at the start of a function."""
 DECLARED = re.compile(r"^    (?:const )?\w+ \w+(?: =|;)", re.M)
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function of a module: where it stands, its name, what it takes, its body."""
+    """A function of a module: position in the text, name, parameters and body."""
 
     start: int
     end: int
@@ -34,7 +34,7 @@ class Function:
 
     @property
     def choices(self) -> list[str]:
-        """The choices at the outermost level of its body."""
+        """The choices and loops at the outermost level of the body."""
         return CHOICE.findall(self.body)
 
     @property
@@ -43,12 +43,12 @@ class Function:
         return f"{self.keyword}void {self.name}({self.parameters})\n{{\n{self.body}}}\n"
 
     def with_body(self, body: str) -> Function:
-        """The function with another body."""
+        """Return the function with another body."""
         return replace(self, body=body)
 
 
 def function_of(text: str, name: str) -> Function:
-    """Return a function of a module."""
+    """Return a function of a module by name."""
     head = rf"^((?:{STATIC_PATTERN})?)void {name}\(([^)]*)\)\n{{\n(.*?)^}}\n"
     found = re.search(head, text, re.M | re.S)
     assert found, name
@@ -56,8 +56,10 @@ def function_of(text: str, name: str) -> Function:
 
 
 def move_scratch_to_parameter(text: str, name: str) -> str:
-    """Return a module in which a function takes the scratch that it has of its own: what it leaves
-    there can be said of it, and of its parts.
+    """Return a module in which a function takes its work variables as a parameter.
+
+    Its contract, and those of its parts, can then refer to them. A function without own work
+    variables is left as it is.
     """
     function = function_of(text, name)
     found = SCRATCH.match(function.body)
@@ -72,9 +74,9 @@ def move_scratch_to_parameter(text: str, name: str) -> str:
 
 
 def outline_choices(function: Function) -> list[Function]:
-    """Return the parts of a function, then what is left of it, which runs them.
+    """Return the parts of a function, then the remaining function, which calls them.
 
-    One with a variable of its own stays whole: so does one with a single choice.
+    A function with local variables or with fewer than two choices stays whole.
     """
     if len(function.choices) < 2 or DECLARED.search(function.body):
         return [function]
@@ -82,8 +84,10 @@ def outline_choices(function: Function) -> list[Function]:
 
 
 def outline_except(function: Function, kept: Sequence[str]) -> list[Function]:
-    """Return the parts of a function, then what is left of it: parts are the outermost choices
-    that write none of some places. One with a variable of its own stays whole.
+    """Return the parts of a function, then the remaining function, which calls them.
+
+    Parts are the outermost choices that assign none of the locations in `kept`. A function with
+    local variables stays whole.
     """
     if DECLARED.search(function.body):
         return [function]
@@ -91,8 +95,10 @@ def outline_except(function: Function, kept: Sequence[str]) -> list[Function]:
 
 
 def outline_calls(function: Function, calls: Sequence[str]) -> list[Function]:
-    """Return the parts of a function, then what is left of it: some calls and what follows each in
-    its block, up to a choice; at last what its first choice does, if there is a choice in that.
+    """Return the parts of a function, then the remaining function, which calls them.
+
+    A part is one of some calls with the statements that follow it in its block, up to a choice. The
+    last part is the body of the first `if`, if that contains a choice.
     """
     text = "|".join(calls)
     part = re.compile(rf"^( +)(?:{text})\((?:.*\n(?=\1(?!if |switch |for |}})))*.*\n", re.M)
@@ -130,5 +136,5 @@ def _taken_out(
 
 
 def part_name(function: str, number: int) -> str:
-    """Return what a part of a function is called."""
+    """Return the name of a part of a function; numbers begin at 0."""
     return f"{function}_{number + 1}"

@@ -1,14 +1,16 @@
-"""Contract: what the mode logic may do, proven of the C by Frama-C's WP and SMT solvers.
+"""Mode contracts: properties of the mode logic, proven for the C by Frama-C's WP and SMT solvers.
 
-`jump_<mode>` of a sampled automaton: nothing fires and the mode stays, or one of its transitions
-fires and the mode is that transition's target; one that waits fires in the tick in which its
-counter is full, and a full counter fires or starts anew; no counter passes its end; whole numbers
-stay in their ranges; nothing else is written than what its actions set; no access, shift or sum is
-undefined. Taken for granted: functions of ha_math write nothing, whole numbers begin in their
-ranges. Ranges are two comparisons here, as in `values.py`. Where a transition runs functions they
-have contracts too (`effect.py`), choices that set no mode stand in functions of their own
-(`outline.py`), and what `values.py` asks is not asked again. Where modes stand inside modes the
-contracts are those of `chart_contract.py`.
+For `jump_<mode>` of a sampled automaton they state: either no transition fires and the mode stays,
+or one of its transitions fires and its target is the new mode. A transition with a wait fires in
+the tick in which its counter is full, and a full counter fires or restarts. No counter exceeds its
+limit. Whole numbers stay in their ranges. Nothing is written but what actions set. There is no
+undefined access, shift or sum.
+
+Two assumptions are made: functions of ha_math write nothing, and whole numbers begin in their
+ranges. Range checks are two comparisons here, as in `eva.py`. The functions that a transition runs
+have contracts too (`assigns_contract.py`). Choices that set no mode are moved into functions of
+their own (`function_outlining.py`). Properties that `eva.py` proves are not proven again. Nested
+modes have the contracts of `chart_contract.py`.
 """
 
 from __future__ import annotations
@@ -50,20 +52,27 @@ from language.model.automaton import Automaton
 from language.programs.name_bindings import chart_context_of
 
 PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
-"""Outcomes of a mode with many ranges are proven way by way only."""
+"""Options of the two runs of WP for a mode: postconditions are proven path by path, all other goals
+
+are not.
+"""
 OF_CALLED = MODEL
-"""Functions that transitions run: reals are numbers without rounding, nothing is asked of them."""
+"""Options for functions that transitions run: reals have no rounding."""
 OF_CALLING = (*MODEL, "-wp-split")
-"""Modes whose transitions run functions."""
+"""Options for modes whose transitions run functions."""
 MODE, FIRED = "self->mode", "self->fired"
 Wholes: TypeAlias = Mapping[str, tuple[int, int]]
 NOTHING_KEPT: Wholes = {}
 Asking: TypeAlias = tuple[list[str], tuple[str, ...]]
-"""Functions, and how WP is asked for their contracts."""
+"""Names of functions, and the options of WP for their contracts."""
 
 
 def check_contracts(automaton: Automaton, program: Program, folder: Path) -> ToolVerdict:
-    """Prove the contracts of the modes of a Program. Raises ToolMissing, BuildError."""
+    """Prove the contracts of the modes of a Program and return the verdict.
+
+    The check does not apply to a continuous automaton or to one with regions but no chart. Raises
+    MissingToolError, BuildError.
+    """
     made = run_c_passes(program, by_magnitude=False)
     tool = f"Frama-C {tool_version('frama-c', folder)} WP"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
@@ -88,7 +97,7 @@ def check_contracts(automaton: Automaton, program: Program, folder: Path) -> Too
 
 
 def wholes_of(automaton: Automaton) -> Wholes:
-    """Return the ranges of whole numbers that an automaton keeps, by their names in a Program."""
+    """Return the ranges of discrete whole numbers of an automaton, by their names in a Program."""
     return {
         f"discrete.{name}": (int(one.range[0]), int(one.range[1]))
         for name, one in automaton.discrete.items()
@@ -99,8 +108,11 @@ def wholes_of(automaton: Automaton) -> Wholes:
 def write_contracts(
     program: Program, files: Mapping[str, str], folder: Path, wholes: Wholes = NOTHING_KEPT
 ) -> list[Asking]:
-    """Write C with its contracts into a folder; return what is to be proven: of modes and their
-    parts, and of the functions that these run. `wholes` are ranges of whole numbers that are kept.
+    """Write the C with its contracts into a folder; return the functions to prove with their
+    options.
+
+    These are modes with their parts, and the functions that they run. `wholes` gives the ranges of
+    whole numbers that are preserved.
     """
     made, file = run_c_passes(program, by_magnitude=False), f"{program.name}.c"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
@@ -122,7 +134,10 @@ def _told(tool: str, found: Asked, what: str) -> ToolVerdict:
 
 
 def prove_contracts(folder: Path, file: str, asking: Sequence[Asking]) -> Asked:
-    """Prove the contracts of functions of modes, and of what these run."""
+    """Prove the contracts of functions and return the sum of their goals.
+
+    Raises MissingToolError, BuildError.
+    """
     detected(folder)
     found = [asked(folder, file, own, options) for own, options in asking if own]
     return sum(found, start=Asked(0, 0, ()))

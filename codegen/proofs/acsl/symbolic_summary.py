@@ -1,7 +1,8 @@
-"""Summary: what a block of a Program leaves in each variable, as clauses of a contract.
+"""Symbolic summary: the value of each variable after a block of a Program, as clauses of a
+contract.
 
-Lemmas between C and what is asked of it: proven of a function, taken for granted where it is
-called. A value that is not said in ACSL is left open.
+The clauses are lemmas between the C and its contract: they are proven of a function and assumed
+where it is called. A value without a translation to ACSL is unconstrained.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from language.ir.ops import Assign, Block, Branch, Count, Expr, Op, Ref, RunBloc
 from language.ir.traversal import block_writes, reachable_blocks
 
 LONGEST = 20000
-"""Characters of a value; a longer one is left open."""
+"""Maximum length of the text of a value [characters]; a longer value is unconstrained."""
 
 
 @dataclass(frozen=True)
 class Fork:
-    """One of two values, by a predicate over what was before."""
+    """A choice between two values by a predicate of the initial values."""
 
     test: str
     then: Found
@@ -28,13 +29,15 @@ class Fork:
 
 
 Found: TypeAlias = str | Fork | None
-"""A value over what was before; None is open."""
+"""A value in terms of the initial values; None is unconstrained."""
 Values: TypeAlias = dict[str, Found]
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What blocks leave; `before` says what a variable was, `now` what it is."""
+    """The effects of blocks; `before` gives the text of an initial value, `now` of a final
+    value.
+    """
 
     blocks: Mapping[str, Block]
     speech: Speech
@@ -42,7 +45,9 @@ class Summary:
     now: Look
 
     def ensured(self, block: Block, silent: frozenset[str]) -> Iterator[str]:
-        """Yield what holds after a block, of all that it writes but the `silent`."""
+        """Yield the postconditions of a block for all variables that it writes, except those in
+        `silent`.
+        """
         values: Values = {}
         self._block(block, values)
         for name, found in sorted(values.items()):
@@ -51,7 +56,7 @@ class Summary:
                 yield f"ensures {said};"
 
     def written(self, block: Block) -> set[str]:
-        """Return the variables that a block writes, and those that it runs."""
+        """Return the variables that a block and the blocks that it runs may write."""
         found = set(block_writes(block))
         for name in self._run_by(block):
             found |= set(block_writes(self.blocks[name]))
@@ -158,7 +163,7 @@ class Summary:
 
 
 def item(array: str, index: str) -> str:
-    """Return the name of an item of an array, at the place that a variable told before."""
+    """Return the name of an array element whose index is the initial value of a variable."""
     return f"{array} {index}"
 
 

@@ -1,4 +1,4 @@
-"""WP: contracts of functions proven by Frama-C's WP and z3, and what it leaves open."""
+"""WP: runs Frama-C's WP with z3 on the contracts of functions and counts the proven goals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from codegen.toolchain.external_tools import require_tool, run_tool
 
 PROVER = "z3"
 SECONDS = 20
-"""Of a prover for one goal."""
+"""Time limit of the prover for one goal [s]."""
 KERNEL = (
     "-machdep",
     "gcc_x86_32",
@@ -21,39 +21,39 @@ KERNEL = (
     "-warn-special-float",
     "none",
 )
-"""Whether reals stay finite is asked by the value analysis (values.py)."""
+"""Options of Frama-C; that reals stay finite is proven by the value analysis (eva.py)."""
 OPTIONS = ("-wp", "-wp-prover", PROVER, "-wp-timeout", str(SECONDS))
 SEARCH = "auto_config=false smt.mbqi=false"
-"""How z3 looks for a proof: by instances of axioms that the goal names, never by models."""
+"""Options of z3: instantiate quantifiers by patterns (E-matching), never by models."""
 CONFIG = ".why3.conf"
 PROVED = re.compile(r"Proved goals: +(\d+) / (\d+)")
 OPEN = re.compile(r"^\[wp\] \[[^]]*\] Goal (\S+)(?! : Valid)(?: : |$)", re.M)
 REFUSED = re.compile(r"^\[kernel[^]]*\] (\S+:\d+: .*(?:\n  .*)*)", re.M)
-"""What Frama-C says of a line that it cannot read."""
+"""A message of Frama-C on a line that it cannot parse."""
 PURE = re.compile(r"^(?=(?:static inline )?(?:double|float|bool|int32_t) ha_\w+\()", re.M)
 NOTHING = "/*@ assigns \\nothing; exits \\false; */\n"
-"""Functions of ha_math write nothing, and return."""
+"""The contract of functions of ha_math: they write nothing, and return."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """How many goals WP made and how many of them are proven; the `open` ones, or what it said."""
+    """The number of proven goals and of all goals; the names of open goals, or an error message."""
 
     proven: int
     asked: int
     open: tuple[str, ...]
 
     def __add__(self, other: Asked) -> Asked:
-        """Return the goals of both."""
+        """Return the sum of both."""
         open_ones = (*self.open, *other.open)
         return Asked(self.proven + other.proven, self.asked + other.asked, open_ones)
 
 
 def detected(folder: Path) -> None:
-    """Tell why3 which provers there are. Raises ToolMissing.
+    """Configure why3 in a folder with the installed provers. Raises MissingToolError.
 
-    It gets z3 by a script: beside what a function does a goal has axioms of memory, and to look
-    for models of these (z3's MBQI) takes all the time that there is.
+    z3 is called by a script with the options SEARCH. Goals contain axioms of the memory model, and
+    a search for models of these (MBQI) would take all of the time limit.
     """
     found = shutil.which(require_tool(PROVER)) or PROVER
     run_tool(["why3", "config", "detect"], folder, {"HOME": str(folder)})
@@ -65,12 +65,15 @@ def detected(folder: Path) -> None:
 
 
 def pure(text: str) -> str:
-    """Return C in which functions of ha_math write nothing."""
+    """Return C in which functions of ha_math have the contract NOTHING."""
     return PURE.sub(lambda found: NOTHING, text)
 
 
 def asked(folder: Path, file: str, functions: Sequence[str], more: Sequence[str] = ()) -> Asked:
-    """Prove the contracts of some functions of a file. Raises ToolMissing, BuildError."""
+    """Prove the contracts of some functions of a file and return the goals.
+
+    `more` are further options of WP. Raises MissingToolError, BuildError.
+    """
     words = [*KERNEL, *OPTIONS, *more, "-wp-fct", ",".join(functions), file]
     done = run_tool(["frama-c", *words], folder, {"HOME": str(folder)})
     counts = PROVED.search(done.stdout)

@@ -1,1 +1,1 @@
-"""Proofs that no input makes a condition matter: invariants, cutpoints, reachability."""
+"""Proofs that conditions are infeasible: cutpoints, loop invariants and reachability with z3."""

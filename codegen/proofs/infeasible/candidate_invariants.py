@@ -1,5 +1,7 @@
-"""Fact: what may hold of variables at a cut. Facts are proposed from the text of a Program and from
-what a loop begins with; what does not hold is taken out (`invariant.py`).
+"""Candidate invariants: facts that may hold of variables at a cutpoint.
+
+Facts are proposed from the operations of a Program and from the initial values of a loop. Those
+that are not inductive are removed by `houdini.py`.
 """
 
 from __future__ import annotations
@@ -19,21 +21,23 @@ from language.lowering.program_builder import INACTIVE
 from language.programs.model_run import RUN_MODE
 
 LEFT = "memory.left_"
-"""What a history holds: which mode was left, `NOT_YET` before that."""
+"""The prefix of history variables, which hold the mode that was left, or NEVER_LEFT."""
 KEPT = "memory."
 LARGEST_LIMIT = 64
-"""Of whole numbers with which counters of a loop are compared."""
+"""Largest number with which a loop compares a counter that is used as a candidate."""
 MOST_FACTOR = 8
-"""Most times another counter that a counter is tried to be."""
+"""Largest factor between two counters that is tried."""
 MOST_COUNTED = 5
-"""Numbers, from 0 on, that are tried as the most of a counter in a mode."""
+"""Number of upper bounds, from 0 on, that are tried for a counter in a mode."""
 Literal = tuple[str, int]
-"""A variable, and a number or, as 0 and 1, a truth value that it has."""
+"""A variable and a value: a number, or a truth value as 0 or 1."""
 
 
 @dataclass(frozen=True)
 class Within:
-    """A variable is within limits, where others have some values."""
+    """A variable is within limits, under the condition that other variables have the values in
+    `where`.
+    """
 
     cut: Cutpoint
     name: str
@@ -43,8 +47,10 @@ class Within:
 
 @dataclass(frozen=True)
 class AtMost:
-    """A counter is no larger than `factor` times the sum of others, and `more`; one more where a
-    truth value that keeps the loop `going` is false. It is so where others have some values.
+    """A counter is at most `factor` times the sum of others, plus `more`.
+
+    The bound is one higher if the truth value `going`, which keeps a loop running, is false. The
+    fact holds under the condition that other variables have the values in `where`.
     """
 
     cut: Cutpoint
@@ -58,8 +64,10 @@ class AtMost:
 
 @dataclass(frozen=True)
 class Same:
-    """A comparison of a variable with a number, or with another one, is a truth value, or has one
-    where others have some values.
+    """A comparison of a variable with a number or another variable equals a truth value.
+
+    The truth value is a constant or a variable. The fact holds under the condition that other
+    variables have the values in `where`.
     """
 
     cut: Cutpoint
@@ -78,8 +86,10 @@ def propose_facts(
     cuts: Mapping[Cutpoint, Mapping[str, int]],
     ranges: Mapping[str, Range],
 ) -> Iterator[Fact]:
-    """Yield what may hold at cuts; `ranges` are those of variables between two steps. Each cut has
-    the numbers and truth values with which a loop begins.
+    """Yield candidate facts at the cutpoints.
+
+    `cuts` gives for each cutpoint the numbers and truth values with which its loop begins. `ranges`
+    gives the ranges of variables between two steps.
     """
     number = program.number_type
     for cut, first in cuts.items():
@@ -138,31 +148,31 @@ def _wheres(
 
 
 def modes_at(program: Program, cut: Cutpoint) -> list[Literal]:
-    """Return each mode of each region that is known at a cut."""
+    """Return pairs of a mode variable and a mode for all regions that are known at a cutpoint."""
     modes = modes_of(program).items()
     return [(name, number) for name, of in modes for number in of if name in cut.names]
 
 
 def going_values(program: Program, first: Mapping[str, int]) -> list[Literal]:
-    """Return both values of each truth value with which a loop begins."""
+    """Return both values of each truth value that is initialised before a loop."""
     return [(name, value) for name in truths_of(program, first) for value in (0, 1)]
 
 
 def truths_of(program: Program, first: Mapping[str, int]) -> list[str]:
-    """Return the truth values with which a loop begins."""
+    """Return the truth values that are initialised before a loop."""
     kinds = {v.name: v.type for v in program.variables}
     return [name for name in first if kinds.get(name) == "truth"]
 
 
 def modes_of(program: Program) -> dict[str, list[int]]:
-    """Return the numbers of modes by the variable that holds one."""
+    """Return the numbers of modes by mode variable."""
     modes = {MODE_VARIABLE: program.modes, RUN_MODE: program.run_modes}
     modes |= {mode_variable(MODE_VARIABLE, region.name): region.modes for region in program.regions}
     return {name: [info.number for info in infos] for name, infos in modes.items() if infos}
 
 
 def active_modes_of(program: Program) -> dict[str, list[int]]:
-    """Return the numbers of modes by the variable that holds one, but for regions that are left."""
+    """Return the numbers of modes by mode variable, without the number of an inactive region."""
     inactive = {i.number for r in program.regions for i in r.modes if i.name == INACTIVE}
     modes = modes_of(program)
     return {name: [n for n in numbers if n not in inactive] for name, numbers in modes.items()}
@@ -200,7 +210,9 @@ def _timers(program: Program) -> Iterator[tuple[str, int]]:
 
 
 def ends_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, int]]:
-    """Yield the numbers with which a loop compares what it counts."""
+    """Yield counters of a loop with the numbers, at most LARGEST_LIMIT, that they are compared
+    with.
+    """
     counters = set(counters_of(program, cut))
     for expr in _expressions(program, cut):
         match expr:
@@ -211,7 +223,7 @@ def ends_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, int]]:
 
 
 def compared_in(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, int]]:
-    """Yield comparisons of whole numbers that become truth values."""
+    """Yield the comparisons of whole numbers with literals that are assigned to truth values."""
     wholes = {v.name for v in program.variables if v.type == "whole"} & set(cut.names)
     found = set()
     for block in program.blocks.values():
@@ -223,7 +235,7 @@ def compared_in(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, int
 
 
 def asked_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, float | int]]:
-    """Yield what a loop compares with a number, and does not change."""
+    """Yield the comparisons with a number in a loop whose variable the loop does not change."""
     if cut.loop is None:
         return
     written = {n for block in blocks_of(program, cut.loop.body) for n in block_writes(block)}
@@ -263,7 +275,7 @@ def _counts(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterat
 
 
 def counters_of(program: Program, cut: Cutpoint) -> list[str]:
-    """Return the whole numbers that a loop counts up."""
+    """Return the sorted names of the whole numbers that a loop increments by one."""
     assert cut.loop
     ops = [op for block in blocks_of(program, cut.loop.body) for op in walk_ops(block)]
     assigned = [op for op in ops if isinstance(op, Assign)]

@@ -1,7 +1,8 @@
-"""Cut: where the ways of a Program are cut, and what may be known there.
+"""Cutpoints: places that cut the paths of a Program into finite pieces, and the variables known
+there.
 
-A step is cut where it begins and ends, and each loop that every step comes by where a turn of it
-begins: between two cuts there is no way back.
+A step is cut at its begin and end, and at the start of each iteration of a loop that every step
+executes. The paths between two cutpoints have no cycle.
 """
 
 from __future__ import annotations
@@ -15,16 +16,18 @@ from language.ir.program import Program
 from language.ir.traversal import block_reads, reachable_blocks, walk_ops
 
 PASSING = ("input", "is_new", "work", "calibration", "derived")
-"""Groups of what each step brings or finds anew."""
+"""Groups of variables that each step sets anew."""
 
 
 MOST_ITEMS = 8
-"""Most items of an array of whole numbers that are each a variable of their own."""
+"""Maximum number of elements of an array whose elements are separate variables."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cutpoint:
-    """A place with the variables that are known there; `loop` if it is where a turn begins."""
+    """A cutpoint with the variables that are known there; `loop` is None for that between two
+    steps.
+    """
 
     name: str
     names: tuple[str, ...]
@@ -33,7 +36,7 @@ class Cutpoint:
 
 @dataclass(frozen=True)
 class CutpointState:
-    """A cut, and the values that variables have there."""
+    """A cutpoint with symbolic values of its variables."""
 
     cut: Cutpoint
     values: Mapping[str, Any]
@@ -41,7 +44,9 @@ class CutpointState:
 
 @dataclass(frozen=True)
 class ExecutionPath:
-    """What leads from one cut, or from nowhere, to the next one: all that is `given`."""
+    """A path between two cutpoints; `begin` is None for the first step. `given` are its
+    conditions.
+    """
 
     begin: CutpointState | None
     given: tuple[Any, ...]
@@ -50,7 +55,7 @@ class ExecutionPath:
 
 @dataclass(frozen=True)
 class ConditionVisit:
-    """A condition where a way comes by it, and what holds there."""
+    """An evaluation of a condition on a path, with the path conditions (`given`) at that point."""
 
     begin: CutpointState | None
     given: tuple[Any, ...]
@@ -58,14 +63,16 @@ class ConditionVisit:
 
 
 def step_cut(program: Program) -> Cutpoint:
-    """Return the cut between two steps."""
+    """Return the cutpoint between two steps."""
     read = {name for block in program.blocks.values() for name in block_reads(block)}
     whole = (v.name for v in program.variables if not v.size and v.name in read)
     return Cutpoint("step", tuple(name for name in whole if name.partition(".")[0] not in PASSING))
 
 
 def loop_cut(program: Program, loop: Loop, number: int) -> Cutpoint:
-    """Return the cut where a turn of a loop begins: all that is read anywhere is known."""
+    """Return the cutpoint at the start of a loop iteration, at which all variables that are read
+    are known.
+    """
     read = {name for block in program.blocks.values() for name in block_reads(block)}
     fixed = {c.name for c in program.constants if c.kind == "fixed" or c.items}
     things = {v.name for v in (*program.variables, *program.inputs) if not v.size}
@@ -75,14 +82,16 @@ def loop_cut(program: Program, loop: Loop, number: int) -> Cutpoint:
 
 
 def items_of(program: Program) -> dict[str, tuple[str, ...]]:
-    """Return the names of the items of small arrays that are written and read within a step."""
+    """Return the names of the elements of small whole-number arrays that are written within a
+    step.
+    """
     small = (v for v in program.variables if v.type == "whole" and 0 < v.size <= MOST_ITEMS)
     passing = (v for v in small if v.name.partition(".")[0] in PASSING)
     return {v.name: tuple(f"{v.name}[{k}]" for k in range(v.size)) for v in passing}
 
 
 def blocks_of(program: Program, block: Block) -> Iterator[Block]:
-    """Yield a block, and all that it runs."""
+    """Yield a block and all blocks that it runs."""
     runs = {
         r
         for op in walk_ops(block)

@@ -1,9 +1,10 @@
-"""Terms: numbers and operations of a Program as z3 has them.
+"""Floating-point terms: numbers and operations of a Program as terms of z3.
 
-A real is a number of the number line and whether it is a NaN: comparisons, signs, abs, min, max and
-clip depend on the order of numbers alone, and infinities are two numbers beyond all others. What
-+ - * / and functions give is left open: the same for the same operands. Of a product is known that
-it is no larger than a factor where the other one is at most 1, of a table its least and largest.
+A real is a real number and a flag for NaN. Comparisons, signs, abs, min, max and clip depend only
+on the order of numbers, and infinities are two numbers beyond all others. Results of + - * / and of
+functions are uninterpreted: equal for equal operands. Two facts are added: a product with a factor
+of magnitude at most 1 is no larger than the other factor, and a table value lies between its
+smallest and largest value.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from typing import Any
 from language.ir.number_type import MAX_FINITE, NumberType, round_to_type
 
 BEFORE_ONE = {"float64": 1.0 - 2.0**-53, "float32": 1.0 - 2.0**-24}
-"""The number before 1."""
+"""The largest number below 1 by number type."""
 Range = tuple[float, float]
 Limits = Range | frozenset[int]
-"""Ends of a real, or the values of a whole number."""
+"""The ends of the range of a real, or the values of a whole number."""
 
 
 @dataclass(frozen=True)
 class Real:
-    """A real: its place among the numbers, and whether it is none."""
+    """A real: its value as a real number, and whether it is NaN."""
 
     value: Any
     nan: Any
 
 
 class Terms:
-    """Terms of one number type; each new one has a name that no other has."""
+    """A factory of terms for one number type; each new variable has a unique name."""
 
     def __init__(self, number: NumberType) -> None:
         import z3
@@ -46,7 +47,7 @@ class Terms:
         self.limited: dict[tuple[object, ...], tuple[Any, object]] = {}
 
     def value(self, value: float | int | bool) -> Any:
-        """Return a literal; -0 is another term than 0, for 1 / -0 is another number."""
+        """Return a literal; -0 is another term than 0, because 1 / -0 is another number."""
         z3 = self.z3
         if isinstance(value, bool):
             return z3.BoolVal(value)
@@ -59,7 +60,7 @@ class Terms:
         return self.minus(found) if copysign(1.0, number) < 0.0 else found
 
     def number_of(self, value: Any) -> int | None:
-        """Return the whole number or, as 0 and 1, the truth value that a literal is."""
+        """Return the value of a whole-number or truth literal, a truth value as 0 or 1."""
         z3 = self.z3
         if isinstance(value, Real):
             return None
@@ -68,7 +69,7 @@ class Terms:
         return 1 if z3.is_true(value) else 0 if z3.is_false(value) else None
 
     def new(self, kind: str, name: str) -> Any:
-        """Return what may be any value of its kind: real, truth or whole."""
+        """Return an unconstrained variable of a kind: real, truth or whole."""
         z3 = self.z3
         self.count += 1
         text = f"{name}!{self.count}"
@@ -77,14 +78,16 @@ class Terms:
         return Real(z3.Real(text), z3.Bool(f"{text} is NaN")) if kind == "real" else z3.Int(text)
 
     def choose(self, test: Any, then: Any, other: Any) -> Any:
-        """Return one of two values of a kind."""
+        """Return a choice between two values of the same kind."""
         if isinstance(then, Real):
             values = self.z3.If(test, then.value, other.value)
             return Real(values, self.z3.If(test, then.nan, other.nan))
         return self.z3.If(test, then, other)
 
     def within(self, value: Any, limits: Limits) -> Any:
-        """Return whether a value is within limits: one term for the same question."""
+        """Return the predicate that a value is within limits; equal arguments give the same
+        term.
+        """
         key = (*(part.get_id() for part in _parts(value)), limits)
         if key not in self.limited:
             self.limited[key] = self._within(value, limits), value  # a value keeps its numbers
@@ -106,7 +109,7 @@ class Terms:
         return Real(-value.value, value.nan) if isinstance(value, Real) else -value
 
     def sum(self, operator: str, left: Any, right: Any) -> Any:
-        """Return what + - * / give."""
+        """Return the result of + - * or /."""
         if isinstance(left, Real):
             made = self._left_open(operator, (left, right), "real")
             if operator == "*":
@@ -127,7 +130,7 @@ class Terms:
         self.bounds.setdefault(product.value.get_id(), []).append(bound)
 
     def lemmas(self, facts: Sequence[Any]) -> list[Any]:
-        """Return what is known of the products and tables in some facts."""
+        """Return the known facts on the products and table values that occur in some facts."""
         found: list[Any] = []
         seen, stack = set[int](), list(facts if self.bounds else ())
         while stack:
@@ -145,7 +148,7 @@ class Terms:
         return self.z3.And(self.z3.Not(x.nan), -largest <= x.value, x.value <= largest)
 
     def compare(self, operator: str, left: Any, right: Any) -> Any:
-        """Return a relation; with a NaN it is false, except `!=`."""
+        """Return a comparison; with a NaN it is false, except `!=`."""
         z3 = self.z3
         if operator == "!=":
             return z3.Not(self.compare("==", left, right))
@@ -156,7 +159,7 @@ class Terms:
         return found
 
     def call(self, function: str, given: list[Any]) -> Any:
-        """Return what an elementary operation or a function gives."""
+        """Return the result of an elementary operation or a function."""
         first = given[0]
         if function == "whole" or not isinstance(first, Real):
             return self.new("real" if function == "real" else "whole", function)
@@ -176,8 +179,10 @@ class Terms:
                 return self._left_open(function, given, "real")
 
     def looked_up(self, points: Sequence[float], x: Real) -> Real:
-        """Return a value of a table: rounding keeps order, so it lies between those at the ends of
-        its cells, and those just before the ends.
+        """Return the result of a table lookup.
+
+        Rounding is monotonic, so the result lies between the values at the ends of a cell, with a
+        rounding error just before the ends.
         """
         z3, found = self.z3, self.new("real", "lookup")
         ends = list(points)

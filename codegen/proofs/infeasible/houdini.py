@@ -1,7 +1,7 @@
-"""Invariant: the largest part of what is proposed of a Program that holds where it has to.
+"""Houdini: the largest inductive subset of the candidate invariants of a Program.
 
-What does not hold where a way ends, if all held where it began, is taken out until the rest does
-(Houdini, Flanagan and Leino 2001).
+A candidate that does not hold at the end of a path, if all hold at its begin, is removed until the
+others do (Houdini, Flanagan and Leino 2001).
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from codegen.proofs.infeasible.queue_candidates import queue_candidates
 from codegen.proofs.infeasible.symbolic_execution import SymbolicProgram
 
 EFFORT = 20_000_000
-"""Units of z3's own count for one question: some seconds, and the same answer on every machine."""
+"""Resource limit of z3 for one query: some seconds, and the same result on every machine."""
 MOST_WHERE, MOST_TRIED = 2, 12_000
-"""Most conditions of a fact, and most facts that are tried together: a minute."""
+"""Maximum number of conditions of a fact, and of facts that are tried together (about a minute)."""
 
 
 def find_invariants(
     world: SymbolicProgram, ranges: Mapping[str, Range], most_where: int = MOST_WHERE
 ) -> list[Fact]:
-    """Return what holds at the cuts of a Program; `ranges` are those of variables between two
-    steps, as far as they stay in them; facts have at most `most_where` conditions.
+    """Return the facts that hold at the cutpoints of a Program.
 
-    What is said of few variables is looked for first: it is known when the rest is asked, which is
-    left out where it is too much.
+    `ranges` gives the ranges in which variables stay between two steps. Facts have at most
+    `most_where` conditions. Facts with few conditions are proven first and assumed for the others.
+    Facts with more conditions are left out if there are more than MOST_TRIED of them.
     """
     facts = list(dict.fromkeys(propose_facts(world.program, world.cuts, ranges)))
     last = list(dict.fromkeys(_last(world)))
@@ -117,14 +117,14 @@ def _says(one: Fact, other: Fact) -> bool:
 def known_at(
     world: SymbolicProgram, at: CutpointState | None, facts: Collection[Fact]
 ) -> list[Any]:
-    """Return what facts say of the values at a cut."""
+    """Return the terms of some facts for the values at a cutpoint."""
     if at is None:
         return []
     return [term(world, at, fact) for fact in facts if fact.cut is at.cut]
 
 
 def is_never(world: SymbolicProgram, facts: list[Any]) -> bool:
-    """Prove that some terms are never true together."""
+    """Tell whether z3 proves that some terms are never true together."""
     solver = world.z3.Solver()
     solver.set("rlimit", EFFORT)
     solver.add(*facts, *world.terms.lemmas(facts))

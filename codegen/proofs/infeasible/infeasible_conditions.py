@@ -1,8 +1,10 @@
-"""Infeasible: conditions of the C of a sampled Program that no input makes true, or false: proofs.
+"""Infeasible conditions: proofs that no input makes a condition of a sampled Program true, or
+false.
 
-A step is followed from cut to cut (`cut.py`, `symbolic.py`, `terms.py`) from any values that facts
-allow, with any inputs and any page within its ranges (`fact.py`, `invariant.py`). What facts alone
-do not exclude is asked of z3's Spacer, which looks for facts of its own (`reach.py`).
+A step is executed symbolically from cutpoint to cutpoint (`cutpoints.py`, `symbolic_execution.py`,
+`float_terms.py`). It begins with any values that the invariants allow (`candidate_invariants.py`,
+`houdini.py`), with any inputs, and with any page within its ranges. An outcome that invariants do
+not exclude is a query to z3's Spacer, which finds further invariants (`spacer.py`).
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from language.ir.traversal import negate_condition, walk_ops
 
 @dataclass(frozen=True)
 class DecisionSite:
-    """A decision as C has it: its block, its text, and the numbers of its conditions."""
+    """A decision of the C: its block, its text, and the numbers of its conditions."""
 
     block: str
     text: str
@@ -38,8 +40,8 @@ class DecisionSite:
 
 
 def unshare_expressions(program: Program) -> Program:
-    """Return a Program in which each expression is an object of its own: conditions are told apart
-    by their `id`.
+    """Return a Program in which each expression is a separate object: conditions are told apart
+    by `id`.
     """
     return replace(program, blocks={name: _own(block) for name, block in program.blocks.items()})
 
@@ -53,7 +55,9 @@ def _own(thing: Any) -> Any:
 
 
 def decision_sites(program: Program) -> Iterator[DecisionSite]:
-    """Yield the decisions of the Program that C is printed of, as far as C has them as they are."""
+    """Yield the decisions of a Program after the passes of the C generator that exist in C
+    unchanged.
+    """
     local = locals_of(program)
     for name, block in program.blocks.items():
         place = CNames(program, local[name], SOLVED_PREFIX_ON_PAGE)
@@ -80,9 +84,9 @@ def decision_sites(program: Program) -> Iterator[DecisionSite]:
 def prove_infeasible(
     program: Program, ranges: Mapping[str, Range], conditions: Collection[int]
 ) -> dict[int, bool]:
-    """Return of conditions, by number, the one outcome that they never have, where that is proven.
+    """Return, by the number of a condition, the one outcome that it is proven never to have.
 
-    `ranges` are those of variables between two steps, as far as they stay in them.
+    `ranges` gives the ranges in which variables stay between two steps.
     """
     world = SymbolicProgram(program)
     facts = find_invariants(world, ranges)

@@ -1,4 +1,4 @@
-"""Holding: whether a fact holds - of terms, for z3, and of numbers."""
+"""Invariant terms: facts as terms of z3, and their evaluation for given numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Number = Fraction | float | int | None
 
 
 def holds(fact: Fact, of: Callable[[str], Any]) -> bool:
-    """Tell whether a fact holds of numbers, `of` variables by name."""
+    """Tell whether a fact holds for the numbers that `of` returns for variables."""
     match fact:
         case Within(_, name, limits, where):
             return not _all(where, of) or _is_within(of(name), limits)
@@ -44,7 +44,7 @@ def _is_within(value: Any, limits: Limits) -> bool:
 
 
 def term(world: SymbolicProgram, at: CutpointState, fact: Fact) -> Any:
-    """Return a fact of the values at a cut, for z3: one term each time that it is asked for."""
+    """Return a fact for the values at a cutpoint as a term; equal arguments give the same term."""
     key = id(at), fact
     if key not in world.said:
         world.said[key] = _term(world, at, fact), at  # it keeps its number

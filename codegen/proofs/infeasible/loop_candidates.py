@@ -1,8 +1,8 @@
-"""Standing: what may stand while a loop goes on - counters and edges beside the guards they follow.
+"""Loop candidates: candidate invariants on counters, edges and guards inside a loop.
 
-A mode that counts how long its guard is true has done so once a turn has passed: where its counter
-is 0, or its edge is not there, the guard is false until the loop ends. And how many turns have come
-by tells what led to a mode: how two modes go with a count, and what guards say then.
+A mode that counts the time of its guard has done so after one iteration. If its counter is 0, or
+its edge is not present, the guard is false until the loop ends. The number of iterations so far
+tells how a mode was reached, which relates two modes, a counter and the guards.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import walk_ops
 
 Atom = tuple[str, str, float | int | str]
-"""A variable, a relation, and a number or another variable."""
+"""A comparison: a variable, a relation, and a number or another variable."""
 
 
 def loop_invariant_candidates(
     program: Program, cut: Cutpoint, first: Mapping[str, int]
 ) -> Iterator[Fact]:
-    """Yield what may hold of what modes count and compare, while a loop goes on."""
+    """Yield candidates on the counters and comparisons of modes inside a loop."""
     if cut.loop is None:
         return
     going = going_values(program, first)
@@ -54,7 +54,7 @@ def loop_invariant_candidates(
 
 
 def counted(program: Program, cut: Cutpoint) -> Iterator[Fact]:
-    """Yield what may hold of modes where a loop has counted so far."""
+    """Yield candidates on modes for each number of iterations so far."""
     counts = counts_of(program, cut)
     modes = modes_at(program, cut)
     for counter, most in counts.items():
@@ -74,7 +74,9 @@ def counted(program: Program, cut: Cutpoint) -> Iterator[Fact]:
 def lasting(
     program: Program, cut: Cutpoint, first: Mapping[str, int], cuts: Iterable[Cutpoint]
 ) -> Iterator[Fact]:
-    """Yield how the time in a mode goes with what a mode beside it counts."""
+    """Yield candidates that relate the time in a mode to the counter of a mode in another
+    region.
+    """
     going = going_values(program, first)
     followed = [(m, ops) for one in cuts if one.loop for m, ops in _followed(program, one)]
     for mode, ops in followed:
@@ -100,13 +102,13 @@ def _times(ops: list[Op]) -> set[str]:
 
 
 def counts_of(program: Program, cut: Cutpoint) -> dict[str, int]:
-    """Return what a loop counts until it says so, and the most of it."""
+    """Return the iteration counters of a loop with their largest values."""
     last = {name for name, _, _ in compared_in(program, cut)}
     return {name: most for name, most in ends_of(program, cut) if name in last}
 
 
 def commanded(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
-    """Yield what equations and discrete truth values may be in a mode, and while a loop goes on."""
+    """Yield candidates on equations and discrete truth values in a mode and inside a loop."""
     groups = ("equation.", "discrete.")
     truths = [v.name for v in program.variables if v.type == "truth" and v.name in cut.names]
     modes = modes_at(program, cut)
@@ -120,7 +122,9 @@ def commanded(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iter
 def said(
     program: Program, cut: Cutpoint, where: tuple[Literal, ...], kind: type = object
 ) -> Iterator[Fact]:
-    """Yield what guards may say of what a loop does not change, of numbers of a kind."""
+    """Yield candidates on comparisons of variables that a loop does not change, of numbers of a
+    kind.
+    """
     for name, relation, number in asked_of(program, cut):
         if isinstance(number, kind):
             yield from (Same(cut, name, relation, number, t, where) for t in (True, False))
@@ -143,7 +147,7 @@ def _followed(program: Program, cut: Cutpoint) -> Iterator[tuple[Literal, list[O
 
 
 def all_of(program: Program, ops: Iterable[Op]) -> list[Op]:
-    """Return some operations, and all that they run."""
+    """Return some operations and all operations that they run."""
     return [op for block in blocks_of(program, tuple(ops)) for op in walk_ops(block)]
 
 

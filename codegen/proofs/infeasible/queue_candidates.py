@@ -1,4 +1,4 @@
-"""Queue: what may wait in a small array while a loop goes on, and what holds while it does."""
+"""Queue candidates: candidate invariants on the contents of small arrays inside a loop."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ from language.ir.ops import Assign, Item, Op, Store, Value
 from language.ir.program import Program
 
 Numbers = Mapping[str, frozenset[int]]
-"""The numbers that are put into an array, by its name."""
+"""The numbers that are stored into an array, by its name."""
 
 
 def queue_candidates(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
-    """Yield what may be in small arrays, and in what is read from them."""
+    """Yield candidates on the elements of small arrays, and on variables that are read from
+    them.
+    """
     arrays, ops = items_of(program), all_of(program, _every(program))
     stored = {name: _stored(ops, name) for name in arrays}
     truths = truths_of(program, first)

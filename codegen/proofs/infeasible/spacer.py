@@ -1,7 +1,8 @@
-"""Reach: whether any number of steps ever comes by a condition with an outcome, for z3's Spacer.
+"""Reachability: queries to z3's Spacer whether a condition can have an outcome in any number of
+steps.
 
-Ways between cuts are clauses of predicates over the values at cuts; what these predicates are is
-looked for from what is asked (Komuravelli, Gurfinkel and Chaki 2014).
+Paths between cutpoints are Horn clauses of predicates over the values at cutpoints. Spacer searches
+for these predicates from the query (Komuravelli, Gurfinkel and Chaki 2014).
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from codegen.proofs.infeasible.houdini import known_at
 from codegen.proofs.infeasible.symbolic_execution import SymbolicProgram
 
 EFFORT = 15_000_000
-"""Units of z3's own count for one question: some seconds."""
+"""Resource limit of z3 for one query: some seconds."""
 
 
 class Reachability:
-    """The clauses of a Program, with `facts` that are known to hold at its cuts."""
+    """The Horn clauses of a Program, with facts that are known to hold at its cutpoints."""
 
     def __init__(self, world: SymbolicProgram, facts: Collection[Fact]) -> None:
         self.world, self.facts, self.z3 = world, facts, world.z3
@@ -32,7 +33,10 @@ class Reachability:
             self.clauses.rule(self._closed(self._at(way.end), body))
 
     def never(self, visits: Sequence[ConditionVisit], outcome: bool) -> bool:
-        """Prove that a condition has an outcome at none of its visits; False where z3 gives up."""
+        """Tell whether a condition is proven to have an outcome at none of its visits.
+
+        Returns False also if z3 reaches its resource limit.
+        """
         z3 = self.z3
         terms = [v.condition if outcome else z3.Not(v.condition) for v in visits]
         asked = [self._all(v.begin, (*v.given, t)) for v, t in zip(visits, terms, strict=True)]

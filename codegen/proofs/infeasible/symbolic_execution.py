@@ -1,7 +1,9 @@
-"""Symbolic: the ways of a sampled Program from cut to cut over values that are not known, for z3.
+"""Symbolic execution: the paths of a sampled Program between cutpoints over symbolic values, for
+z3.
 
-What loops inside branches leave is left open, as is what operations give (`terms.py`): more than
-happens, so what is never true of it never is.
+The effects of loops inside branches, and results of operations (`float_terms.py`), are
+over-approximated. An outcome that is impossible in this model is therefore impossible in the
+Program.
 """
 
 from __future__ import annotations
@@ -46,14 +48,15 @@ from language.ir.program import Program
 from language.ir.traversal import block_writes
 
 KINDS = ("real", "whole")
-"""Of an item of an array, which is a whole number or not."""
+"""Kinds of the elements of an array."""
 
 
 class SymbolicProgram:
-    """The `ways` of a Program from cut to cut; `visits` are by `id` of a condition.
+    """The symbolic paths of a Program: `ways` between cutpoints, and `visits` by `id` of a
+    condition.
 
-    Each of the `cuts` has the numbers and truth values with which its loop begins. What was `said`
-    of the values at a cut is kept.
+    Each of the `cuts` has the numbers and truth values with which its loop begins. `said` memoises
+    the terms of facts at a cutpoint.
     """
 
     def __init__(self, program: Program) -> None:
