@@ -1,1 +1,1 @@
-"""Many runs of a system: variants of parameters, interpreted or compiled."""
+"""Batches: many runs of a system with different parameters, interpreted or compiled."""

@@ -1,8 +1,9 @@
-"""Batch: many variants of one system and scenario in one call - what goes in, what comes out.
+"""Batch: many variants of one system and scenario in one call, and their results.
 
-A variant has its own parameters, initial values, inputs and seed. Of each variant only the
-measures, the events and the outputs that were asked for are kept. Who carries a batch out is a
-`Runner`: the interpreter (engine/batch/interpreted_batch.py) or compiled C, same protocol, same bits.
+A variant has its own parameters, initial values, inputs and seed. The result has the statistics,
+the events and the outputs that the batch selects. A `BatchRunner` executes a batch: the interpreter
+(engine/batch/interpreted_batch.py) or compiled C (engine/batch/compiled_batch.py), with the same
+bits.
 """
 
 from __future__ import annotations
@@ -20,16 +21,17 @@ from language.model.system import Scenario, Stimulus, System
 
 Reals = NDArray[np.float64]
 StatisticKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]
+"""Kind of a statistic of a signal."""
 NO_EVENT = -1
-"""What fills `BatchResult.event_kinds` behind the last event of a variant."""
+"""Value in `BatchResult.event_kinds` after the last event of a variant."""
 
 
 @dataclass(frozen=True)
 class SignalStatistic:
-    """One number of a signal over its rows from `since` to `until` [s], ends included.
+    """Statistic of a signal over its rows from `since` to `until` [s], ends included.
 
-    `peak` is the largest magnitude. Rows are those of the scenario's `record`. Without rows in the
-    span, or with a NaN among them, it is NaN.
+    `peak` is the largest magnitude. Rows are those of the scenario's `record`. The statistic is NaN
+    without rows in the span, or with a NaN among them.
     """
 
     name: str
@@ -41,7 +43,7 @@ class SignalStatistic:
 
 @dataclass(frozen=True)
 class InputTable:
-    """An input that steps at `starts` [s] (k,), the first 0, to `values` [SI] (count, k)."""
+    """Input that steps at `starts` [s] (k,), the first 0, to `values` [SI] (count, k)."""
 
     starts: tuple[Fraction, ...]
     values: Reals
@@ -49,14 +51,13 @@ class InputTable:
 
 @dataclass(frozen=True)
 class Batch:
-    """Variants of a system through a scenario, `count` of them.
+    """Variants of a system through a scenario; `count` is their number.
 
-    `parameters` are values [SI] (count,) by `instance.parameter`, `initial` start values by
-    `instance.state`, `inputs` those of the system that differ, `seeds` (count,) those of noise.
-    `courses` are inputs of each variant that step at other times than those of the others: in C
-    each of them has a plan of its own, all have one Program.
-    `outputs` are recorded signals to keep whole; `most_events` is how many events are kept of each
-    variant: all are counted.
+    `parameters` are values [SI] (count,) by `instance.parameter`, `initial` initial values by
+    `instance.state`, `inputs` the system inputs that differ, and `seeds` (count,) the seeds of
+    noise. `variant_inputs` are stimuli of each variant that step at different times; in C each
+    variant has its own plan, and all share one Program. `statistics` and `outputs` are the selected
+    results. Of each variant `max_events` events are kept, and all are counted.
     """
 
     system: System
@@ -74,7 +75,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class EventKind:
-    """What can happen: a transition with its modes; a range left or an invariant has none."""
+    """Kind of event: a transition with its modes; range and invariant violations have no modes."""
 
     instance: str
     transition: str
@@ -86,13 +87,13 @@ class EventKind:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What is kept of each variant, in the order of the batch.
+    """Results of all variants, in the order of the batch.
 
-    `measures` (count,) by name; `outputs` (count, rows) by signal over `times` (rows,), NaN behind
-    the end of a run that stopped; `event_counts` (count,); `event_times` [s] and `event_kinds`
-    (count, most_events), places in `kinds`; `faults`: which fault bits were set, as `instance:
-    fault`, and `stopped`: why a variant ended before the horizon, both by its number. `note` says
-    what did the work.
+    `statistics` (count,) by name; `outputs` (count, rows) by signal at `times` [s] (rows,), NaN
+    after the end of a run that stopped; `event_counts` (count,); `event_times` [s] and
+    `event_kinds` (count, max_events), the latter as indices of `kinds`. `faults` are the latched
+    fault bits as `instance: fault`, `stopped` the reasons why variants ended before the horizon,
+    both by variant. `note` names the executor.
     """
 
     statistics: Mapping[str, Reals]
@@ -108,7 +109,7 @@ class BatchResult:
 
 
 class BatchRunner(Protocol):
-    """What carries a batch out; results do not depend on which one does, nor on threads."""
+    """Executor of batches; results do not depend on the executor or on the number of threads."""
 
     def __call__(self, batch: Batch) -> BatchResult:
-        """Return what is kept of each variant."""
+        """Return the results of all variants."""

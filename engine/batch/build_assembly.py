@@ -1,4 +1,4 @@
-"""Assembling: what is to be compiled of a system - instances, wires, sensors, recorded columns."""
+"""Simulation assembly: collects instances, wires, sensors and recorded columns for compilation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from language.programs.simulation_assembly import (
 def assembly_of(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> SimulationAssembly:
-    """Return what is to be compiled of a system and a resolved scenario."""
+    """Return the assembly of a system and a resolved scenario."""
     formulas = wire_formulas(system, scenario)
     truths = {name for name, thing in system.inputs.items() if thing.is_bool}
     truths |= {line.name for line in system.delayed_signals.values() if line.source in truths}
@@ -55,7 +55,7 @@ def assembly_of(
         programs=programs,
         order=system.order,
         inputs=(*system.inputs, *system.delayed_signals),
-        input_sources={name: tuple(found) for name, found in feeds.items()},
+        input_sources={name: tuple(sources) for name, sources in feeds.items()},
         sensors=system.sensors,
         wires=wires,
         row_signals=tuple(slots),
@@ -66,6 +66,7 @@ def assembly_of(
 
 
 def _feed_of(connection: Connection, program: Program, system: System) -> InputSource:
+    """Return the source of an input: a signal, a number or an expression block, and its flags."""
     name = connection.target[1]
     variable = next(v for v in program.inputs if v.name == f"input.{name}")
     source = connection.source
@@ -79,11 +80,12 @@ def _feed_of(connection: Connection, program: Program, system: System) -> InputS
 
 
 def _signals_read(block: Block) -> list[str]:
+    """Return the signals that a block of the wires reads."""
     return [n.removeprefix("signal.") for n in block_reads(block) if n.startswith("signal.")]
 
 
 def _varying_inputs(system: System, scenario: Scenario) -> Iterator[InputTrajectory]:
-    """Yield the inputs that change between instants."""
+    """Yield the inputs and delayed inputs that change between instants."""
     for name in (*system.inputs, *system.delayed_signals):
         line = system.delayed_signals.get(name)
         source = line.source if line else name

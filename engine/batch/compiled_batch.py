@@ -1,7 +1,7 @@
-"""Planned batch: the variants of a batch carried out by a compiled library, on several threads.
+"""Compiled batch: executes the variants of a batch in a compiled library, on several threads.
 
-Results are those of the interpreter, bit for bit. What a library leaves (a run that stopped, a
-range of a sampled instance) the interpreter does.
+Results are those of the interpreter bit for bit. Variants that the library leaves out (a run that
+stopped, a saturated signal) are executed by the interpreter.
 """
 
 from __future__ import annotations
@@ -32,23 +32,24 @@ from engine.batch.parameter_binding import (
 from engine.batch.run_plan import planning_obstacle
 
 MAX_CACHED = 4
-"""Plans of a planner: the scenarios of a study take turns."""
+"""Number of compiled batches in a cache; a study alternates between its scenarios."""
 
 
 def run_compiled_batch(
     batch: Batch, build: BuildLibrary, threads: int | None = None, min_steps: int = 0
 ) -> BatchResult:
-    """Return what is kept of each variant, by compiled C on several threads.
+    """Return the results of all variants, by compiled C on several threads.
 
-    Variants that share a Program and have fewer than `min_steps` steps in all are not compiled for.
+    Groups of variants that share Programs and have fewer than `min_steps` steps in all are
+    interpreted. By default there is a thread for each processor.
     """
     return CompiledBatch(batch, build, min_steps).run(threads)
 
 
 class CompiledBatch:
-    """A batch that is planned: it can be carried out again and again.
+    """Compiled batch that can run repeatedly.
 
-    Variants with Programs of their own are compiled group by group.
+    Each group of variants that shares its Programs has its own library.
     """
 
     def __init__(
@@ -58,9 +59,10 @@ class CompiledBatch:
         min_steps: int = 0,
         binding: ParameterBinding | None = None,
     ) -> None:
-        """Compile what the batch needs; `reason` says why it is left to the interpreter.
+        """Compile the groups of a batch; `reason` is set if the interpreter has to execute it.
 
-        `binding` is how a batch that differs in numbers alone is carried out.
+        `binding` is a known binding of a batch that differs in numbers only. Raises ValueError for
+        a batch without variants.
         """
         self.batch, self.build, self.least = batch, build, min_steps
         self.reason: str | None = None
@@ -83,11 +85,11 @@ class CompiledBatch:
             raise ValueError("a batch has at least one variant")
 
     def rebind(self, batch: Batch) -> CompiledBatch | None:
-        """Return what is planned already for a batch that differs in numbers alone, else None.
+        """Return this compiled batch for a batch that differs in numbers only.
 
-        Where inputs step at times of their own the plan of each variant is made, for the same
-        Programs; so it is where the interpreter took the few there were, whose steps then count
-        as steps of all that is compiled for.
+        None if it cannot be used. If each variant has its own input times, plans are rebuilt for
+        the same Programs. The same holds if the interpreter executes some groups; their steps then
+        count for all variants in the decision to compile.
         """
         if self.reason or _form(batch) != _form(self.batch):
             return None
@@ -108,7 +110,7 @@ class CompiledBatch:
         return found
 
     def run(self, threads: int | None = None) -> BatchResult:
-        """Return what is kept of each variant."""
+        """Return the results of all variants; `threads` defaults to the number of processors."""
         if self.reason:
             note = f"interpreter: {self.reason}"
             return BatchResult(**{**vars(run_interpreted_batch(self.batch)), "note": note})
@@ -124,15 +126,18 @@ class CompiledBatch:
 
 
 class CompiledBatchCache:
-    """Plans batches; a batch like one of the last ones, but for its numbers, has its plan."""
+    """Cache of compiled batches; a batch that differs from a cached one in numbers reuses it."""
 
     def __init__(self, build: BuildLibrary, min_steps: int = 0) -> None:
-        """Plan nothing yet; `build` and `min_steps` are those of a planned batch."""
+        """Create an empty cache; the arguments are those of a compiled batch."""
         self.build, self.least = build, min_steps
         self._kept: list[CompiledBatch] = []
 
     def get_or_compile(self, batch: Batch) -> CompiledBatch:
-        """Return a batch that is planned."""
+        """Return the compiled form of a batch, from the cache if possible.
+
+        A new one replaces the oldest of `MAX_CACHED` entries.
+        """
         for place, known in enumerate(self._kept):
             if found := known.rebind(batch):
                 self._kept[place] = found

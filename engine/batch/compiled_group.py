@@ -1,4 +1,4 @@
-"""Planned group: the variants of a batch that share their Programs, carried out in C."""
+"""Compiled group: executes the variants of a batch that share their Programs in C."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ from language.ir.program import unqualified_name
 from language.programs.simulation_assembly import SimulationAssembly, range_event_variables
 
 STATISTIC_KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
+"""Kinds of statistics in the order of their numbers in C."""
 CHUNK_SIZE = 2000
-"""Variants of one call: their events and values are a few megabytes."""
+"""Number of variants of one call; their events and values are a few megabytes."""
 
 
 class CompiledGroup:
-    """The variants of a batch that share their Programs."""
+    """Variants of a batch that share their Programs, with plan and library."""
 
     def __init__(
         self,
@@ -41,7 +42,7 @@ class CompiledGroup:
         build: BuildLibrary,
         like: CompiledGroup | None = None,
     ) -> None:
-        """Plan and compile; of a group `like` it, with the same assembly, the library is shared."""
+        """Plan and compile the group; the library of `like` is reused for an equal assembly."""
         self.batch, self.group = batch, group
         adjustment = group.binding
         self.system, self.programs = adjustment.system, adjustment.programs
@@ -68,13 +69,16 @@ class CompiledGroup:
         self.kinds = _kind_places(self.assembly, list_event_kinds(self.programs))
 
     def rebind(self, batch: Batch) -> CompiledGroup:
-        """Return the same for all variants of another batch."""
+        """Return the group for all variants of another batch."""
         found = copy.copy(self)
         found.batch, found.group = batch, ProgramGroup(np.arange(batch.count), self.group.binding)
         return found
 
     def run(self, result: BatchResult, threads: int) -> None:
-        """Carry all out, in chunks on threads; each chunk writes its own part of the result."""
+        """Execute all variants in chunks on threads and store the results.
+
+        Each chunk writes its own part of the result. Variants that C leaves out are interpreted.
+        """
         variants = self.group.variants
         chunks = [variants[k : k + CHUNK_SIZE] for k in range(0, len(variants), CHUNK_SIZE)]
         if threads > 1 and len(variants) > threads:

@@ -1,6 +1,7 @@
-"""Planned: a run carried out by a compiled library; a batch is in engine/batch/compiled_batch.py.
+"""Compiled run: executes a single run in a compiled library.
 
-Results are those of the interpreter, bit for bit. What a library leaves, the interpreter does.
+Results are those of the interpreter bit for bit. Runs that the library cannot complete are executed
+by the interpreter. Batches are in engine/batch/compiled_batch.py.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ EVENT_DTYPE = np.dtype(
         ("reserved", "i4"),
     ]
 )
-"""`Event` of codegen/templates/simulator/run.h.jinja."""
+"""Memory layout of `Event` in codegen/templates/simulator/run.h.jinja."""
 INITIAL_EVENT_CAPACITY = 1000
-"""Events for which a single run has room at first; it is made again where there were more."""
+"""Initial number of events of a single run; the run is repeated with more if it has more."""
 
 
 class RunLibrary(Protocol):
@@ -44,25 +45,26 @@ class RunLibrary(Protocol):
 
     @property
     def columns(self) -> Sequence[int]:
-        """The place of each column of the assembly in a row."""
+        """Position of each column of the assembly in a row."""
 
     @property
     def width(self) -> int:
-        """How many numbers a row has."""
+        """Number of values in a row."""
 
     @property
     def lanes(self) -> int:
-        """How many variants may be carried out side by side."""
+        """Number of variants that are executed side by side."""
 
     def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
-        """Return what carries variants out, from a first to one behind the last."""
+        """Return a function that executes the variants from a first to before a last index."""
 
 
 BuildLibrary = Callable[[SimulationAssembly], RunLibrary]
+"""Function that compiles an assembly."""
 
 
 class CompiledRun:
-    """One run that is planned: it can be carried out again and again."""
+    """Compiled run that can be executed repeatedly."""
 
     def __init__(
         self,
@@ -71,7 +73,7 @@ class CompiledRun:
         programs: Mapping[str, Program],
         build: BuildLibrary,
     ) -> None:
-        """Take a resolved scenario that can be planned."""
+        """Take a resolved scenario without planning obstacle, and compile it."""
         self.scenario = scenario
         self.assembly = assembly_of(system, scenario, programs)
         self.plan = build_run_plan(system, scenario, self.assembly)
@@ -88,7 +90,10 @@ class CompiledRun:
         self._call = self.library.bind(self.plan, self._members())
 
     def run(self) -> bool:
-        """Run in C; tell whether that was all. The numbers are in this object's arrays."""
+        """Execute the run; return whether the library completed it.
+
+        The results are in the arrays of this object.
+        """
         self._call(0, 1)
         count = int(self._count[0])
         if count > len(self._events):
@@ -98,7 +103,7 @@ class CompiledRun:
         return not self._is_left[0]
 
     def trajectory(self) -> Trajectory | None:
-        """Return the trajectory; None where the interpreter has to tell what happened."""
+        """Execute the run and return its trajectory; None if the interpreter has to execute it."""
         if not self.run():
             return None
         programs = self.assembly.programs

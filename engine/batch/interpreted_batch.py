@@ -1,4 +1,4 @@
-"""Variants: a batch carried out one variant after another by a stepper like the interpreter."""
+"""Interpreted batch: executes the variants of a batch one after the other by a stepper."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ from language.model.system import Scenario, Stimulus, StimulusPiece, System
 
 
 def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> BatchResult:
-    """Return what is kept of each variant; `build` makes what runs a Program."""
+    """Return the results of all variants; `build` creates the stepper of a Program.
+
+    Raises ValueError for a batch without variants.
+    """
     result: BatchResult | None = None
     for group in group_variants(batch):
         current = result or allocate_result(batch, group.binding, "interpreter")
@@ -46,7 +49,7 @@ def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> Ba
 
 
 def allocate_result(batch: Batch, binding: ParameterBinding, note: str) -> BatchResult:
-    """Return the arrays of a result, to be filled."""
+    """Return a result with arrays of NaN, zeros and `NO_EVENT`, to be filled by variant."""
     horizon = binding.scenario.horizon
     assert horizon is not None
     grid = TimeGrid(Fraction(0), binding.scenario.every)
@@ -67,35 +70,41 @@ def allocate_result(batch: Batch, binding: ParameterBinding, note: str) -> Batch
 
 
 def list_event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
-    """Return what can happen in some instances: transitions, ranges left, invariants."""
-    found: list[EventKind] = []
+    """Return the event kinds of some instances, each once.
+
+    For each instance these are its transitions, then ranges, then invariants.
+    """
+    kinds: list[EventKind] = []
     for name, program in programs.items():
         for info in program.transitions:
             source, target = program.endpoint_names(info)
-            found.append(EventKind(name, info.name, source, target, info.region))
+            kinds.append(EventKind(name, info.name, source, target, info.region))
         for signal in _ranged_signals(program):
-            found.append(EventKind(name, f"range {signal}", kind="range"))
+            kinds.append(EventKind(name, f"range {signal}", kind="range"))
         for invariant in program.invariants:
             text = f"invariant {invariant.name}"
-            found.append(EventKind(name, text, region=invariant.region, kind="invariant"))
-    return tuple(dict.fromkeys(found))
+            kinds.append(EventKind(name, text, region=invariant.region, kind="invariant"))
+    return tuple(dict.fromkeys(kinds))
 
 
 def _ranged_signals(program: Program) -> list[str]:
-    """Return the signals whose range may be left."""
+    """Return the variables with a range and the signals of fault bits."""
     states = [unqualified_name(v.name) for v in program.variables if v.range is not None]
     ops = (op for block in program.blocks.values() for op in walk_ops(block))
     return [*states, *(op.signal for op in ops if isinstance(op, FaultBit) and op.signal)]
 
 
 def row_range(statistic: SignalStatistic, every: Fraction, count: int) -> tuple[int, int]:
-    """Return the first row of a measure and the one behind its last."""
+    """Return the index of the first row of a statistic and the index after its last row."""
     until = count - 1 if statistic.until is None else statistic.until // every
     return -int(-statistic.since // every), min(count, int(until) + 1)
 
 
 def evaluate_statistic(statistic: SignalStatistic, values: Reals) -> float:
-    """Return a measure of the rows in its span, from the first to the last in this order."""
+    """Return a statistic of the rows in its span; NaN without rows or with a NaN among them.
+
+    Sums are accumulated from the first to the last row, as in C.
+    """
     if not len(values) or np.any(np.isnan(values)):
         return math.nan
     match statistic.kind:
@@ -116,7 +125,7 @@ def evaluate_statistic(statistic: SignalStatistic, values: Reals) -> float:
 
 
 def scenario_of_variant(batch: Batch, scenario: Scenario, variant: int) -> Scenario:
-    """Return the scenario of a variant: its inputs and its seed."""
+    """Return the scenario with the inputs and the seed of a variant."""
     inputs = dict(scenario.inputs)
     if batch.variant_inputs:
         inputs.update(batch.variant_inputs[variant])
@@ -129,7 +138,7 @@ def scenario_of_variant(batch: Batch, scenario: Scenario, variant: int) -> Scena
 def tunable_values(
     batch: Batch, binding: ParameterBinding, variant: int
 ) -> dict[tuple[str, str], float]:
-    """Return the values of a variant by instance and tunable parameter."""
+    """Return the values [SI] of a variant by instance and tunable parameter."""
     arrays = {**batch.parameters, **batch.initial}
     return {place: float(arrays[name][variant]) for name, place in binding.tunables.items()}
 
@@ -137,10 +146,11 @@ def tunable_values(
 def _simulate_variant(
     batch: Batch, binding: ParameterBinding, variant: int, build: BuildStepper
 ) -> Trajectory:
+    """Return the trajectory of a variant with its tunable parameters set."""
     values = tunable_values(batch, binding, variant)
     owners = {id(program): name for name, program in binding.programs.items()}
 
-    def tuned(program: Program) -> Stepper:
+    def build_tuned(program: Program) -> Stepper:
         stepper = build(program)
         known = {constant.name for constant in program.constants}
         for (owner, parameter), value in values.items():
@@ -155,10 +165,11 @@ def _simulate_variant(
         return stepper
 
     scenario = scenario_of_variant(batch, binding.scenario, variant)
-    return simulate(binding.system, scenario, tuned, programs=binding.programs)
+    return simulate(binding.system, scenario, build_tuned, programs=binding.programs)
 
 
 def _stimulus_of_table(system: System, name: str, table: InputTable, variant: int) -> Stimulus:
+    """Return the steps of an input table as the stimulus of a variant."""
     values = table.values[variant].tolist()
     pieces = tuple(StimulusPiece(s, Fraction(v)) for s, v in zip(table.starts, values, strict=True))
     return Stimulus(pieces, is_bool=system.inputs[name].is_bool)
@@ -171,14 +182,18 @@ def run_variant(
     binding: ParameterBinding,
     build: BuildStepper = Interpreter,
 ) -> None:
-    """Run a variant, and put what is kept of it into the result."""
+    """Run a variant and store its results in the arrays of `result`.
+
+    These are statistics, outputs, events, faults and the stop reason. Of the events the first
+    `max_events` are stored.
+    """
     run = _simulate_variant(batch, binding, variant, build)
     for name, array in result.outputs.items():
         array[variant, : len(run.times)] = run.signals[name]
-    for measure in batch.statistics:
-        first, behind = row_range(measure, batch.scenario.every, len(result.times))
-        values = np.asarray(run.signals[measure.signal], dtype=np.float64)[first:behind]
-        result.statistics[measure.name][variant] = evaluate_statistic(measure, values)
+    for statistic in batch.statistics:
+        first, behind = row_range(statistic, batch.scenario.every, len(result.times))
+        values = np.asarray(run.signals[statistic.signal], dtype=np.float64)[first:behind]
+        result.statistics[statistic.name][variant] = evaluate_statistic(statistic, values)
     result.event_counts[variant] = len(run.events)
     for place, event in enumerate(run.events[: batch.max_events]):
         result.event_times[variant, place] = event.time
@@ -192,8 +207,8 @@ def run_variant(
 
 
 def _event_kind_index(kinds: Iterable[EventKind], event: Event) -> int:
-    """Return the place of an event among the kinds; ranges and invariants have no modes there."""
+    """Return the index of the kind of an event. Raises ValueError for an unknown kind."""
     is_move = event.kind == "transition"
     modes = (event.source, event.target) if is_move else ("", "")
-    wanted = EventKind(event.instance, event.transition, *modes, event.region, event.kind)
-    return list(kinds).index(wanted)
+    kind = EventKind(event.instance, event.transition, *modes, event.region, event.kind)
+    return list(kinds).index(kind)

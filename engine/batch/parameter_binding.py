@@ -1,9 +1,9 @@
-"""Adjustment: which values of a batch one Program takes, and which need a Program per value.
+"""Parameter binding: makes swept parameters tunable, so that variants share their Programs.
 
-A swept parameter is made tunable in the Programs of the batch, a swept initial value becomes a
-tunable parameter of its own: so all variants share their Programs, and differ in calibrations.
-Numbers that are solved at check time (gains, matrix exponentials) and times of waits cannot follow
-a tunable: what they depend on is set before the Program is made, once for each value.
+A swept parameter becomes tunable in the Programs of the batch, and a swept initial value becomes a
+tunable parameter of its own. Variants then differ in calibration only. Numbers that are solved at
+check time (gains, matrix exponentials) and waits cannot follow a tunable parameter. Parameters that
+they depend on are set before lowering, and the Programs are built once for each value.
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ from language.model.system import Scenario, System
 from language.text.diagnostic import SpecError
 
 Bounds = tuple[float, float]
-"""The least and the largest value of a parameter."""
+"""Least and largest value of a parameter."""
 INITIAL_PARAMETER = "start_of_{}"
-"""The name of the parameter that a swept initial value becomes."""
+"""Name of the parameter that stands for a swept initial value."""
 
 
 @dataclass(frozen=True)
 class ParameterBinding:
-    """How a batch is carried out: `system` and `scenario` in which swept values are tunable.
+    """Binding of the swept names of a batch to tunable parameters of `system` and `scenario`.
 
-    `tuned` gives for each swept name its instance and tunable parameter; `rebuilt` says why a name
-    needs a Program per value. `programs` are those of the batch's own values of what is rebuilt.
-    Where nothing is, `ends` are the values [SI] between which the Programs are the same.
+    `tunables` gives the instance and tunable parameter of a swept name. `rebuild_reasons` says why
+    other names need Programs for each value. `programs` are the Programs of `system`. If nothing is
+    rebuilt, `bounds` are the values [SI] between which the Programs are equal except for
+    calibration.
     """
 
     system: System
@@ -52,16 +53,18 @@ class ParameterBinding:
 
 @dataclass(frozen=True)
 class ProgramGroup:
-    """Variants (places in the batch) that share their Programs."""
+    """Variants (indices in the batch) that share their Programs."""
 
     variants: NDArray[np.int64]
     binding: ParameterBinding
 
 
 def bind_parameters(batch: Batch) -> ParameterBinding:
-    """Return how the names of a batch are swept.
+    """Return the binding of the swept names of a batch.
 
-    Raises ValueError for a name that is not there, SpecError for a value that no Program takes.
+    If the Programs are equal at both ends of the ranges, all names are tunable; otherwise each name
+    is decided on its own. Raises ValueError for unknown names, and SpecError for a value that the
+    checks refuse.
     """
     require_known_names(batch)
     scenario = _without_initial(resolve_recording(batch.system, batch.scenario), batch)
@@ -90,12 +93,15 @@ def bind_parameters(batch: Batch) -> ParameterBinding:
 
 
 def value_bounds(batch: Batch) -> dict[str, Bounds]:
-    """Return between which values [SI] the parameters of a batch are."""
+    """Return the least and largest value [SI] of each swept parameter."""
     return {name: (float(min(v)), float(max(v))) for name, v in batch.parameters.items()}
 
 
 def _declared_bounds(batch: Batch, seen_bounds: Mapping[str, Bounds]) -> dict[str, Bounds]:
-    """Return the declared ranges of parameters that have one, where all values are inside."""
+    """Return the declared ranges of parameters that contain all their values.
+
+    Other parameters have the bounds of their values.
+    """
     bounds = {}
     for name, (low, high) in seen_bounds.items():
         owner, _, short = name.partition(".")
@@ -108,7 +114,11 @@ def _declared_bounds(batch: Batch, seen_bounds: Mapping[str, Bounds]) -> dict[st
 def _bind_all_tunable(
     batch: Batch, scenario: Scenario, bounds: Mapping[str, Bounds]
 ) -> ParameterBinding | None:
-    """Return the Programs in which all names are tunable, where nothing but values differs."""
+    """Return a binding with all names tunable.
+
+    The result is None if the Programs at both bounds differ in more than values, a check refuses
+    them, or a parameter is not a real number in the Program.
+    """
     names = list(dict.fromkeys([*batch.parameters, *batch.initial]))
     systems, program_sets = [], []
     try:
@@ -133,7 +143,10 @@ def _bind_all_tunable(
 
 
 def group_variants(batch: Batch) -> list[ProgramGroup]:
-    """Return the variants of a batch by the values that need a Program of their own."""
+    """Return the variants grouped by the values of the parameters that need a rebuild.
+
+    The groups are sorted by these values. Without such parameters all variants are one group.
+    """
     binding = bind_parameters(batch)
     if not binding.rebuild_reasons:
         return [ProgramGroup(np.arange(batch.count), binding)]
@@ -154,7 +167,10 @@ def group_variants(batch: Batch) -> list[ProgramGroup]:
 
 
 def require_known_names(batch: Batch) -> None:
-    """Raise ValueError for a name that is not there, or for arrays of another length."""
+    """Raise ValueError for names or arrays that do not fit the system.
+
+    These are unknown names, tables, arrays of a wrong length, and values that are not finite.
+    """
     for name in batch.parameters:
         owner, _, short = name.partition(".")
         instance = batch.system.instances.get(owner)
@@ -192,18 +208,27 @@ def require_known_names(batch: Batch) -> None:
 
 
 def _without_initial(scenario: Scenario, batch: Batch) -> Scenario:
-    kept = {name: value for name, value in scenario.initial.items() if name not in batch.initial}
+    """Return the scenario without the swept initial values.
+
+    It records the outputs and the signals of statistics of the batch; if there are none, its own
+    first signal.
+    """
+    initial = {name: value for name, value in scenario.initial.items() if name not in batch.initial}
     signals = tuple(dict.fromkeys([*batch.outputs, *(m.signal for m in batch.statistics)]))
-    return dataclasses.replace(scenario, initial=kept, signals=signals or scenario.signals[:1])
+    return dataclasses.replace(scenario, initial=initial, signals=signals or scenario.signals[:1])
 
 
 def _tunable_of(name: str, batch: Batch) -> tuple[str, str]:
+    """Return the instance and tunable parameter that stand for a swept name."""
     owner, _, short = name.partition(".")
     return owner, INITIAL_PARAMETER.format(short) if name in batch.initial else short
 
 
 def _with_tunable(system: System, name: str, batch: Batch, first: float) -> System:
-    """Return a system in which a name is tunable; a parameter has the value `first` until then."""
+    """Return the system with a swept name tunable; a parameter gets the value `first`.
+
+    An initial value becomes the new tunable parameter `start_of_<state>`.
+    """
     owner, _, short = name.partition(".")
     automaton = system.instances[owner].automaton
     parameters, states = dict(automaton.parameters), dict(automaton.states)
@@ -219,9 +244,14 @@ def _with_tunable(system: System, name: str, batch: Batch, first: float) -> Syst
 
 
 def _with_parameter_value(system: System, name: str, value: float) -> System:
-    """Return the system with a parameter set, in an automaton and in the model that it knows."""
+    """Return the system with a parameter of an instance, and of its model, set to a value [SI].
+
+    A derived parameter becomes fixed.
+    """
     owner, _, short = name.partition(".")
-    exact = Fraction(repr(float(value)))  # the decimal that was meant: a wait of 2 ms is two ticks
+    exact = Fraction(
+        repr(float(value))
+    )  # the shortest decimal, so that a wait of 2 ms is exactly two ticks
 
     def with_value(automaton: Automaton) -> Automaton:
         old = automaton.parameters.get(short)
@@ -237,12 +267,17 @@ def _with_parameter_value(system: System, name: str, value: float) -> System:
 
 
 def _with_automaton(system: System, owner: str, automaton: Automaton) -> System:
+    """Return the system with the automaton of an instance replaced."""
     instance = dataclasses.replace(system.instances[owner], automaton=automaton)
     return dataclasses.replace(system, instances={**system.instances, owner: instance})
 
 
 def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
-    """Return why a parameter needs a Program per value: more than a calibration follows from it."""
+    """Return why a parameter needs Programs for each value; None if it can be tunable.
+
+    The Programs at the least and the largest value are compared. Raises SpecError for a value that
+    the checks refuse.
+    """
     owner, _, short = name.partition(".")
     values = batch.parameters[name]
     own = _single_instance_system(batch.system, owner)
@@ -267,21 +302,21 @@ def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
 
 
 def _is_not_real(programs: Mapping[str, Program], name: str) -> bool:
-    """Tell whether a tunable is no real in its Program: a wait is kept in ticks."""
+    """Return whether a tunable parameter is not real in its Program, as a wait in ticks."""
     owner, _, own = name.partition(".")
     constants = programs[owner].constants if owner in programs else ()
     return any(c.name == f"calibration.{own}" and c.type != "real" for c in constants)
 
 
 def _single_instance_system(system: System, owner: str) -> System:
-    """Return a system of one instance: its Program does not depend on those of the others."""
+    """Return a system with one instance, whose Program does not depend on the others."""
     connections = {key: wire for key, wire in system.connections.items() if key[0] == owner}
     instances = {owner: system.instances[owner]}
     return dataclasses.replace(system, instances=instances, connections=connections)
 
 
 def _without_values(program: Program) -> Program:
-    """Return a Program in which tunables, and what follows from them, have no value."""
+    """Return the Program with tunable and derived constants set to 0."""
     constants = tuple(
         dataclasses.replace(c, value=0.0) if c.kind in ("tunable", "derived") else c
         for c in program.constants
@@ -290,6 +325,7 @@ def _without_values(program: Program) -> Program:
 
 
 def _with_tunable_parameter(system: System, owner: str, short: str) -> System:
+    """Return the system with a parameter of an instance made tunable."""
     automaton = system.instances[owner].automaton
     parameter = dataclasses.replace(automaton.parameters[short], kind="tunable")
     parameters = {**automaton.parameters, short: parameter}

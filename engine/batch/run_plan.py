@@ -1,7 +1,7 @@
-"""Plan: what is known of a run before it begins, as flat arrays for compiled C.
+"""Run plan: the instants, steps, rows, inputs and noise of a run as flat arrays for compiled C.
 
-Instants, ends of steps, rows, inputs and noise follow from the scenario alone. Times are exact here
-(whole multiples of a common tick) and pass to C as sums of two doubles.
+They follow from the scenario alone. Times are exact here, as integer multiples of a common tick,
+and are passed to C as sums of two doubles.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from language.programs.simulation_assembly import InputTrajectory as Varying, Si
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 MAX_TICKS = 2**52
-"""A horizon of more common ticks has instants that a double does not count."""
+"""Largest number of common ticks in a horizon; a double counts them exactly."""
 MAX_SCHEDULE_BITS = 32
-"""Bits of the word that says what happens at an instant."""
+"""Number of bits in the word that says what happens at an instant."""
 NO_ROW = -1
+"""Index that stands for no row or no step."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,13 @@ class DoubleDoubleTimes:
 
 @dataclass(frozen=True)
 class StepPlan:
-    """The steps of one continuous instance: `first` (instants + 1,) that leads to each instant.
+    """Steps of one continuous instance.
 
-    `left` (steps,) are their lengths [s], `starts` (steps + 1,). Of each row (rows,) the step that
-    it is in (NEVER where it is at an instant), the time since the step's start, and whether it is
-    at the step's end; `boundaries` (steps + 1,) are the starts that are whole major steps.
+    `first` (instants + 1,) is the first step that leads to each instant. `left` (steps,) are the
+    lengths [s] and `starts` (steps + 1,) the times of the steps. For each row (rows,): `row_steps`
+    is its step (`NO_ROW` at an instant), `row_times` the time [s] since the start of the step, and
+    `row_ends` whether the row is at the end of the step. `boundaries` (steps + 1,) tells which
+    times are whole major steps.
     """
 
     first: Integers
@@ -62,12 +65,15 @@ class StepPlan:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One scenario: `inputs` (instants, inputs), `happens` (instants,) bits, `row_at` (instants,)
-    the row of each or NEVER, `rows` [s] (rows,) with the instant that each is at or before.
+    """Arrays of one scenario.
 
-    `noise` are normal numbers of each sensor that has noise, `early` how many samples of each are
-    taken before the first delayed one arrives. Of inputs that change between instants: `pieces`
-    (instants, courses), `courses` (pieces, 6) with start, value and slope of each.
+    `inputs` (instants, inputs) are values, `happens` (instants,) bits of what happens, `row_at`
+    (instants,) the row of each instant or `NO_ROW`, `rows` (rows,) the times of rows [s],
+    `row_gaps` (rows,) the first instant that is not before each row. `flows` are the steps by
+    continuous instance. `noise` are standard normal numbers by sensor, `early` the number of
+    samples of a sensor before its first delayed one arrives. Inputs that change between instants
+    have `pieces` (instants, trajectories) and `courses` (pieces, 6) with start, value and slope of
+    each piece. `exact` are the instants [s].
     """
 
     instants: DoubleDoubleTimes
@@ -84,7 +90,7 @@ class RunPlan:
     courses: Mapping[str, Reals] = field(default_factory=dict)
 
     def pieces_at(self, starts: Sequence[Fraction]) -> Integers:
-        """Return the piece that holds at each instant (instants,); before the first, the first."""
+        """Return the index of the piece at each instant (instants,); 0 before the first start."""
         at = [bisect_right(starts, time) - 1 for time in self.exact]
         return np.maximum(np.array(at, dtype=np.int64), 0)
 
@@ -92,7 +98,7 @@ class RunPlan:
 def planning_obstacle(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> str | None:
-    """Return why a run cannot be planned before it begins; None where it can."""
+    """Return the reason why a run has no plan; None if it has one."""
     if scenario.calibrations:
         return "a page of the calibration turns during the run"
     for name, line in system.delayed_signals.items():
@@ -112,7 +118,7 @@ def planning_obstacle(
 
 
 def build_run_plan(system: System, scenario: Scenario, assembly: SimulationAssembly) -> RunPlan:
-    """Return the plan of a resolved scenario that can be planned."""
+    """Return the plan of a resolved scenario without planning obstacle."""
     programs = assembly.programs
     schedule = Schedule(system, scenario, dict(programs))
     tick = _tick(schedule, programs)
@@ -172,7 +178,7 @@ def _row_at(instants: Integers, rows: Integers) -> Integers:
 
 
 def noise_samples(seed: int, sensor: str, count: int) -> Reals:
-    """Return the first noise numbers of a sensor."""
+    """Return the first `count` noise numbers of a sensor (count,)."""
     return np.fromiter(islice(noise_stream(seed, sensor), count), dtype=np.float64, count=count)
 
 
@@ -183,7 +189,10 @@ def input_values(
     instants: Integers,
     tick: Fraction,
 ) -> Reals:
-    """Return the values of the inputs (instants, inputs): pieces hold from their start on."""
+    """Return the values of the inputs (instants, inputs); varying inputs have 0.
+
+    A piece is in effect from its start on.
+    """
     found = np.zeros((len(instants), len(assembly.inputs)))
     for place, name in enumerate(assembly.inputs):
         line = system.delayed_signals.get(name)

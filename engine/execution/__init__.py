@@ -1,1 +1,1 @@
-"""Execution of continuous automata: major steps, located events, monitors of ranges."""
+"""Execution of continuous automata: major steps, located events, range and invariant monitors."""

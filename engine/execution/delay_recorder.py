@@ -1,4 +1,4 @@
-"""Keeping: what a continuous automaton's delays remember of each major step."""
+"""Delay recorder: stores the history of delayed quantities at each major step."""
 
 from __future__ import annotations
 
@@ -10,30 +10,33 @@ from language.lowering.continuous_delay import RECORD_AGE
 
 
 class DelayRecorder:
-    """Delayed quantities: recorded at each major step, before time leaves it."""
+    """Recorder of delayed quantities; it stores values before time leaves a major step."""
 
     def __init__(self, program: Program, stepper: Stepper) -> None:
-        """Take the Program; one without delays records nothing."""
+        """Take the Program; without delays nothing is recorded."""
         self._stepper = stepper
         self._step = program.major_step
         self.is_needed = "record" in program.blocks
         self._last: Fraction | None = None
 
     def start(self) -> None:
-        """Begin anew: `start` fills every history with the value of now."""
+        """Reset the recorder; the block `start` fills the histories with the present values."""
         self._last = None
 
     def record_step(self, time: Fraction) -> None:
-        """Record at a major step that time is about to leave."""
+        """Record at a time [s] that is a whole multiple of the major step, once.
+
+        Other times are ignored.
+        """
         if self.is_needed and time != self._last and time % self._step == 0:
             self._stepper.run("record")
             self._last = time
 
     def age(self) -> float:
-        """Return how long ago [s] the last record was."""
+        """Return the time [s] since the last record; 0 without delays."""
         return float(self._stepper.get(RECORD_AGE.name)) if self.is_needed else 0.0
 
     def set_age(self, age: float) -> None:
-        """Say how long ago [s] the last record was: to look at another time."""
+        """Set the time [s] since the last record, so that delays are evaluated at another time."""
         if self.is_needed:
             self._stepper.set(RECORD_AGE.name, age)

@@ -1,4 +1,4 @@
-"""Continuous: moves a continuous automaton through time, from event to event (rules 1, 4, 7-12)."""
+"""Event loop: advances a continuous automaton from event to event (rules 1, 4 and 7-12)."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ from language.ir.program import Program, TransitionInfo, unqualified_name
 from language.programs.major_step import MAX_EVENTS_PER_STEP
 
 FlowSegment = tuple[Fraction, Fraction, Sequence[float], float]
-"""Where a flow began and was to end, and the states and age of the records at its start."""
+"""Start and planned end [s] of a flow, and the states and age of the delay records at its start."""
 
 
 class PartialStep(NamedTuple):
-    """A step whose first segment is done; `flow` where someone looks inside it."""
+    """Major step whose first segment has been executed.
+
+    `flow` is that segment if outputs are sampled inside it, else None.
+    """
 
     flow: FlowSegment | None
 
 
 class SimulationStopped(Exception):
-    """The run cannot go on: the message says what happened, where and when."""
+    """Error that ends a run; the message says what happened, where and when."""
 
 
 class ContinuousRun:
-    """One continuous automaton at one time: exact (a fraction of a second).
+    """Continuous automaton at an exact time [s].
 
-    It runs the parts of the Program's `step` one by one, and sees each event.
+    The parts of the block `step` of the Program are run one by one, so that each event is visible.
     """
 
     def __init__(
@@ -47,10 +50,10 @@ class ContinuousRun:
         log: Callable[[Event], None],
         environment: Environment | None = None,
     ) -> None:
-        """Take the inputs from the stepper as they are; `start` enters the initial mode.
+        """Take the automaton with its stepper, event receiver and environment.
 
-        `stepped` is called after each major step; `off_step` is the first time at which something
-        outside happened between two of them.
+        `on_step` is called after each major step. `off_step` is the first time at which something
+        outside happened between two major steps, else None.
         """
         self._around = environment or ConstantEnvironment()
         self._looks: deque[Fraction] = deque()
@@ -75,7 +78,10 @@ class ContinuousRun:
         self._cruise = FastPath(program, stepper, self._ranges) if is_plain and is_alone else None
 
     def start(self) -> None:
-        """Put the states where they start; `settle` enters the initial mode (rule 16)."""
+        """Set the states to their initial values.
+
+        `settle` then enters the initial mode (rule 16).
+        """
         self._records.start()
         self.stepper.run("latch")
         self.stepper.run("start")
@@ -83,10 +89,11 @@ class ContinuousRun:
         self.is_settled = False
 
     def flow_to(self, time: Fraction, sample_times: Sequence[Fraction] = ()) -> None:
-        """Flow up to `time`, through every event before it. Raises Stopped.
+        """Advance to `time` [s] through every event before it. Raises SimulationStopped.
 
-        An event at `time` itself is left to `settle`: inputs that step there come first. `sample_times`
-        are times before it at which the outputs are looked at; they change nothing.
+        An event at `time` itself is left to `settle`, because inputs that step there come first.
+        The outputs are sampled at `sample_times`, which lie before `time` and have no influence on
+        the solution.
         """
         self._looks = deque(sample_times)
         step = self.program.major_step
@@ -101,13 +108,16 @@ class ContinuousRun:
             self.off_step = time
 
     def end_step(self) -> None:
-        """Tell that a major step is done, when everything at its end has happened."""
+        """Call `on_step` if the time is a whole multiple of the major step."""
         if self.on_step and self.time % self.program.major_step == 0:
             self.stepper.run("equations")
             self.on_step()
 
     def settle(self) -> None:
-        """Jump before flow: micro-steps until no transition is enabled, then equations."""
+        """Execute micro-steps until no transition is enabled, then evaluate equations (rule 11a).
+
+        Raises SimulationStopped if more micro-steps fire than there are modes (rule 7).
+        """
         bound = sum(len(self.program.modes_of(region)) for region in self._regions)
         self.stepper.run("latch")
         done: list[TransitionInfo] = []

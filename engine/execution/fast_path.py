@@ -1,4 +1,4 @@
-"""Cruise: whole major steps, one after the other, as long as nothing happens in them."""
+"""Fast path: executes consecutive event-free major steps of a continuous automaton."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from language.ir.program import Program
 
 
 class FastPath:
-    """The common case of a continuous automaton whose inputs stand still and nobody watches.
+    """Execution of whole major steps with constant inputs and without observers.
 
-    Steps are counted, so no exact time is needed between them.
+    Steps are counted as integers, so that no exact time is needed between them.
     """
 
     def __init__(self, program: Program, stepper: Stepper, ranges: RangeMonitor) -> None:
-        """Take the automaton and what tells that all of it is finite and in its range."""
+        """Take the automaton and the monitor that tells whether all values are in range."""
         self._stepper = stepper
         self._ranges = ranges
         self._step = program.major_step
@@ -30,10 +30,11 @@ class FastPath:
         return number, rest > 0
 
     def advance(self, first: int, last: int) -> tuple[int, bool]:
-        """Go from one major step to another; return the one reached, and whether more was done.
+        """Execute major steps from index `first` to `last`; return the index reached and a flag.
 
-        That is the first segment of a step in which something happens: it flowed and elapsed. The
-        inputs are latched.
+        The flag is true if something happened in the step that begins there. Its first segment has
+        then been executed, that is the blocks `flow` and `elapse` have run. The inputs have to be
+        latched before the call.
         """
         run, put, h = self._stepper.run, self._stepper.set, self._h
         is_inside, happened = self._ranges.is_inside, self._happened

@@ -1,4 +1,4 @@
-"""Invariant watch: an assertion about a mode that does not hold is an event, never forced."""
+"""Invariant monitor: reports invariants of active modes that cease to hold (rule 11b)."""
 
 from __future__ import annotations
 
@@ -10,21 +10,25 @@ from engine.results.samples import Event
 from language.ir.program import InvariantInfo, Program
 
 INVARIANT_BLOCK = "invariants"
+"""Block of the Program that evaluates all invariants."""
 
 
 class InvariantMonitor:
-    """The invariants of one automaton; each is reported when it ceases to hold."""
+    """Monitor of the invariants of one automaton; each violation is reported once."""
 
     def __init__(
         self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
     ) -> None:
-        """Look at the active modes whenever asked."""
+        """Take the automaton and the function that receives events."""
         self._name, self._program, self._stepper, self._log = name, program, stepper, log
         self._regions = program.mode_variables()
         self._broken: set[str] = set()
 
     def check(self, time: Fraction) -> None:
-        """Report what has ceased to hold since the last look; equations are those of now."""
+        """Report the invariants of active modes that ceased to hold since the last call.
+
+        The equations have to be evaluated for the present instant [s].
+        """
         if not self._program.invariants:
             return
         self._stepper.run(INVARIANT_BLOCK)

@@ -1,4 +1,4 @@
-"""Range watch: leaving a declared range is a named event of the trajectory (rule 18)."""
+"""Range monitor: reports variables of a continuous automaton that leave their range (rule 18)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from language.ir.program import Program, unqualified_name
 from language.programs.simulation_assembly import RANGE_TOLERANCE
 
 FINITE_RANGE = (-sys.float_info.max, sys.float_info.max)
-"""The range of a state that has none of its own."""
+"""Range of a state without a declared range: all finite numbers."""
 
 
 class RangeMonitor:
-    """The ranges of one continuous automaton: never clamped, each leaving is reported once."""
+    """Monitor of the ranges of one continuous automaton; values are not saturated."""
 
     def __init__(
         self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
     ) -> None:
-        """Watch the states and discrete variables that have a range."""
+        """Take the automaton and the function that receives events."""
         self._name, self._program, self._stepper, self._log = name, program, stepper, log
         self._bounds = {v.name: v.range for v in program.variables if v.range is not None}
         self._read = stepper.make_reader(tuple(self._bounds))
@@ -34,13 +34,20 @@ class RangeMonitor:
         self._highs = tuple(high for _, high in limits.values())
 
     def is_inside(self) -> bool:
-        """Tell whether all states are finite, and nothing is or was outside its range."""
+        """Return whether all states are finite and all variables within their ranges.
+
+        The result is False as long as a reported variable is outside.
+        """
         values = self._read_all()
         is_inside = all(map(le, self._lows, values)) and all(map(le, values, self._highs))
         return is_inside and not self._outside
 
     def check(self, time: Fraction) -> None:
-        """Report what has left its range since the last look."""
+        """Report the variables that left their range since the last call.
+
+        The bounds have a relative tolerance. A variable that returned to its range is reported
+        again when it leaves.
+        """
         for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
             slack = RANGE_TOLERANCE * (high - low)
             if low - slack <= value <= high + slack:
@@ -55,10 +62,10 @@ class RangeMonitor:
 
 
 def format_range_violation(variable: str, value: float, low: float, high: float) -> str:
-    """Return what is told of a variable outside its range."""
+    """Return the message for a variable outside its range."""
     return f"`{unqualified_name(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
 
 
 def range_event(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
-    """Return the event of a signal that left its range, in a mode."""
+    """Return the event of a signal that left its range at a time [s] in a mode."""
     return Event(time, 0, instance, f"range {signal}", mode, mode, kind="range", message=message)

@@ -1,4 +1,4 @@
-"""Firing: the transitions of a Program as events, and the names of its modes."""
+"""Transition events: the transitions that a step has fired, as events with mode names."""
 
 from __future__ import annotations
 
@@ -9,37 +9,42 @@ from language.ir.regions import CHART
 
 
 def fired_transitions(program: Program, stepper: Stepper) -> list[TransitionInfo]:
-    """Return the transitions of the last micro-step, at most one of each region.
+    """Return the transitions of the last micro-step, at most one for each region.
 
-    Of a chart with several micro-steps in a tick those of all of them, in their order.
+    If a tick of a chart has several micro-steps, the transitions of all of them are returned in
+    order.
     """
     return [info for _, info in fired_by_micro_step(program, stepper)]
 
 
 def fired_by_micro_step(program: Program, stepper: Stepper) -> list[tuple[int, TransitionInfo]]:
-    """Return the transitions of a tick, each with the number of its micro-step in the tick."""
+    """Return the transitions of the last tick with the indices of their micro-steps, in order."""
     if not program.has_log:
         numbers = [stepper.get(name) for name in program.fired_variables()]
         return [(0, program.transitions[number - 1]) for number in numbers if number]
-    log, found, micro_step = stepper.get(LOG_VARIABLE), [], 0
+    log, fired, micro_step = stepper.get(LOG_VARIABLE), [], 0
     for number in (log[k] for k in range(stepper.get(LOG_COUNT_VARIABLE))):
         if number:
-            found.append((micro_step, program.transitions[number - 1]))
+            fired.append((micro_step, program.transitions[number - 1]))
         else:
             micro_step += 1
-    return found
+    return fired
 
 
 def transition_event(
     name: str, program: Program, info: TransitionInfo, time: float, micro_step: int = 0
 ) -> Event:
-    """Return a transition of an instance at a time [s] as an event."""
+    """Return the event of a transition of an instance at a time [s]."""
     source, target = program.endpoint_names(info)
     return Event(time, micro_step, name, info.name, source, target, info.region)
 
 
 def mode_names(program: Program, prefix: str = "") -> dict[str, dict[int, str]]:
-    """Return the names of the modes by signal: `mode` for the chart, else the region."""
+    """Return the mode names of each region by number; keys are signals.
+
+    The chart has the key `mode`, other regions have their names with `_` for dots, each after
+    `prefix`.
+    """
     return {
         f"{prefix}{'mode' if region == CHART else region.replace('.', '_')}": {
             mode.number: mode.name for mode in program.modes_of(region)

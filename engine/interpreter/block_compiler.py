@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from engine.interpreter import expression_closures as shapes, statement_closures as actions
+from engine.interpreter import expression_closures, statement_closures
 from engine.interpreter.expression_closures import ExpressionClosure, Frame
 from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
 from engine.interpreter.statement_closures import StatementClosure
@@ -121,7 +121,7 @@ class BlockCompiler:
                 pending.append(op)
             else:
                 statements.append(self._compile_operation(op))
-        return actions.sequence(
+        return statement_closures.sequence(
             [*statements, *([self._compile_assignments(pending)] if pending else [])]
         )
 
@@ -140,8 +140,10 @@ class BlockCompiler:
         targets = [self.scope.slots[op.target] for op in assignments]
         sources = [self._operand_slot(op.value) for op in assignments]
         if None not in sources:
-            return actions.copy(targets, [slot for slot in sources if slot is not None])
-        return actions.assign(targets, [self._compile_expression(op.value) for op in assignments])
+            return statement_closures.copy(targets, [slot for slot in sources if slot is not None])
+        return statement_closures.assign(
+            targets, [self._compile_expression(op.value) for op in assignments]
+        )
 
     def _compile_operation(self, op: Op) -> StatementClosure:
         """Return the closure of one operation."""
@@ -150,15 +152,15 @@ class BlockCompiler:
             case Assign():
                 return self._compile_assignments([op])
             case Store(array, index, value):
-                return actions.store(
+                return statement_closures.store(
                     slots[array], self._compile_expression(index), self._compile_expression(value)
                 )
             case Branch(condition, then, other):
                 two = self._compile_block(then), self._compile_block(other)
-                return actions.branch(self._compile_expression(condition), *two)
+                return statement_closures.branch(self._compile_expression(condition), *two)
             case Switch(selector, cases):
                 table = {number: self._compile_block(block) for number, block in cases}
-                return actions.switch_case(slots[selector], table)
+                return statement_closures.switch_case(slots[selector], table)
             case Loop(count, index, body) if count <= MAX_UNROLLED_TURNS and _is_indexed(body):
                 turns = [substitute_variable(body, index, k) for k in range(count)]
                 last = Assign(index, Value(count - 1))
@@ -167,18 +169,22 @@ class BlockCompiler:
                 condition
             ):
                 more = self._compile_expression(condition)
-                return actions.loop_while(count, slots[index], more, self._compile_block(then))
+                return statement_closures.loop_while(
+                    count, slots[index], more, self._compile_block(then)
+                )
             case Loop(count, index, body):
-                return actions.loop(count, slots[index], self._compile_block(body))
+                return statement_closures.loop(count, slots[index], self._compile_block(body))
             case Count(timer, condition, limit, _):
-                return actions.count_while(slots[timer], self._compile_expression(condition), limit)
+                return statement_closures.count_while(
+                    slots[timer], self._compile_expression(condition), limit
+                )
             case FaultBit(fault, signal, is_set):
                 slot, bit = slots["memory.faults"], self.faults[fault]
                 left = slots[RANGE_VIOLATIONS]
                 return (
-                    actions.set_fault(slot, bit, signal, left)
+                    statement_closures.set_fault(slot, bit, signal, left)
                     if is_set
-                    else actions.clear_fault(slot, bit)
+                    else statement_closures.clear_fault(slot, bit)
                 )
             case RunBlock(name):
                 return self._compile_named_block(name)
@@ -202,16 +208,20 @@ class BlockCompiler:
         """Return the closure of an expression. Raises TypeError for an unknown node."""
         place = self._find_slot(expr)
         if place is not None:
-            return shapes.load_slot(place)
+            return expression_closures.load_slot(place)
         match expr:
             case Item(name, index) if _is_constant(index, {}):
-                return shapes.load_element(self.scope.slots[name], self._fold_constant(index))
+                return expression_closures.load_element(
+                    self.scope.slots[name], self._fold_constant(index)
+                )
             case Item(name, index):
-                return shapes.load_item(self.scope.slots[name], self._compile_expression(index))
+                return expression_closures.load_item(
+                    self.scope.slots[name], self._compile_expression(index)
+                )
             case Unary("-", operand):
-                return shapes.negate(self._compile_expression(operand))
+                return expression_closures.negate(self._compile_expression(operand))
             case Unary(_, operand):
-                return shapes.logical_not(self._compile_expression(operand))
+                return expression_closures.logical_not(self._compile_expression(operand))
             case Binary("and", Compare(">=", a, low), Compare("<=", b, high)):
                 return self._compile_range_test(a, low, b, high) or self._compile_binary(
                     "and", expr.left, expr.right
@@ -220,10 +230,10 @@ class BlockCompiler:
                 return self._compile_binary(operator, left, right)
             case Select(condition, then, other):
                 parts = [self._compile_expression(part) for part in (condition, then, other)]
-                return shapes.select(*parts)
+                return expression_closures.select(*parts)
             case Call(function, arguments):
                 known = self.functions.get(function) or self.arithmetic.elementary[function]
-                return shapes.call_function(
+                return expression_closures.call_function(
                     known, [self._compile_expression(argument) for argument in arguments]
                 )
             case _:
@@ -233,7 +243,7 @@ class BlockCompiler:
         """Return the closure of a range test if all four operands have slots, else None."""
         slots = [self._operand_slot(part) for part in parts]
         known = [slot for slot in slots if slot is not None]
-        return shapes.range_test(*known) if len(known) == len(slots) else None
+        return expression_closures.range_test(*known) if len(known) == len(slots) else None
 
     def _compile_binary(self, operator: str, left: Expr, right: Expr) -> ExpressionClosure:
         """Return the closure of a binary operation.
@@ -243,27 +253,30 @@ class BlockCompiler:
         """
         a, b = self._operand_slot(left), self._operand_slot(right)
         if a is not None and b is not None:
-            return shapes.SLOT_SLOT[operator](a, b)
+            return expression_closures.SLOT_SLOT[operator](a, b)
         if b is not None:
             if inner := self._match_inner_operation(operator, left):
-                return shapes.FUSED_LEFT[inner.operators](*inner.slots, b)
-            return shapes.EXPRESSION_SLOT[operator](self._compile_expression(left), b)
+                return expression_closures.FUSED_LEFT[inner.operators](*inner.slots, b)
+            return expression_closures.EXPRESSION_SLOT[operator](self._compile_expression(left), b)
         inner = self._match_inner_operation(operator, right)
         if a is not None:
             if inner:
-                return shapes.FUSED_RIGHT[inner.operators](a, *inner.slots)
-            return shapes.SLOT_EXPRESSION[operator](a, self._compile_expression(right))
+                return expression_closures.FUSED_RIGHT[inner.operators](a, *inner.slots)
+            return expression_closures.SLOT_EXPRESSION[operator](a, self._compile_expression(right))
         if inner:
-            return shapes.EXPRESSION_FUSED[inner.operators](
+            return expression_closures.EXPRESSION_FUSED[inner.operators](
                 self._compile_expression(left), *inner.slots
             )
-        return shapes.EXPRESSION_EXPRESSION[operator](
+        return expression_closures.EXPRESSION_EXPRESSION[operator](
             self._compile_expression(left), self._compile_expression(right)
         )
 
     def _match_inner_operation(self, outer_operator: str, expr: Expr) -> _InnerOperation | None:
         """Return an operand as an operation on two slots; None if it cannot be fused."""
-        if not isinstance(expr, Binary) or (outer_operator, expr.operator) not in shapes.FUSED_LEFT:
+        if (
+            not isinstance(expr, Binary)
+            or (outer_operator, expr.operator) not in expression_closures.FUSED_LEFT
+        ):
             return None
         a, b = self._operand_slot(expr.left), self._operand_slot(expr.right)
         if a is None or b is None:

@@ -1,1 +1,1 @@
-"""Simulation and replay of a system: schedule, wiring, sensors, stimuli."""
+"""Simulation and replay of a system: schedule, wiring, sensors and stimuli."""

@@ -1,4 +1,4 @@
-"""Schedule: the instants at which something happens in a system, in exact time (rule 19b)."""
+"""Event schedule: the instants at which something happens in a system, in exact time (rule 19b)."""
 
 from __future__ import annotations
 
@@ -13,37 +13,41 @@ from language.model.system import Scenario, Stimulus, System
 from language.text.diagnostic import Problems, SpecError
 
 MAX_INSTANTS = 100_000_000
-"""Most ticks, samples and rows of one run: about an hour of the interpreter."""
+"""Largest number of ticks, samples and rows of a run: about an hour of interpretation."""
 
 
 class TimeGrid:
-    """The instants start, start + period, start + 2 periods ... from time 0 on."""
+    """Instants `start`, `start + period`, `start + 2 period`, ... that are not negative [s]."""
 
     def __init__(self, start: Fraction, period: Fraction) -> None:
-        """Take the first instant, which may be before time 0, and the period [s]."""
+        """Take the first instant [s], which may be negative, and the period [s]."""
         self.period = period
         self.start = start if start >= 0 else start + -(start // period) * period
 
     def has(self, time: Fraction) -> bool:
-        """Tell whether a time is one of the instants."""
+        """Return whether a time [s] is one of the instants."""
         return time >= self.start and (time - self.start) % self.period == 0
 
     def count(self, horizon: Fraction) -> int:
-        """Return how many instants there are up to the horizon."""
+        """Return the number of instants up to the horizon [s], end included."""
         return max(0, int((horizon - self.start) // self.period) + 1)
 
     def __iter__(self) -> Iterator[Fraction]:
-        """Yield the instants for ever."""
+        """Yield the instants in order, without end."""
         whole = math.lcm(self.start.denominator, self.period.denominator)
         start, period = int(self.start * whole), int(self.period * whole)
         return (Fraction(start + k * period, whole) for k in itertools.count())
 
 
 class Schedule:
-    """When instances tick, sensors sample and capture, and delayed signals arrive."""
+    """Instants of ticks, samples, captures, arrivals and events of a scenario.
+
+    `rows` are the times of recorded rows. `captures` are the times at which a delayed sensor or
+    signal stores its source.
+    """
 
     def __init__(self, system: System, scenario: Scenario, programs: dict[str, Program]) -> None:
-        """Take a resolved scenario."""
+        """Take a resolved scenario. Raises SpecError for more than `MAX_INSTANTS` instants."""
         assert scenario.horizon is not None
         self.horizon = scenario.horizon
         self.rows = TimeGrid(Fraction(0), scenario.every)
@@ -81,16 +85,21 @@ class Schedule:
 
     @property
     def _grids(self) -> list[TimeGrid]:
+        """All grids whose times are instants."""
         captures = [grid for grids in self.captures.values() for grid in grids]
         return [*self.ticks.values(), *self.samples.values(), *captures, *self._arrivals]
 
     def grids(self) -> dict[str, TimeGrid]:
-        """Return when what ticks, samples or captures does so; of a run without delayed outputs."""
+        """Return the grids of ticks, samples and captures by name; a capture is `capture <name>`.
+
+        The result is meant for systems without delayed outputs; of several captures of a signal the
+        first is returned.
+        """
         late = {f"capture {n}": grids[0] for n, grids in self.captures.items() if grids}
         return {**self.ticks, **self.samples, **late}
 
     def instants(self) -> Iterator[Fraction]:
-        """Yield every instant from 0 to the horizon at which something may happen."""
+        """Yield every instant from 0 to the horizon [s] in order, each once."""
         last = None
         ends = (Fraction(0), self.horizon)
         for time in heapq.merge(ends, self.events, *self._grids):
@@ -101,10 +110,11 @@ class Schedule:
             last = time
 
     def captures_at(self, time: Fraction) -> list[str]:
-        """Return the sensors and lines that capture their signal at an instant."""
+        """Return the sensors and delayed signals that capture their source at an instant."""
         return [n for n, grids in self.captures.items() if any(grid.has(time) for grid in grids)]
 
     def _require_bounded(self, scenario: Scenario) -> None:
+        """Raise SpecError for more than `MAX_INSTANTS` instants and rows."""
         count = sum(grid.count(self.horizon) for grid in (self.rows, *self._grids))
         if count > MAX_INSTANTS:
             label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
@@ -114,14 +124,17 @@ class Schedule:
 
 
 def _sort_unique(times: Sequence[Fraction]) -> list[Fraction]:
-    """Return times in their order, each once: as whole numbers of a tick they are soon compared."""
+    """Return times in increasing order, each once.
+
+    They are compared as integers over their common denominator, which is faster than fractions.
+    """
     bottom = math.lcm(*(time.denominator for time in times))
     ticks = {time.numerator * (bottom // time.denominator): time for time in times}
     return [ticks[tick] for tick in sorted(ticks)]
 
 
 def _input_event_times(system: System, inputs: Mapping[str, Stimulus]) -> Iterator[Fraction]:
-    """Yield when a piece of an input starts, and when that arrives at the end of a line."""
+    """Yield the times [s] at which pieces of inputs start and at which delayed ones arrive."""
     for name, stimulus in inputs.items():
         delays = [line.delay for line in system.delayed_signals.values() if line.source == name]
         for piece in stimulus.pieces:

@@ -1,4 +1,4 @@
-"""Feeding: the inputs of a system's instances, from signals as they are now."""
+"""Input wiring: sets the inputs of the instances of a system from its connections."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from language.model.system import Connection, System
 
 
 class InputWiring:
-    """What is connected to each instance, and what a tick has seen of it."""
+    """Connections of each instance, and the samples that each tick has already used.
+
+    `wires` are the connections by instance.
+    """
 
     def __init__(
         self,
@@ -23,7 +26,7 @@ class InputWiring:
         steppers: Mapping[str, Stepper],
         signals: Signals,
     ) -> None:
-        """Nothing was fed yet."""
+        """Group the connections by instance."""
         self.system = system
         self.programs = programs
         self.steppers = steppers
@@ -33,10 +36,10 @@ class InputWiring:
             self.wires[owner].append(connection)
         self._seen: dict[tuple[str, str, str], int] = {}
         self._flags = self._inputs_with_variable("is_new.")
-        self._limited = self._inputs_with_variable("latched.")
+        self._saturated = self._inputs_with_variable("latched.")
 
     def _inputs_with_variable(self, group: str) -> set[tuple[str, str]]:
-        """Return the inputs of all instances that have a variable of a group."""
+        """Return the inputs, as instance and name, that have a variable in a group."""
         return {
             (name, unqualified_name(variable.name))
             for name, program in self.programs.items()
@@ -45,7 +48,10 @@ class InputWiring:
         }
 
     def set_inputs(self, name: str, time: Fraction) -> bool:
-        """Set the inputs of an instance; tell whether one changed. Raises Stopped."""
+        """Set the inputs of an instance; return whether one changed.
+
+        Raises SimulationStopped for an input that is not finite, unless the Program saturates it.
+        """
         stepper, changed = self.steppers[name], False
         for connection in self.wires[name]:
             thing = connection.target[1]
@@ -56,16 +62,17 @@ class InputWiring:
             before = stepper.get(f"input.{thing}")
             stepper.set(f"input.{thing}", value)
             now = stepper.get(f"input.{thing}")
-            if not math.isfinite(now) and (name, thing) not in self._limited:
+            if not math.isfinite(now) and (name, thing) not in self._saturated:
                 place = describe_instant(name, self.programs[name], stepper, time)
                 raise SimulationStopped(f"{place}: input `{thing}` is {now}")
             changed = changed or now != before
         return changed
 
     def flag_new_inputs(self, name: str, sampling: Container[str]) -> None:
-        """A measured input is new where a sensor that it reads has sampled since the last tick.
+        """Set the flags of the measured inputs of an instance.
 
-        `sampling` are the sensors that sample.
+        A flag is true if a sensor that the input reads has sampled since the last call. `sampling`
+        are the sensors with a sample period.
         """
         for connection in self.wires[name]:
             thing = connection.target[1]
@@ -78,6 +85,6 @@ class InputWiring:
 
 
 def describe_instant(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:
-    """Return an instant of an instance in words."""
+    """Return the time, instance and mode for a message."""
     mode = program.mode_name(stepper.get("memory.mode"))
     return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"

@@ -1,4 +1,4 @@
-"""Starting: the Program of each instance of a system, with the start values of a scenario."""
+"""Instance Programs: lowers each instance of a system with the initial values of a scenario."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from language.text.diagnostic import Source, Span
 
 
 def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
-    """Return the Program of each instance, with the start values of a resolved scenario."""
+    """Return the Program of each instance for a scenario without recordings (resolved)."""
     automata = automata_of(system, scenario)
     return {name: program_of(*each) for name, each in automata.items()}
 
 
 def automata_of(system: System, scenario: Scenario) -> dict[str, tuple[Automaton, list[str]]]:
-    """Return the automaton of each instance with its start values, and its inputs that vary.
+    """Return, for each instance, the automaton with initial values and the names of varying inputs.
 
-    Inputs of continuous automata that change between instants are parabolas inside a step.
+    A varying input of a continuous automaton changes between instants; it is interpolated by a
+    parabola inside a step.
     """
-    found = {}
+    automata = {}
     for name, instance in system.instances.items():
         start = {
             key.partition(".")[2]: Fraction(value)
@@ -41,16 +42,18 @@ def automata_of(system: System, scenario: Scenario) -> dict[str, tuple[Automaton
             if not instance.automaton.inputs[thing].is_bool
             if any(_varies(system, scenario, read) for read in connection.reads)
         ]
-        found[name] = _with_start_values(instance.automaton, start), varying
-    return found
+        automata[name] = _with_start_values(instance.automaton, start), varying
+    return automata
 
 
 def _varies(system: System, scenario: Scenario, signal: str) -> bool:
+    """Return whether a signal is an input, or a delayed input, whose stimulus varies."""
     source = system.delayed_signals[signal].source if signal in system.delayed_signals else signal
     return source in scenario.inputs and scenario.inputs[source].varies
 
 
 def _with_start_values(automaton: Automaton, start: Mapping[str, Fraction]) -> Automaton:
+    """Return an automaton with some initial values [SI] replaced."""
     states = dict(automaton.states)
     nowhere = Span(Source("scenario"), 1, 1)
     for name, value in start.items():

@@ -1,4 +1,8 @@
-"""Replay: a recording through a sampled automaton that ticks at its own period."""
+"""Replay: executes a sampled automaton on the values of a recording, tick by tick.
+
+Inputs are held at their latest recorded values. Outputs can be compared with columns of the
+recording.
+"""
 
 from __future__ import annotations
 
@@ -25,12 +29,15 @@ from language.model.system import RecordingMap
 from language.text.diagnostic import Problems, SpecError
 
 MAX_TICKS = 20_000_000
-"""Most ticks of one replay."""
+"""Largest number of ticks of a replay."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """An output against a column of the recording, at the ticks with a new value."""
+    """Difference of an output and a column of the recording, at the ticks with a new value.
+
+    `rms` and `largest` are in `unit`.
+    """
 
     output: str
     rms: float
@@ -40,10 +47,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out of a replay: a trajectory per tick with the inputs that were read.
+    """Result of a replay: a trajectory with one sample for each tick, inputs included.
 
-    `innovation_rms` is the root mean square of the one-step innovation per measured input, over
-    the ticks that had a new value while an observer was active.
+    `innovation_rms` is the root mean square of the one-step innovation by measured input, over the
+    ticks with a new value at which an observer was active.
     """
 
     trajectory: Trajectory
@@ -52,9 +59,10 @@ class Replay:
 
 
 def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str], list[str]]:
-    """Return the columns of a map that an automaton reads or compares, and those left out.
+    """Return the columns of a map that an automaton reads or compares, and the names left out.
 
-    Raises SpecError: an input without a column, a wrong dimension, an unknown output.
+    Raises SpecError for an input without a column, a wrong dimension, an unknown output or a
+    `linear` input column.
     """
     problems = Problems()
     used, left_out = pair_columns(automaton, mapping, problems)
@@ -76,9 +84,12 @@ def replay(
     build: Callable[[Program], Stepper] = Interpreter,
     on_tick: Callable[[Stepper], None] | None = None,
 ) -> Replay:
-    """Tick through a recording: inputs held, a channel without a new value has innovation 0.
+    """Replay a recording through a sampled automaton.
 
-    The first tick is where every input has had a value; tick k is k periods later.
+    Tick 0 is at the first time at which every input column has a value; tick k is k periods later.
+    An input keeps its value until the next stamp; without a new value its innovation is 0. `build`
+    creates the stepper; `on_tick` is called after each tick. Raises ValueError for a continuous
+    Program, and SpecError if the number of ticks is not in 1 to `MAX_TICKS`.
     """
     if program.period is None:
         raise ValueError(f"{program.name} is continuous: only a sampled automaton is replayed")
@@ -92,15 +103,16 @@ def replay(
         problems.error("range", mapping.span, label)
         raise SpecError(problems.reported)
     _set_constants(automaton, program, mapping, stepper)
-    keep = _run_ticks(program, stepper, feeds, start, count, on_tick)
+    recorder = _run_ticks(program, stepper, feeds, start, count, on_tick)
     word = stepper.get("memory.faults") if program.faults else 0
     faults = fault_names(automaton.name, program, word)
-    trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
-    compared = [c for c in recording.channels.values() if c.column.compare is not None]
-    found = [
-        _compare_output(channel, trajectory, start, program, recording) for channel in compared
+    trajectory = dataclasses.replace(recorder.trajectory(automaton.name), faults=faults)
+    compared_channels = [c for c in recording.channels.values() if c.column.compare is not None]
+    comparisons = [
+        _compare_output(channel, trajectory, start, program, recording)
+        for channel in compared_channels
     ]
-    return Replay(trajectory, keep.innovation_rms(), tuple(one for one in found if one))
+    return Replay(trajectory, recorder.innovation_rms(), tuple(c for c in comparisons if c))
 
 
 def _run_ticks(
@@ -111,23 +123,26 @@ def _run_ticks(
     count: int,
     on_tick: Callable[[Stepper], None] | None,
 ) -> _TickRecorder:
-    """Tick `count` times from `start` [s]: channels are latched, then the step runs."""
+    """Execute `count` ticks from `start` [s] and return the recorded rows.
+
+    Each tick latches the channels and runs the block `step`.
+    """
     assert program.period is not None
     cursors = [_ChannelCursor(channel, program) for channel in channels]
-    keep = _TickRecorder(program, [cursor.target for cursor in cursors])
+    recorder = _TickRecorder(program, [cursor.target for cursor in cursors])
     for tick in range(count):
         time = start + tick * program.period
         for cursor in cursors:
             cursor.advance(time, stepper)
         stepper.run("step")
-        keep.record(time, stepper)
+        recorder.record(time, stepper)
         if on_tick:
             on_tick(stepper)
-    return keep
+    return recorder
 
 
 class _ChannelCursor:
-    """A channel and how far it has been read."""
+    """Channel of a recording with the position up to which it is read."""
 
     def __init__(self, channel: Channel, program: Program) -> None:
         self.channel = channel
@@ -139,7 +154,10 @@ class _ChannelCursor:
         self.truth = kinds[self.target] == "truth"
 
     def advance(self, time: Fraction, stepper: Stepper) -> None:
-        """Latch the latest value with a stamp up to `time`, and say whether it is new."""
+        """Set the input to the latest value with a stamp up to `time` [s].
+
+        The flag of the input, if it has one, tells whether the value is new since the last call.
+        """
         times, position = self.channel.times, self.position
         while position < len(times) and times[position] <= time:
             position += 1
@@ -155,6 +173,7 @@ class _ChannelCursor:
 def _set_constants(
     automaton: Automaton, program: Program, mapping: RecordingMap, stepper: Stepper
 ) -> None:
+    """Set the inputs to their defaults, then to the constants of the map."""
     for name, value in program.defaults.items():
         stepper.set(f"input.{name}", value)
     for name, (number, _) in mapping.constants.items():
@@ -163,7 +182,7 @@ def _set_constants(
 
 
 class _TickRecorder:
-    """Rows of what each tick gave."""
+    """Recorder of inputs, outputs, modes, events and innovations of each tick."""
 
     def __init__(self, program: Program, input_names: Sequence[str]) -> None:
         self.program = program
@@ -187,6 +206,10 @@ class _TickRecorder:
         self.mode: int | None = None
 
     def record(self, time: Fraction, stepper: Stepper) -> None:
+        """Append the row of a tick and its transitions.
+
+        Innovations count if the mode before the tick has an observer and the measured input is new.
+        """
         self.times.append(time)
         self.rows.append(tuple([stepper.get(source) for source in self.names.values()]))
         if self.mode in self.observing:
@@ -202,6 +225,7 @@ class _TickRecorder:
         self.mode = stepper.get("memory.mode")
 
     def innovation_rms(self) -> dict[str, float]:
+        """Return the RMS innovation of each measured input that had a new value."""
         return {
             name.partition(".")[2]: math.sqrt(self.squares[name] / self.counts[name])
             for name in self.innovations
@@ -209,6 +233,7 @@ class _TickRecorder:
         }
 
     def trajectory(self, name: str) -> Trajectory:
+        """Return the recorded rows and events as a trajectory."""
         columns = list(zip(*self.rows, strict=True))
         signals: dict[str, SignalArray] = {}
         for (key, kind), values in zip(self.kinds.items(), columns, strict=True):
@@ -230,7 +255,10 @@ def _compare_output(
     program: Program,
     recording: Recording,
 ) -> Comparison | None:
-    """Compare an output with a column at the ticks in which it has a new value to use, if any."""
+    """Return the comparison of an output with a column; None if no value of the column is used.
+
+    A value is compared with the output of the first tick at or after its stamp [s].
+    """
     assert program.period is not None and channel.column.compare is not None
     output = trajectory.signals[channel.column.compare]
     differences = []

@@ -1,4 +1,4 @@
-"""Sensing: a sensor as a small sampled automaton - lag, delay, noise, quantisation, sample."""
+"""Sensors: lag, delay, noise, quantisation and sampling of a signal (rule 19)."""
 
 from __future__ import annotations
 
@@ -15,32 +15,36 @@ from language.model.system import Sensor
 from language.numerics.evaluate import apply_function
 
 NOISE_CHUNK = 1024
-"""Noise numbers drawn at once; the stream does not depend on it."""
+"""Number of noise values drawn at once; the stream does not depend on it."""
 
 
 @lru_cache(maxsize=1024)
 def _decay(exponent: float) -> float:
-    """Return e^-exponent by the language's own function: the same bits on every machine."""
+    """Return e^-exponent by the exponential function of the language.
+
+    It has the same bits on every machine.
+    """
     return float(apply_function("exp", [-exponent]))
 
 
 class FirstOrderLag:
-    """A lag of first order, exact for an input that is linear between the points it is told.
+    """First-order lag L y' = u - y, exact for an input that is linear between the given points.
 
-    L y' = u - y. With u = u0 + r s: y(h) = u(h) - r L + (y0 - u0 + r L) e^(-h / L).
+    With u = u0 + r s: y(h) = u(h) - r L + (y0 - u0 + r L) e^(-h / L).
     """
 
     def __init__(self, lag: Fraction) -> None:
-        """Take the time constant [s]; 0: no lag."""
+        """Take the time constant L [s]; 0 means no lag."""
         self._lag = float(lag)
         self._time: Fraction | None = None
         self._input = 0.0
         self._value = 0.0
 
     def advance(self, time: Fraction, value: float) -> None:
-        """Carry the lag on to a time with the input there; at the same time the input jumps.
+        """Advance the lag to a time [s] at which the input has a value.
 
-        At the first time the lag is settled.
+        The first call sets the output to the input. A second call at the same time is a step of the
+        input.
         """
         if self._time is None:
             self._value = value
@@ -49,7 +53,10 @@ class FirstOrderLag:
         self._time, self._input = time, value
 
     def evaluate(self, time: Fraction, value: float) -> float:
-        """Return what the lag gives at a time with the input there, without moving it."""
+        """Return the output at a time [s] for a value of the input there; the lag is not advanced.
+
+        A time that is not after the last one gives the present output.
+        """
         if self._lag == 0.0:
             return value
         if self._time is None or time <= self._time:
@@ -60,10 +67,11 @@ class FirstOrderLag:
 
 
 def noise_stream(seed: int, name: str) -> Iterator[float]:
-    """Yield normal numbers with variance 1: a stream per sensor, whatever else is simulated.
+    """Yield standard normal numbers of a sensor.
 
-    Philox 4x64 (Salmon and others, Parallel random numbers: as easy as 1, 2, 3, SC 2011), keyed
-    by the seed and the first 8 bytes of the SHA-256 of the sensor's name.
+    The stream depends on the seed and the name of the sensor only. Philox 4x64 (Salmon and others,
+    Parallel random numbers: as easy as 1, 2, 3, SC 2011), keyed by the seed and the first 8 bytes
+    of the SHA-256 of the name.
     """
     digest = hashlib.sha256(name.encode()).digest()
     key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
@@ -73,7 +81,7 @@ def noise_stream(seed: int, name: str) -> Iterator[float]:
 
 
 class SensorRun:
-    """A sensor over time. `value` is its latest sample, `count` how many there were."""
+    """State of a sensor in a run: `value` is its latest sample, `count` the number of samples."""
 
     def __init__(self, sensor: Sensor, seed: int) -> None:
         """Take the sensor and the seed of the scenario."""
@@ -81,41 +89,45 @@ class SensorRun:
         self.lag = FirstOrderLag(sensor.lag)
         self.value = 0.0
         self.count = 0
-        self._on_the_way: deque[float] = deque()
+        self._in_transit: deque[float] = deque()
         self._first = 0.0
         self._sd = float(sensor.noise)
         self._quantum = float(sensor.quantum)
         self._noise = noise_stream(seed, sensor.name)
 
     def start(self, measured: float) -> None:
-        """Begin at time 0: until its first sample a sensor gives the first value, not new."""
+        """Set the value before the first sample, from the measured signal at time 0."""
         self.lag.advance(Fraction(0), measured)
         self._first = measured
         self.value = self._quantise(measured)
 
     def capture(self, time: Fraction, measured: float) -> None:
-        """Keep what will arrive one delay later."""
-        self._on_the_way.append(self.lag.evaluate(time, measured))
+        """Store the lagged signal, which arrives one delay later."""
+        self._in_transit.append(self.lag.evaluate(time, measured))
 
     def sample(self, time: Fraction, measured: float) -> None:
-        """Take a sample: what was captured one delay ago, or what is there now."""
+        """Take a sample [SI] at a time [s], with noise and quantisation.
+
+        A sensor with a delay takes the value captured one delay ago, or the initial one before
+        that.
+        """
         if not self.sensor.delay:
             reading = self.lag.evaluate(time, measured)
         elif time < self.sensor.delay:
             reading = self._first
         else:
-            reading = self._on_the_way.popleft()
+            reading = self._in_transit.popleft()
         if self._sd:
             reading += self._sd * next(self._noise)
         self.value = self._quantise(reading)
         self.count += 1
 
     def evaluate(self, time: Fraction, measured: float) -> float:
-        """Return what a sensor without `sample` gives at a time."""
+        """Return the lagged and quantised signal of a sensor without `sample`."""
         return self._quantise(self.lag.evaluate(time, measured))
 
     def _quantise(self, value: float) -> float:
-        """floor(x / q + 1/2) * q (rule 19); what is not finite stays as it is."""
+        """Return floor(x / q + 1/2) * q (rule 19); values that are not finite remain unchanged."""
         if not self._quantum or not math.isfinite(value):
             return value
         return math.floor(value / self._quantum + 0.5) * self._quantum

@@ -1,4 +1,4 @@
-"""Signals: what every wire of a system carries - inputs, outputs, sensors, delayed lines."""
+"""Signal values: present values of the inputs, outputs, sensors and delayed signals of a system."""
 
 from __future__ import annotations
 
@@ -22,34 +22,43 @@ from language.model.declaration import Formula
 from language.model.system import Connection, DelayedSignal, Scenario, System
 
 ReadSignal = Callable[[str], Any]
+"""Function that returns the value of a signal by its name."""
 
 
 class DelayLine:
-    """A delayed signal: exact for an input of the system, else the values that were put in."""
+    """Delayed signal of a system.
+
+    The delay of a system input is exact, because its stimulus is known at all times. For other
+    signals the stored values are used.
+    """
 
     def __init__(self, line: DelayedSignal, input_signal: InputSignal | None) -> None:
-        """Take the line and, where it reads an input of the system, that input's course."""
+        """Take the delayed signal and, if its source is a system input, that stimulus."""
         self.line = line
         self.course = input_signal
-        self._kept: deque[tuple[Fraction, Any]] = deque()
+        self._stored: deque[tuple[Fraction, Any]] = deque()
 
     def push(self, time: Fraction, value: Any) -> None:
-        """Keep the value that the signal has from a time on."""
-        self._kept.append((time, value))
+        """Store the value that the source has from a time [s] on."""
+        self._stored.append((time, value))
 
     def at(self, time: Fraction, since: Fraction | None = None) -> Any:
-        """Return the signal as it was one delay ago; before that, as it was at the start."""
+        """Return the value of the source one delay before a time; earlier, its value at the start.
+
+        `since` is the start of the present step: an input keeps the piece of its stimulus that is
+        active then. Stored values that are no longer needed are removed.
+        """
         delayed = time - self.line.delay
         if self.course:
             delayed_since = None if since is None else max(since - self.line.delay, Fraction(0))
             return self.course.at(max(delayed, Fraction(0)), delayed_since)
-        while len(self._kept) > 1 and self._kept[1][0] <= delayed:
-            self._kept.popleft()
-        return self._kept[0][1]
+        while len(self._stored) > 1 and self._stored[1][0] <= delayed:
+            self._stored.popleft()
+        return self._stored[0][1]
 
 
 class Signals:
-    """The value of every signal at one instant; `time` is that instant [s]."""
+    """Values of all signals at the instant `time` [s]."""
 
     def __init__(
         self,
@@ -58,7 +67,7 @@ class Signals:
         programs: Mapping[str, Program],
         steppers: Mapping[str, Stepper],
     ) -> None:
-        """Take the system, a resolved scenario and what runs the instances."""
+        """Take the system, a resolved scenario, and the Programs and steppers of the instances."""
         formulas = wire_formulas(system, scenario)
         self._reads = {
             key: tuple(dict.fromkeys(name.path for name in names(formula.tree)))
@@ -89,12 +98,15 @@ class Signals:
         self.read_inputs(self.time)
 
     def read_inputs(self, time: Fraction) -> None:
-        """Give every input of the system its value at an instant."""
+        """Set the instant and evaluate every input of the system there."""
         self.time = time
         self._inputs = {name: course.at(time) for name, course in self.courses.items()}
 
     def current_value(self, name: str) -> Any:
-        """Return what a signal is now; a sensor gives its latest sample."""
+        """Return the present value of a signal.
+
+        A sampled sensor returns its latest sample; a sensor without `sample` is evaluated.
+        """
         if name in self._outputs:
             stepper, wire = self._outputs[name]
             return stepper.get(wire.source)
@@ -108,14 +120,21 @@ class Signals:
         return sensor.value
 
     def varies(self, name: str) -> bool:
-        """Tell whether a signal changes between the instants."""
+        """Return whether a signal changes between instants.
+
+        Only inputs, and delayed inputs, with a varying stimulus do.
+        """
         course = self.courses.get(name)
         if course is None and name in self.lines:
             course = self.lines[name].course
         return course is not None and course.varies
 
     def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
-        """Return what reads signals at a time of the step that began at `since`."""
+        """Return a reader of signals at a time [s] within the step that began at `since`.
+
+        Inputs and delayed inputs are evaluated at that time; other signals have their present
+        values.
+        """
 
         def read(name: str) -> Any:
             course = self.courses.get(name)
@@ -127,7 +146,10 @@ class Signals:
         return read
 
     def evaluate_connection(self, connection: Connection, read: ReadSignal | None = None) -> Any:
-        """Return the value that a connection gives."""
+        """Return the value of a connection: a signal, an expression or a constant.
+
+        `read` reads signals; by default their present values.
+        """
         source, read = connection.source, read or self.current_value
         if isinstance(source, str):
             return read(source)
@@ -136,11 +158,12 @@ class Signals:
         return source.numerator / source.denominator
 
     def evaluate_formula(self, block: str, read: ReadSignal) -> Any:
-        """Return the value of an expression of the wires."""
+        """Return the value of an expression block of the wires with the signals that it reads."""
         for name in self._reads[block]:
             self._wires.set(f"signal.{name}", read(name))
         self._wires.run(block)
         return self._wires.get(WIRE_RESULT)
 
     def _evaluate_piece(self, block: str, time: float) -> float:
+        """Return the value of a formula piece of a stimulus at a time [s]."""
         return float(self.evaluate_formula(block, lambda _: time))

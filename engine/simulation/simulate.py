@@ -1,4 +1,8 @@
-"""Simulate: a system through a scenario - continuous flow, events, ticks, one instant at a time."""
+"""Simulation: executes a system through a scenario, instant by instant.
+
+Between instants the continuous instances flow. At an instant, inputs take their new values, enabled
+transitions fire, and sampled instances and sensors execute in the order of the system (rule 11a).
+"""
 
 from __future__ import annotations
 
@@ -27,9 +31,11 @@ from language.ir.program import Program
 from language.model.system import Scenario, System
 
 BuildStepper = Callable[[Program], Stepper]
+"""Function that creates the stepper of a Program."""
 TickCallback = Callable[[str, Program, Stepper], None]
+"""Function that is called with the name, Program and stepper of an instance after a tick."""
 CONVERTER_OF_TYPE: Mapping[str, Callable[[Any], Any]] = {"real": float, "truth": bool, "whole": int}
-"""What an input of a type makes of a number."""
+"""Conversion of a number to the value of an input, by type."""
 
 
 def simulate(
@@ -41,16 +47,16 @@ def simulate(
 ) -> Trajectory:
     """Return the trajectory of a system through a scenario.
 
-    `build` makes the steppers (the interpreter, or a compiled one with the same protocol);
-    `on_tick` is called after each tick of a sampled instance, and after each major step of a
-    continuous one until something outside happens between two of them; `programs` are those of the
-    instances where they are made already. Raises SpecError for what is wrong with a recording.
+    `build` creates the steppers: the interpreter, or an executor with the same protocol. `on_tick`
+    is called after each tick of a sampled instance, and after each major step of a continuous
+    instance until an instant lies between two major steps. `programs` are the Programs of the
+    instances if they exist already. Raises SpecError for mistakes in a recording.
     """
     return _Simulation(system, resolve_recording(system, scenario), build, on_tick, programs).run()
 
 
 class _Simulation:
-    """The instances of a system and the instants at which something happens."""
+    """State of a simulation: steppers, signals, schedule and recorded results."""
 
     def __init__(
         self,
@@ -62,41 +68,47 @@ class _Simulation:
     ) -> None:
         self.system = system
         self.scenario = scenario
-        self.ticked = on_tick
+        self.on_tick = on_tick
         self.programs = dict(programs or programs_of(system, scenario))
         self.schedule = Schedule(system, scenario, self.programs)
         self.steppers = {name: build(program) for name, program in self.programs.items()}
         self.signals = Signals(system, scenario, self.programs, self.steppers)
         self.rows = RowRecorder(recorded_columns(system, scenario, self.programs))
         self.events: list[Event] = []
-        self.feeding = InputWiring(system, self.programs, self.steppers, self.signals)
-        self.left: set[tuple[str, str]] = set()
+        self.wiring = InputWiring(system, self.programs, self.steppers, self.signals)
+        self.reported_ranges: set[tuple[str, str]] = set()
         self.invariants = {
             name: InvariantMonitor(name, program, self.steppers[name], self.events.append)
             for name, program in self.programs.items()
         }
-        self.words: dict[str, int] = {}
-        self.around: dict[str, SystemEnvironment] = {}
+        self.fault_words: dict[str, int] = {}
+        self.environments: dict[str, SystemEnvironment] = {}
         self.flows: dict[str, ContinuousRun] = {}
         for name, program in self.programs.items():
             if program.period is None:
                 self._add_continuous_run(name, program)
 
     def _add_continuous_run(self, name: str, program: Program) -> None:
+        """Create the environment and the event loop of a continuous instance."""
         stepper, log = self.steppers[name], self.events.append
-        around = SystemEnvironment(name, stepper, self.signals, self.feeding.wires[name], program)
-        self.around[name] = around
-        self.flows[name] = ContinuousRun(name, program, stepper, log, around)
-        if self.ticked:
+        wires = self.wiring.wires[name]
+        environment = SystemEnvironment(name, stepper, self.signals, wires, program)
+        self.environments[name] = environment
+        self.flows[name] = ContinuousRun(name, program, stepper, log, environment)
+        if self.on_tick:
             self.flows[name].on_step = partial(self._report_step, name)
 
     def _report_step(self, name: str) -> None:
+        """Call `on_tick` after a major step, unless an instant was between two major steps."""
         has_step = "step" in self.programs[name].blocks
-        if self.ticked and has_step and self.flows[name].off_step is None:
-            self.ticked(name, self.programs[name], self.steppers[name])
+        if self.on_tick and has_step and self.flows[name].off_step is None:
+            self.on_tick(name, self.programs[name], self.steppers[name])
 
     def run(self) -> Trajectory:
-        """Run to the horizon, or until something stops the run: what was done is kept."""
+        """Run to the horizon and return the trajectory.
+
+        If the simulation stops earlier, the trajectory has all results until then and the reason.
+        """
         stopped = None
         rows = iter(self.schedule.rows)
         row = next(rows)
@@ -117,6 +129,7 @@ class _Simulation:
         return self._build_trajectory(stopped)
 
     def _start(self) -> None:
+        """Set inputs, defaults and delayed signals, and start the continuous instances."""
         for name, program in self.programs.items():
             stepper = self.steppers[name]
             for variable in program.inputs:
@@ -130,11 +143,11 @@ class _Simulation:
             if line.course is None:
                 line.push(Fraction(0), self.signals.current_value(line.line.source))
         for name, flow in self.flows.items():
-            self.feeding.set_inputs(name, Fraction(0))
+            self.wiring.set_inputs(name, Fraction(0))
             flow.start()
 
     def _flow_to(self, time: Fraction, row_times: Sequence[Fraction]) -> None:
-        """Flow all continuous instances up to an instant, and keep the rows before it."""
+        """Advance all continuous instances to an instant [s] and record the rows before it."""
         try:
             for flow in self.flows.values():
                 flow.flow_to(time, row_times)
@@ -142,9 +155,9 @@ class _Simulation:
             self._record_rows(row_times)
 
     def _record_rows(self, row_times: Sequence[Fraction]) -> None:
-        """Keep the rows that every continuous instance has reached."""
-        environments = list(self.around.values())
-        reached = min((len(around.looked) for around in environments), default=len(row_times))
+        """Record the rows that every continuous instance has reached."""
+        environments = list(self.environments.values())
+        reached = min((len(each.looked) for each in environments), default=len(row_times))
         pick_row = (
             self.rows.make_row_picker(environments[0].names) if len(environments) == 1 else None
         )
@@ -153,19 +166,24 @@ class _Simulation:
             reached = 0
         for number, row in enumerate(row_times[:reached]):
             values: dict[str, Any] = {}
-            for around in environments:
-                values.update(zip(around.names, around.looked[number], strict=True))
+            for environment in environments:
+                values.update(zip(environment.names, environment.looked[number], strict=True))
             self.rows.add(
                 row, partial(self._value_at_row, row, values), self.signals.evaluate_formula
             )
-        for around in environments:
-            around.looked.clear()
+        for environment in environments:
+            environment.looked.clear()
 
     def _value_at_row(self, row: Fraction, values: Mapping[str, Any], name: str) -> Any:
+        """Return a signal at a row [s]: the sampled value, else the value of its source then."""
         return values[name] if name in values else self.signals.reader_at(row, row)(name)
 
     def _process_instant(self, time: Fraction) -> None:
-        """Flow has ended: inputs take their new values, then jumps, then ticks in their order."""
+        """Execute an instant [s]: inputs, jumps, then samples and ticks in order, then jumps again.
+
+        New calibrations of sampled instances apply before, those of continuous instances after.
+        Delayed signals are captured last.
+        """
         self.signals.read_inputs(time)
         self._apply_calibrations(time, continuous=False)
         for name in self.flows:
@@ -188,7 +206,10 @@ class _Simulation:
             self._capture(name, time)
 
     def _apply_calibrations(self, time: Fraction, continuous: bool) -> None:
-        """A new calibration holds from this tick or, if continuous, from the next step on."""
+        """Apply the calibrations of an instant to the continuous or to the sampled instances.
+
+        They are in effect from this tick or, if continuous, from the next step on.
+        """
         for page in self.scenario.calibrations:
             if page.time == time:
                 for name, program in self.programs.items():
@@ -197,12 +218,13 @@ class _Simulation:
                         calibrate(self.steppers[name], program, values)
 
     def _sample(self, name: str, time: Fraction) -> None:
+        """Sample a sensor and store the value in its delay lines."""
         run = self.signals.sensors[name]
         run.sample(time, self.signals.current_value(run.sensor.source))
         self._push_to_lines([name], time)
 
     def _capture(self, name: str, time: Fraction) -> None:
-        """Keep a signal that arrives later, as it is when everything at an instant has happened."""
+        """Capture the source of a delayed sensor or signal after all else at an instant."""
         if name in self.signals.sensors:
             run = self.signals.sensors[name]
             run.capture(time, self.signals.current_value(run.sensor.source))
@@ -211,13 +233,18 @@ class _Simulation:
             line.push(time, self.signals.current_value(line.line.source))
 
     def _push_to_lines(self, sources: Sequence[str], time: Fraction) -> None:
+        """Store the present values of some sources in their delay lines."""
         for line in self.signals.lines.values():
             if line.line.source in sources:
                 line.push(time, self.signals.current_value(line.line.source))
 
     def _update_flow(self, name: str, time: Fraction) -> None:
-        """An input that changed is an event: guards are read again (rule 11)."""
-        changed, flow = self.feeding.set_inputs(name, time), self.flows[name]
+        """Set the inputs of a continuous instance; a change is an event (rule 11a).
+
+        If an input changed or the instance is not settled, enabled transitions fire; otherwise the
+        equations are evaluated.
+        """
+        changed, flow = self.wiring.set_inputs(name, time), self.flows[name]
         if changed and time == 0:
             flow.start()
         if changed or not flow.is_settled:
@@ -226,15 +253,23 @@ class _Simulation:
             self.steppers[name].run("equations")
 
     def _reads_sampled_instance(self, name: str) -> bool:
-        """Tell whether an input reads a sampled instance: its first value is that of tick 0."""
-        reads = [read for connection in self.feeding.wires[name] for read in connection.reads]
+        """Return whether an input of an instance reads another instance.
+
+        Its first value is then that of tick 0.
+        """
+        reads = [read for connection in self.wiring.wires[name] for read in connection.reads]
         return any(read.partition(".")[0] in self.programs for read in reads)
 
     def _tick(self, name: str, time: Fraction) -> None:
+        """Execute a tick of a sampled instance and record its events.
+
+        Lags of sensors on its outputs are advanced before and after. Raises SimulationStopped if an
+        output is not finite.
+        """
         stepper, program = self.steppers[name], self.programs[name]
         sources = [f"{name}.{wire.name}" for wire in program.outputs]
-        self.feeding.set_inputs(name, time)
-        self.feeding.flag_new_inputs(name, self.schedule.samples)
+        self.wiring.set_inputs(name, time)
+        self.wiring.flag_new_inputs(name, self.schedule.samples)
         self._advance_lags(sources, time)
         stepper.run("step")
         self._advance_lags(sources, time)
@@ -245,36 +280,38 @@ class _Simulation:
         ]
         self._report_range_violations(name, time)
         self.invariants[name].check(time)
-        if self.ticked:
-            self.ticked(name, program, stepper)
+        if self.on_tick:
+            self.on_tick(name, program, stepper)
         self._require_finite(name, time)
 
     def _report_range_violations(self, name: str, time: Fraction) -> None:
-        """Report each signal that was held in its range once, with time and mode (rule 18)."""
+        """Record an event for each signal at its first saturation in the run (rule 18)."""
         stepper, program = self.steppers[name], self.programs[name]
-        self.words[name] = self.words.get(name, 0) | stepper.get("memory.faults")
+        self.fault_words[name] = self.fault_words.get(name, 0) | stepper.get("memory.faults")
         for signal in stepper.pop_range_violations():
-            if (name, signal) not in self.left:
-                self.left.add((name, signal))
+            if (name, signal) not in self.reported_ranges:
+                self.reported_ranges.add((name, signal))
                 mode = program.mode_name(stepper.get("memory.mode"))
                 text = f"`{signal}` was held in its range"
                 self.events.append(range_event(float(time), name, signal, mode, text))
 
     def _advance_lags(self, sources: Sequence[str], time: Fraction) -> None:
+        """Advance the lags of the sensors on some signals to a time [s]."""
         for run in self.signals.sensors.values():
             if run.sensor.lag and run.sensor.source in sources:
                 run.lag.advance(time, self.signals.current_value(run.sensor.source))
 
     def _require_finite(self, name: str, time: Fraction) -> None:
+        """Raise SimulationStopped if an output is infinite or NaN."""
         stepper, program = self.steppers[name], self.programs[name]
         for wire in program.outputs:
             value = stepper.get(wire.source)
             if isinstance(value, float) and not math.isfinite(value):
-                raise SimulationStopped(
-                    f"{describe_instant(name, program, stepper, time)}: output `{wire.name}` is {value}"
-                )
+                place = describe_instant(name, program, stepper, time)
+                raise SimulationStopped(f"{place}: output `{wire.name}` is {value}")
 
     def _build_trajectory(self, stopped: str | None) -> Trajectory:
+        """Return the recorded rows and events as a trajectory."""
         return Trajectory(
             name=self.scenario.name,
             times=self.rows.seconds(),
@@ -291,6 +328,6 @@ class _Simulation:
                 fault
                 for name, program in self.programs.items()
                 if program.faults
-                for fault in fault_names(name, program, self.words.get(name, 0))
+                for fault in fault_names(name, program, self.fault_words.get(name, 0))
             ),
         )

@@ -1,4 +1,4 @@
-"""Stimulus: the inputs of a scenario as functions of exact time, recordings resolved."""
+"""Stimuli: the inputs of a scenario as functions of exact time; recordings become stimuli."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from language.model.system import Scenario, Stimulus, StimulusPiece, System
 from language.text.diagnostic import Problems, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
-"""The value of a piece's formula, by the name of its block, at a time [s]."""
+"""Function that returns the value of a formula piece, by its block and the time [s]."""
 
 
 class InputSignal:
-    """An input over time: right-continuous; inside a step, the piece of the step's start."""
+    """Input as a right-continuous function of time.
+
+    Inside a step the piece at the start of the step is used.
+    """
 
     def __init__(self, name: str, stimulus: Stimulus, formulas: EvaluateFormula) -> None:
-        """Take the input's name, its pieces, and what evaluates formulas."""
+        """Take the name of the input, its stimulus, and an evaluator of its formulas."""
         self.name = name
         self.pieces = stimulus.pieces
         self.truth = stimulus.is_bool
@@ -31,7 +34,11 @@ class InputSignal:
         self._latest = 0
 
     def at(self, time: Fraction, since: Fraction | None = None) -> float | bool:
-        """Return the value at a time; `since` picks the piece active then: the limit from below."""
+        """Return the value at a time [s].
+
+        `since` selects the piece that is active at that earlier time, which gives the limit from
+        below at the end of a step.
+        """
         piece_time = time if since is None else since
         number = self._active_piece(piece_time)
         piece = self.pieces[number]
@@ -43,27 +50,28 @@ class InputSignal:
         return bool(exact) if self.truth else exact.numerator / exact.denominator
 
     def constant_value(self, piece: StimulusPiece) -> float | bool:
-        """Return the value of a piece that does not vary."""
+        """Return the value of a piece without slope and formula."""
         exact = piece.value
         return bool(exact) if self.truth else exact.numerator / exact.denominator
 
     def _active_piece(self, time: Fraction) -> int:
-        """Return the place of the piece that is active at a time: most often that of before."""
+        """Return the index of the piece at a time [s]; the previous one is tried first."""
         starts, latest = self.starts, self._latest
         if not starts[latest] <= time or (latest + 1 < len(starts) and starts[latest + 1] <= time):
             self._latest = max(0, bisect_right(starts, time) - 1)
         return self._latest
 
     def piece_starts(self) -> list[Fraction]:
-        """Return when pieces start, after time 0."""
+        """Return the times [s] above 0 at which pieces start."""
         return [start for start in self.starts if start > 0]
 
 
 def resolve_recording(system: System, scenario: Scenario) -> Scenario:
-    """Return a scenario in which a recording is replaced by the inputs that it gives.
+    """Return a scenario in which the inputs of a recording are stimuli.
 
-    Time 0 is the first instant at which every input that the recording gives has had a value.
-    Raises SpecError for what is wrong with the file.
+    Unchanged without a recording. Time 0 is the first time at which every input from the recording
+    has a value. Initial values and the horizon are taken from the recording if they refer to it or
+    are absent. Raises SpecError for mistakes in the file.
     """
     use = scenario.recording
     if use is None:
@@ -94,7 +102,7 @@ def resolve_recording(system: System, scenario: Scenario) -> Scenario:
 
 
 def stimulus_of(channel: Channel, start: Fraction, truth: bool = False) -> Stimulus:
-    """Return a channel as an input from `start` [s] on, held or linear as its column says."""
+    """Return a channel as a stimulus from `start` [s] on, held or linear as the map says."""
     values = [Fraction(value) for value in channel.values]
     points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
     pieces = linear_pieces(points) if channel.column.hold == "linear" else constant_pieces(points)
@@ -103,6 +111,6 @@ def stimulus_of(channel: Channel, start: Fraction, truth: bool = False) -> Stimu
 
 
 def _value_at_start(recording: Recording, column: str, start: Fraction) -> Fraction:
-    """Return the value of a column at the start: the latest one until then, or the first."""
+    """Return the latest value of a column up to `start` [s]; its first value if there is none."""
     channel = recording.channels[column]
     return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])

@@ -1,4 +1,4 @@
-"""Surroundings: what a continuous instance reads from the wires, and who watches its outputs."""
+"""System environment: connects a continuous instance to the signals of its system."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from language.model.system import Connection
 
 
 class SystemEnvironment:
-    """The wires around one continuous instance (see engine/execution/event_loop.py, Around)."""
+    """Environment of one continuous instance (engine/execution/environment_protocol.py).
+
+    It sets inputs that vary within a step, advances the lags of sensors, and records outputs for
+    rows.
+    """
 
     def __init__(
         self,
@@ -25,7 +29,7 @@ class SystemEnvironment:
     ) -> None:
         """Take the instance with its Program, and the connections of its inputs.
 
-        `looked` has the values of `names` at each look.
+        `looked` collects the values of `names` at each sampled time.
         """
         self.name = name
         self.looked: list[tuple[Any, ...]] = []
@@ -44,7 +48,10 @@ class SystemEnvironment:
         self.has_constant_inputs = not self._varying
 
     def interpolate_inputs(self, start: Fraction, stop: Fraction) -> None:
-        """Lay a parabola through an input at the start, the middle and the end of a flow."""
+        """Set the varying inputs to parabolas over the flow from `start` to `stop` [s].
+
+        A parabola interpolates the input at the start, the middle and the end of the flow.
+        """
         self._since = start
         h = float(stop - start)
         for connection in self._varying:
@@ -56,25 +63,29 @@ class SystemEnvironment:
             self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
 
     def set_inputs(self, time: Fraction) -> None:
-        """Set the inputs to what they are at a time of that flow: the limit from below."""
+        """Set the varying inputs to their values at a time [s] of the flow.
+
+        At a discontinuity the value is the limit from below.
+        """
         for connection in self._varying:
             name = f"input.{connection.target[1]}"
             self._stepper.set(name, self._input_function(connection)(time))
 
     def observe_boundary(self, time: Fraction) -> None:
-        """Carry the lags of sensors on to a time."""
+        """Advance the lags of sensors on the outputs of the instance to a time [s]."""
         for run in self._lagging:
             run.lag.advance(time, self._signals.current_value(run.sensor.source))
 
     def sample_outputs(self, time: Fraction) -> None:
-        """Keep the outputs, and the sensors that give their value whenever they are read."""
-        found = self._read()
+        """Append the outputs, and the values of sensors without `sample`, at a time [s]."""
+        values = self._read()
         for run in self._unsampled:
-            value = found[self._outputs.index(run.sensor.source)]
-            found = (*found, run.evaluate(time, value))
-        self.looked.append(found)
+            value = values[self._outputs.index(run.sensor.source)]
+            values = (*values, run.evaluate(time, value))
+        self.looked.append(values)
 
     def _input_function(self, connection: Connection) -> Callable[[Fraction], Any]:
+        """Return a function of time [s] that evaluates a connection within the present flow."""
         return lambda time: self._signals.evaluate_connection(
             connection, self._signals.reader_at(time, self._since)
         )
