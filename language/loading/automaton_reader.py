@@ -141,7 +141,10 @@ def _set_values(
         elif "derived" in entry.node.entries:
             label = f"`{name}` is derived: its value follows from others"
             problems.error(
-                "values", value.span, label, f"set what it follows from, given at {entry.span}"
+                "values",
+                value.span,
+                label,
+                f"set the parameters that it reads; it is given at {entry.span}",
             )
         else:
             parameters = _with_entry(

@@ -179,7 +179,7 @@ class _InstanceReader(Reader):
                 self.problems.error("form", reference.span, label)
         periods = [self._read_period(tree) for tree in (document.root, self.tree)]
         if periods[0] != periods[1]:
-            label = f"`{document.name}` has another period than what it is an instance in"
+            label = f"`{document.name}` has another period than the automaton around it"
             hint = "give both one period, or make them instances of a system"
             self.problems.error("form", reference.span, label, hint)
 
@@ -200,8 +200,8 @@ class _InstanceReader(Reader):
         for final in names.values():
             self._check_host_name(tree, final, entry)
         source = instance.tree.span.source
-        layer = Source(source.name, source.lines, f"instance {entry.key}", entry.span)
-        body = replace_source(instance.tree, layer)
+        overlay = Source(source.name, source.lines, f"instance {entry.key}", entry.span)
+        body = replace_source(instance.tree, overlay)
         assert isinstance(body, MappingNode)
         body = self._apply_values(body, options)
         inputs = self._input_expressions(body, options, entry)
@@ -247,7 +247,7 @@ class _InstanceReader(Reader):
                 label = f"there is no parameter `{value.key}`"
                 self.problems.error("name", value.span, label, suggest_name(value.key, parameters))
             elif "derived" in known.node.entries:
-                label = f"`{value.key}` is derived: set what it follows from"
+                label = f"`{value.key}` is derived: set the parameters that it reads"
                 self.problems.error("values", value.span, label)
             else:
                 overridden = override_parameter(known.node, value.node, self.problems)

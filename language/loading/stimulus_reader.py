@@ -32,6 +32,7 @@ from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
 
 FORMS = ("steps", "ramp", "chirp", "table", "pulses")
+"""Keys that give an input as a function of time; at most one is allowed."""
 INPUT_KEYS = ("start", *FORMS, "hold")
 DISCONTINUOUS = (Conditional, Relation, Logic, Not, BoolLiteral)
 """Nodes of expressions that make a formula of time discontinuous."""

@@ -201,7 +201,11 @@ class Region:
 
 @dataclass(frozen=True)
 class Element:
-    """A two-terminal part to which effects can be applied; `far` names what acts at its far end."""
+    """A two-terminal part to which effects can be applied.
+
+    `parts` are its quantities by key, such as `twist` and `torque`, and `far` are the names of the
+    loads at its far end.
+    """
 
     name: str
     kind: Literal["elastic", "inertia"]

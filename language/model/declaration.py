@@ -14,6 +14,7 @@ from language.typecheck.lookup_table import LookupTable
 from language.typecheck.types import TypeName
 
 Range = tuple[Fraction, Fraction]
+"""Lower and upper bound in SI."""
 
 ParameterKind = Literal["fixed", "tunable", "derived"]
 
@@ -129,6 +130,7 @@ class State:
 
 
 MICRO_STEP_LIMIT_FAULT = "micro_step_limit"
+"""The fault bit of a tick that reaches the bound of micro-steps (rule 7)."""
 
 BUILTIN_FAULTS = ("event_limit", MICRO_STEP_LIMIT_FAULT, "rewind_limit", "stale_calibration")
 """The fault bits that the product sets itself; a spec must not declare them."""

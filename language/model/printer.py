@@ -27,6 +27,7 @@ from language.text.diagnostic import Span
 
 INDENT = "  "
 SKIPPED_FIELDS = ("name", "key", "span")
+"""Fields that are not printed."""
 
 
 def format_model(automaton: Automaton) -> str:

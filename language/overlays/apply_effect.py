@@ -82,8 +82,8 @@ class _EffectApplier:
         self.tree = tree
         self.problems = problems
         source = application.effect.span.source
-        layer = Source(source.name, source.lines, application.layer_name, application.span)
-        body = replace_source(application.effect.body, layer)
+        overlay = Source(source.name, source.lines, application.layer_name, application.span)
+        body = replace_source(application.effect.body, overlay)
         assert isinstance(body, MappingNode)
         self.body = body
         self.private_names = self._choose_private_names()
@@ -342,7 +342,7 @@ class _EffectApplier:
                 label = f"`{self.application.effect.name}` has no parameter `{name}`"
                 self.problems.error("effect", entry.span, label, suggest_name(name, own))
             elif "derived" in table.entries:
-                label = f"`{name}` is derived: set what it follows from"
+                label = f"`{name}` is derived: set the parameters that it reads"
                 self.problems.error("values", entry.span, label)
             elif isinstance(entry.node, ScalarNode):
                 overridden = set_parameter_value(table, entry.node)

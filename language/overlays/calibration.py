@@ -15,6 +15,7 @@ from language.text.node_edit import find_node, put_node
 CALIBRATION_KEYS = ("language", "calibration", "of", "from", "date", "parameters")
 VALUE_KEYS = ("value", "points", "std", "from", "date")
 DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
+"""A date in the form of ISO 8601."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def apply_calibration(
                 calibration, value, {**parameters, **instance_parameters}, problems
             )
         elif "derived" in parameters[name].entries:
-            label = f"`{name}` is derived: set what it follows from"
+            label = f"`{name}` is derived: set the parameters that it reads"
             problems.error("values", value.span, label)
         else:
             overridden = override_parameter(parameters[name], value.value, problems)

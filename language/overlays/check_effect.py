@@ -15,6 +15,7 @@ from language.text.node_edit import entries, format_inline, put_node, scalars_of
 from language.typecheck.function_calls import FUNCTION_NAMES, argument_count_error
 
 HOLE_PATTERN = re.compile(r"\$[A-Za-z]\w*")
+"""A hole in a key or expression of an effect."""
 KEY_HOLE_SECTIONS = ("terms", "equations", "redirect", "move")
 """Sections whose keys may be holes."""
 UNIT_SECTIONS = ("parameters", "states", "discrete")

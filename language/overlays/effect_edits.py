@@ -21,6 +21,7 @@ from language.text.formula_sites import AUTOMATON_SITES, KeyPath, map_formulas
 from language.text.node_edit import entries, find_node, put_node
 
 MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
+"""Sections at the root that contain modes."""
 
 PathPredicate = Callable[[KeyPath], bool]
 """Tells whether an edit applies to the expression at a key path."""

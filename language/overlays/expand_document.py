@@ -78,7 +78,7 @@ def apply_variant(
 
 def lineage(document: Document, project: Project) -> list[str]:
     """Return the names of a document and of the documents that it extends, the base last."""
-    return [layer.name for layer in _extension_chain(document, project)]
+    return [overlay.name for overlay in _extension_chain(document, project)]
 
 
 def _extension_chain(document: Document, project: Project) -> list[Document]:
@@ -91,7 +91,7 @@ def _extension_chain(document: Document, project: Project) -> list[Document]:
         extends = _base_name_of(chain[-1])
         base = project.read(project.path_of(extends.text, extends.span))
         chain.append(base)
-        names = [layer.name for layer in chain]
+        names = [overlay.name for overlay in chain]
         problems = Problems()
         if base.name in names[:-1]:
             cycle = " -> ".join(f"`{name}`" for name in names[names.index(base.name) :])
@@ -169,14 +169,14 @@ def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tup
 
 
 def _apply_effects_and_calibrations(
-    merged: Document, layer: Document, project: Project, problems: Problems
+    merged: Document, overlay: Document, project: Project, problems: Problems
 ) -> Document:
     """Return a document with the effects, then the calibrations, of one of its overlays.
 
-    `layer` is the document whose keys name them. Raises SpecError.
+    `overlay` is the document whose keys name them. Raises SpecError.
     """
-    merged = _apply_effects(merged, layer, project, problems)
-    node = layer.root.get("calibrations")
+    merged = _apply_effects(merged, overlay, project, problems)
+    node = overlay.root.get("calibrations")
     if node is None:
         return merged
     root = without_keys(merged.root, "calibrations")
@@ -184,7 +184,7 @@ def _apply_effects_and_calibrations(
     for name in names:
         document = project.read(project.path_of(name.text, name.span))
         calibration = read_calibration(document, problems)
-        known = [*lineage(layer, project), merged.name, *_model_names(root, project)]
+        known = [*lineage(overlay, project), merged.name, *_model_names(root, project)]
         if merged.kind == "automaton" and calibration.of.text in known:
             own, inner = parameters_of(root, project), instance_parameters_of(root, project)
             root = apply_calibration(root, calibration, own, inner, problems)
@@ -251,20 +251,20 @@ def _report_wrong_target(
 
 
 def _apply_effects(
-    merged: Document, layer: Document, project: Project, problems: Problems
+    merged: Document, overlay: Document, project: Project, problems: Problems
 ) -> Document:
     """Return a document with the effects of one of its overlays applied in their order.
 
     Raises SpecError; the problems of all effects are collected first.
     """
-    node = layer.root.get("effects")
+    node = overlay.root.get("effects")
     if node is None:
         return merged
     if merged.kind != "automaton" or not isinstance(node, MappingNode):
         label = f"`effects` apply to an automaton; `{merged.name}` is a {merged.kind}"
         if not isinstance(node, MappingNode):
             label = "`effects` is a mapping"
-        problems.error("form", layer.root.entries["effects"].span, label)
+        problems.error("form", overlay.root.entries["effects"].span, label)
         problems.raise_if_errors()
     root = without_keys(merged.root, "effects")
     for entry in entries(node):

@@ -90,7 +90,7 @@ def _check_internal(
     if not transition.internal:
         return
     if any(not source.contains(t.index) or t.index == source.index for t in targets):
-        label = f"an internal transition leads to what is inside `{source.path}`"
+        label = f"an internal transition leads to a mode inside `{source.path}`"
         problems.error("target", transition.span, label, "`to: []` where nothing is entered")
     elif targets and source.kind == "parallel":
         label = f"`{source.path}` has regions: no transition of its own is internal"

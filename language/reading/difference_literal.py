@@ -11,7 +11,9 @@ from language.text.diagnostic import Span
 from language.text.document import YamlNode
 
 LABEL = "a temperature in degC is a point, not a difference"
+"""The label of the problem of `read_difference`."""
 HINT = "write a difference in K"
+"""The hint of the problem of `read_difference`."""
 
 
 def read_difference(

@@ -12,6 +12,7 @@ from language.text.document import Entry, MappingNode, ScalarNode
 from language.typecheck.lookup_table import Axis, LookupTable
 
 TableRow = dict[Fraction, Fraction]
+"""The values of one axis (SI) by point (SI)."""
 
 
 class LookupTableReader(Reader):

@@ -29,11 +29,15 @@ KALMAN_KEYS = ("states", "gain", "covariance", "covariance_range")
 NOISE_KEYS = ("process_noise", "measurement_noise")
 RUN_KEYS = ("of", "method", "substeps", "events", "follow", "linearise")
 METHODS = ("euler", "midpoint", "rk4", "exact", "exponential")
+"""Methods of integration of a model run and of a continuous automaton."""
 COVARIANCE_OPTIONS = ("steady", "keep")
 MAX_SUBSTEPS = 100
+"""Largest number of steps of the method within a tick."""
 MAX_EVENTS = 100
+"""Largest number of located transitions within a tick."""
 
 FormulaMatrix = dict[str, dict[str, Formula]]
+"""The coefficients of a matrix by row and column name."""
 
 
 def read_observer(reader: Reader, node: YamlNode, key: str, model: Automaton | None) -> Observer:

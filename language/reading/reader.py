@@ -343,6 +343,7 @@ class Reader:
 
 
 Quantity = tuple[Fraction, Unit]
+"""A value in SI and the unit in which it is written."""
 
 
 def _literal_value(tree: SyntaxTree) -> tuple[Fraction, Unit] | None:

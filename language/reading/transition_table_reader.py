@@ -23,6 +23,7 @@ from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 TABLE_KEY = "transition_table"
 COLUMN_KEYS = tuple(key for key in (*TRANSITION_KEYS, *CHART_TRANSITION_KEYS) if key != "to")
 STAY = "stay"
+"""The content of a cell without a transition."""
 
 
 def expand_transition_tables(tree: MappingNode, problems: Problems) -> MappingNode:

@@ -10,6 +10,7 @@ from language.text.diagnostic import suggest_name
 from language.text.document import Entry, MappingNode
 
 MARKS: Mapping[str, bool | None] = {"T": True, "F": False, "-": None}
+"""The value of a condition that each mark requires; None for either value."""
 ELSE_ROW = "else"
 MARK_ALIASES: Mapping[str, str] = {
     **dict.fromkeys("TtYy1", "T"),
