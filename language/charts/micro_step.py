@@ -84,7 +84,7 @@ def chart_variables(context: ChartContext) -> list[Variable]:
     """Return the variables of a chart; `finalise_program` removes the unused ones."""
     found = [*selection_variables(context), *event_queue_variables(context.queue_capacity)]
     for node in context.chart.nodes[ROOT + 1 :]:
-        about = f"what `{node.path}` was left in"
+        about = f"mode in which `{node.path}` was left"
         found.append(Variable(history_ref(node).name, "whole", about=about))
         for verb, flag in (("left", exit_flag), ("entered", entry_flag)):
             about = f"`{node.path}` is {verb} in this micro-step"

@@ -88,16 +88,16 @@ def selection_variables(context: ChartContext) -> list[Variable]:
             Variable(
                 request_variable(name),
                 "whole",
-                about="transition that the region wishes for, 0: none",
+                about="transition that the region requests, 0: none",
             ),
             Variable(selected_variable(name), "whole", about="transition that it takes, 0: none"),
-            Variable(_span_first(region), "whole", about="first node of what its wish leaves"),
-            Variable(_span_last(region), "whole", about="last node of what its wish leaves"),
-            Variable(_is_resolved_variable(region), "truth", about="its wish was decided on"),
+            Variable(_span_first(region), "whole", about="first node that its request leaves"),
+            Variable(_span_last(region), "whole", about="last node that its request leaves"),
+            Variable(_is_resolved_variable(region), "truth", about="its request is resolved"),
         ]
     return [
         *found,
-        Variable("work.keeps", "truth", about="no transition that is taken leaves the same"),
+        Variable("work.keeps", "truth", about="no selected transition leaves the same node"),
         Variable(IS_FIRST_STEP.name, "truth", about="this is the first micro-step of the tick"),
         Variable(IS_STEP_LIMIT_REACHED.name, "truth", about="no further micro-step is allowed"),
     ]
@@ -292,6 +292,7 @@ def _spans_overlap(left: ChartNode, right: ChartNode) -> Expr:
     """Return the condition that two nonempty spans of nodes overlap."""
 
     def begins(inner: ChartNode, outer: ChartNode) -> Expr:
+        """Return the condition that the span of `inner` begins in that of `outer`."""
         low = Ref(_span_first(inner))
         after = Compare("<=", Ref(_span_first(outer)), low)
         return Binary("and", after, Compare("<=", low, Ref(_span_last(outer))))

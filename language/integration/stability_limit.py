@@ -93,6 +93,7 @@ def _stability_radius(method: str, direction: complex) -> float:
     growth = STABILITY_FUNCTIONS[method]
 
     def decays(z: float) -> bool:
+        """Return whether |R| stays within 1 at the distance z from 0."""
         return abs(growth(z * direction)) <= 1.0 + GROWTH_TOLERANCE
 
     low = 0.0

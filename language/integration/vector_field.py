@@ -117,7 +117,7 @@ def field_variables(field: VectorField) -> list[Variable]:
     found = []
     for state, thing in field.automaton.states.items():
         dimension = thing.unit.dimension
-        about = "at the point that is looked at"
+        about = "at the point of evaluation"
         found.append(Variable(f"work.at_{state}", "real", str(dimension), about=about))
         found.append(
             Variable(f"work.rate_{state}", "real", str(rate_dimension(dimension)), about=about)
@@ -283,6 +283,7 @@ def _lower_rates(field: VectorField, mode: Mode) -> Block:
     ops = lower_equations(mode, known, "work.at_", field.key_prefix, wanted)
 
     def rate_is(balance: Balance) -> Assign:
+        """Return the assignment of the rate of a balance."""
         target = f"work.rate_{balance.state}"
         return Assign(target, lower_rate(balance, known), field.key_prefix + balance.key)
 

@@ -31,7 +31,7 @@ def calibration_stamps(
     for name in sorted({name for constant in constants for name in constant.depends_on}):
         parameter = parameters[name]
         if parameter.items:
-            label = f"`{name}` enters what is solved when the spec is checked: it is not tunable"
+            label = f"`{name}` enters numbers that are solved at check time: it cannot be tunable"
             problems.error("table", automaton.parameters[name].span, label)
         else:
             stamp = f"solved.stamp_{name}"

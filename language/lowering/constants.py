@@ -153,6 +153,7 @@ def evaluate_exactly(formula: Formula, automaton: Automaton) -> Fraction:
     problems = Problems()
 
     def value(tree: SyntaxTree) -> Fraction:
+        """Return the exact value of a subtree; TypeError if it is not constant arithmetic."""
         match tree:
             case NumberLiteral(number, _, _):
                 return number

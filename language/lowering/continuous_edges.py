@@ -96,7 +96,7 @@ def level_variables(automaton: Automaton) -> list[Variable]:
         kind = edge_value_type(automaton, edge)
         about = f"level of an edge in `{edge.mode_key}` at the last instant, true on entry"
         if edge.is_change:
-            about = f"value looked at in `{edge.mode_key}` at the last instant"
+            about = f"value of an edge in `{edge.mode_key}` at the last instant"
             seen = f"there was such an instant in `{edge.mode_key}`"
             found.append(Variable(edge.armed_variable, "truth", about=seen))
             found.append(Variable(_is_watched_ref(edge).name, "truth"))

@@ -175,9 +175,9 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
         found.append(
             Variable(edge.armed_variable, "truth", about=f"{seen} seen in `{edge.mode_key}`")
         )
-        about = "what is looked at for an edge"
+        about = "level whose edge is detected"
         found.append(Variable(f"work.level_{edge.number}", kind, about=about))
-        found.append(Variable(f"work.edge_{edge.number}", "truth", about="that edge is now"))
+        found.append(Variable(f"work.edge_{edge.number}", "truth", about="edge in this tick"))
         if edge.is_change:
             about = f"value of the tick before in `{edge.mode_key}`"
             found.append(Variable(f"memory.last_{edge.number}", kind, about=about))

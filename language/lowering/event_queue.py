@@ -116,14 +116,8 @@ def event_condition(chart: Chart, transition: Transition) -> Expr | None:
 def event_queue_variables(capacity: int) -> list[Variable]:
     """Return the variables of the queue and of the current event."""
     found = [
-        Variable(
-            QUEUE_HEAD.name, "whole", about="place in the queue of the event that is heard next"
-        ),
-        Variable(
-            QUEUE_TAIL.name, "whole", about="place in the queue of the event that is raised next"
-        ),
-        Variable(
-            CURRENT_EVENT.name, "whole", about="event that is heard in this micro-step, 0: none"
-        ),
+        Variable(QUEUE_HEAD.name, "whole", about="place in the queue of the next event to process"),
+        Variable(QUEUE_TAIL.name, "whole", about="place in the queue of the next event to raise"),
+        Variable(CURRENT_EVENT.name, "whole", about="event of this micro-step, 0: none"),
     ]
     return [*found, Variable(QUEUE, "whole", size=max(capacity, 1), about="events that wait")]

@@ -270,6 +270,7 @@ def _lower_equation(mode: Mode, name: str, known: NameBindings, group: str, pref
     """
 
     def set_to(formula: Formula) -> Assign:
+        """Return the assignment of a formula to the equation."""
         value = lower_assigned_value(formula.tree, known, formula.is_integer)
         return Assign(f"{group}{name}", value, prefix + formula.key)
 

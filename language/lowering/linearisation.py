@@ -72,7 +72,8 @@ class LinearisationPoint:
         """
         known = constant_bindings(self.automaton)
 
-        def at(tree: SyntaxTree) -> Scalar:
+        def value_at_point(tree: SyntaxTree) -> Scalar:
+            """Return the value of an expression at the point."""
             here = substitute_names(tree, self.substitutions)
             for read in names(here):
                 if read.path not in known:
@@ -80,7 +81,7 @@ class LinearisationPoint:
                     raise derivative_error(read.span, label, _point_hint(read.path))
             return evaluate(lower_expression(here, known), self.constant_values)
 
-        return at
+        return value_at_point
 
 
 def inline_equations(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
@@ -166,7 +167,8 @@ def affine_offset(
     point. SpecError if a nonlinear term reads a column without a value.
     """
 
-    def inside(part: SyntaxTree) -> SyntaxTree:
+    def offset_of(part: SyntaxTree) -> SyntaxTree:
+        """Return the offset of a part of the tree."""
         return affine_offset(part, columns, point)
 
     if not _reads_any(tree, columns):
@@ -175,23 +177,23 @@ def affine_offset(
         case Name(_, span):
             return make_number(0, span)
         case Negation(operand, _):
-            return negate(inside(operand))
+            return negate(offset_of(operand))
         case Arithmetic("+", left, right, _):
-            return add(inside(left), inside(right))
+            return add(offset_of(left), offset_of(right))
         case Arithmetic("-", left, right, _):
-            return subtract(inside(left), inside(right))
+            return subtract(offset_of(left), offset_of(right))
         case Arithmetic("*", left, right, _) if not _reads_any(left, columns):
-            return multiply(left, inside(right))
+            return multiply(left, offset_of(right))
         case Arithmetic("*", left, right, _) if not _reads_any(right, columns):
-            return multiply(inside(left), right)
+            return multiply(offset_of(left), right)
         case Arithmetic("/", left, right, _) if not _reads_any(right, columns):
-            return divide(inside(left), right)
+            return divide(offset_of(left), right)
         case Arithmetic() | Power():
             return _nonlinear_offset(tree, columns, point)
         case FunctionCall(function, _, _) if function in SMOOTH_FUNCTIONS:
             return _nonlinear_offset(tree, columns, point)
         case _:
-            return inside(select_branch(tree, point.evaluator))
+            return offset_of(select_branch(tree, point.evaluator))
 
 
 def _reads_any(tree: SyntaxTree, columns: Collection[str]) -> bool:

@@ -179,7 +179,7 @@ def _affine_offsets(
         left = affine_offset(tree, columns, point)
         reads = dict.fromkeys(read.path for read in names(left))
         values = [name for name in reads if name not in point.automaton.parameters]
-        with suppress(SpecError):  # what does not enter linearly is read as it stands
+        with suppress(SpecError):  # a nonlinear offset is evaluated as it stands
             slopes = symbolic_jacobian({row: left}, values, point).get(row, {})
             if all(_is_constant(point.automaton, slope) for slope in slopes.values()):
                 constant = affine_offset(left, values, point)

@@ -73,11 +73,11 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
         parameter = automaton.parameters[name]
         if automaton.model and name in automaton.model.parameters:
             label = f"`{name}` is a parameter of the model `{automaton.model.name}`"
-            hint = "a tunable wait is kept in ticks: take a parameter that the model does not have"
+            hint = "a tunable wait is stored in ticks: use a parameter that the model does not have"
             problems.error("wait", parameter.span, label, hint)
         elif name in read:
             label = f"`{name}` is a tunable wait, and read elsewhere too"
-            hint = "it is kept in ticks: take another parameter beside it"
+            hint = "a tunable wait is stored in ticks: use a separate parameter for it"
             problems.error("wait", parameter.span, label, hint)
         low, high = wait_range_in_ticks(automaton, parameter)
         ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))

@@ -73,7 +73,7 @@ def input_change_matrices(
         if name not in observer.inputs or not time > 0.0:
             label = f"`{name}` enters no balance of the observer in a linear way"
             if not time > 0.0:
-                label = f"the time within which `{name}` changed is above zero"
+                label = f"the time within which `{name}` changed must be above zero"
             problems.error("observer", formula.span, label)
             continue
         b = numeric_matrix(automaton, values, observer.b, states, (name,), "B")

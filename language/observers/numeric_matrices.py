@@ -26,6 +26,7 @@ def numeric_matrix(
     """
 
     def value(row: str, column: str) -> float:
+        """Return the value of an entry; 0 without a formula."""
         formula = entries.get(row, {}).get(column)
         return evaluate_constant(formula, automaton, values, what) if formula else 0.0
 

@@ -102,7 +102,8 @@ def lower_recursive_observer(
                 automaton, mode, (before, now), values, problems
             ).build()
         except ValueError as error:
-            problems.error("observer", mode.observer.span, f"it cannot be solved: {error}")
+            label = f"the observer has no solution: {error}"
+            problems.error("observer", mode.observer.span, label)
     return None
 
 

@@ -177,6 +177,7 @@ def _transitive_writes(program: Program) -> dict[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
 
     def visit(name: str) -> frozenset[str]:
+        """Return the variables that a block writes, and store them in `found`."""
         if name not in found:
             block = program.blocks[name]
             own = set(block_writes(block))

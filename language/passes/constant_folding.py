@@ -71,9 +71,11 @@ def hoist_inputs(program: Program) -> Program:
     found = _HoistedValues(program)
 
     def is_latched(name: str) -> bool | None:
+        """Return True for a latched input, None for a fixed constant and False otherwise."""
         return name in latched or (None if name.startswith(CONSTANT_PREFIX) else False)
 
     def change(expr: Expr) -> Expr:
+        """Return the reference to the hoisted value of an expression."""
         return found.ref_to(LATCHED_PREFIX, expr)
 
     blocks = _replace_hoistable(program, is_latched, change)
@@ -127,9 +129,11 @@ def fold_parameters(program: Program) -> Program:
     found = _HoistedValues(program)
 
     def is_parameter(name: str) -> bool | None:
+        """Return whether a name is a real parameter without a table."""
         return name in real and name.startswith((CONSTANT_PREFIX, *TUNABLE_PREFIXES))
 
     def change(expr: Expr) -> Expr:
+        """Return the reference to the value of an expression; one that is not finite stays."""
         value = float(evaluate(expr, values, number))
         if not math.isfinite(value):
             return expr
@@ -139,6 +143,7 @@ def fold_parameters(program: Program) -> Program:
         return ref
 
     def reciprocal(divisor: Expr) -> Expr | None:
+        """Return the reference to 1/divisor; None if it is not a normal number."""
         inverse = Binary("/", Value(1.0), divisor)
         size = abs(float(evaluate(inverse, values, number)))
         is_normal = SMALLEST_NORMAL[number] <= size < math.inf
@@ -226,23 +231,25 @@ def _replace_hoistable(
                     return expr, True if True in kinds else None
                 return _with_changed(expr, inner), False
             case _:
-                return map_operands(expr, lambda part: settled(*visit(part))), False
+                return map_operands(expr, lambda part: hoist_if_real(*visit(part))), False
 
-    def settled(expr: Expr, kind: bool | None) -> Expr:
+    def hoist_if_real(expr: Expr, kind: bool | None) -> Expr:
+        """Return the replacement of an expression that can be hoisted and computes a real."""
         return hoist(expr) if kind and _is_real_operation(expr) else expr
 
     def _with_changed(expr: Expr, inner: list[tuple[Expr, bool | None]]) -> Expr:
+        """Return an expression with its hoistable operands replaced, a division by a product."""
         if isinstance(expr, Binary) and expr.operator == "/" and inner[1][1]:
             inverse = reciprocal(inner[1][0])
             if inverse is not None:
-                return Binary("*", settled(*inner[0]), inverse)
+                return Binary("*", hoist_if_real(*inner[0]), inverse)
         pending = iter(inner)
-        return map_operands(expr, lambda _: settled(*next(pending)))
+        return map_operands(expr, lambda _: hoist_if_real(*next(pending)))
 
     return {
         name: block
         if name in EXCLUDED_BLOCKS
-        else map_expressions(block, lambda e: settled(*visit(e)))
+        else map_expressions(block, lambda e: hoist_if_real(*visit(e)))
         for name, block in program.blocks.items()
     }
 

@@ -262,9 +262,11 @@ def _selection(
     begins, ends = begin_blocks(waits), end_blocks(waits)
 
     def info_of(transition: Transition) -> TransitionInfo:
+        """Return the data of a transition."""
         return by_key[f"{automaton.name} {transition.key}"]
 
     def enabled(transition: Transition, slot: str) -> Expr:
+        """Return the condition of a transition: its guard and the end of its wait, if any."""
         guard, info = Ref(f"work.guard_{slot}"), info_of(transition)
         return Binary("and", guard, is_wait_over(info)) if info.timer else guard
 

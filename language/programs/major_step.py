@@ -178,7 +178,8 @@ def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
     """
     h = Ref("work.h")
 
-    def shorter(wait: WaitTimer) -> Block:
+    def limit_to_timer(wait: WaitTimer) -> Block:
+        """Return the operations that shorten the segment to the end of a running timer."""
         timer = Ref(wait.timer)
         near = Compare("<=", timer, add(h, Ref("work.merge")))
         ends = Binary("and", wait.is_running, near)
@@ -189,7 +190,7 @@ def _limit_block(field: VectorField, waits: WaitTimers) -> Block:
         Assign(h.name, Ref("work.left")),
         Assign("work.merge", _merge_window(field)),
         Assign("work.is_wait", Value(False)),
-        *_for_each_wait(field, waits, shorter),
+        *_for_each_wait(field, waits, limit_to_timer),
     )
 
 
@@ -215,7 +216,8 @@ def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[st
     h, merge = Ref("work.h"), Ref("work.merge")
     near = Binary("and", Ref("work.crossed"), Compare("<=", subtract(h, elapsed), merge))
 
-    def passes(wait: WaitTimer) -> Block:
+    def count_down(wait: WaitTimer) -> Block:
+        """Return the operations that count a running timer down and detect its end."""
         timer = Ref(wait.timer)
         over = Branch(
             Compare("<=", timer, merge), (*wait.on_end, Assign("work.event", Value(True)))
@@ -229,7 +231,7 @@ def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[st
         Branch(Compare("<=", left, merge), (Assign(left.name, real(0.0)),)),
         Assign("memory.time", add(Ref("memory.time"), elapsed)),
         *(Assign(name, add(Ref(name), elapsed)) for name in age_variables),
-        *_for_each_wait(field, waits, passes),
+        *_for_each_wait(field, waits, count_down),
     )
 
 

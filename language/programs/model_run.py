@@ -158,12 +158,13 @@ def _refuse_memory(model: Automaton, problems: Problems) -> None:
     """Raise SpecError if the model uses a function with memory."""
     call = find_memory_call(model)
     if call:
-        label = "a run inside a tick follows what has no memory"
+        label = "the model of a run inside a tick cannot use a function with memory"
         problems.error("run", call.span, label)
         problems.raise_if_errors()
 
 
 def _require_equal_settings(runs: list[ModelRun], problems: Problems) -> None:
+    """Report each run whose method, substeps or linearisation differ from the first run's."""
     for run in runs:
         if _settings_key(run) != _settings_key(runs[0]):
             label = "all runs of an automaton have one method, one number of substeps and one point"

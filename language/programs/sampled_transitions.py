@@ -1,4 +1,4 @@
-"""Transition: numbers, waits and timers of transitions, and the jump of a sampled automaton."""
+"""The jump of a sampled automaton without nested modes: waits, choice, actions (rules 4b and 6)."""
 
 from __future__ import annotations
 
@@ -114,9 +114,11 @@ def lower_sampled_commit(
     numbers = {info.key: info.number for info in infos}
 
     def number(way: Transition) -> int:
+        """Return the number of a transition."""
         return numbers[f"{automaton.name} {way.key}"]
 
     def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
+        """Return the stage of all regions with the assignments that `written` gives."""
         return lower_stage_of_regions(automaton, fired_variable, number, written, known)
 
     known = {**now, **equation_bindings(automaton, "equation.")}

@@ -58,7 +58,7 @@ def _format_work_lines(program: Program, motion: IntegrationInfo) -> Iterator[st
     yield (
         f"  work: at most {motion.max_events} events per substep, "
         f"{motion.max_events * once} products and "
-        f"{motion.max_events * RUN_BISECTIONS} looks at the guards"
+        f"{motion.max_events * RUN_BISECTIONS} evaluations of the guards"
     )
 
 
@@ -67,10 +67,10 @@ def _format_rewind_lines(program: Program) -> Iterator[str]:
     for info in program.transitions:
         if info.rewind_ticks:
             way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
-            looks = info.rewind_ticks + RUN_BISECTIONS + 2
+            evaluations = info.rewind_ticks + RUN_BISECTIONS + 2
             yield (
-                f"  rewind {way}: at most {looks} looks at `until` and {info.rewind_ticks} runs, "
-                f"one of them over a part of a period"
+                f"  rewind {way}: at most {evaluations} evaluations of `until` and "
+                f"{info.rewind_ticks} runs, one of them over a part of a period"
             )
 
 

@@ -122,7 +122,7 @@ def test_what_nothing_reads_is_not_printed() -> None:
     assert "work.rate_theta_d" in {variable.name for variable in program("estimator").variables}
     for text in (files := files_of("estimator")).values():
         assert "rate_theta_d" not in text
-    assert "double rate_w_w; /* rad/s^2; at the point that is looked at */" in files["estimator.h"]
+    assert "double rate_w_w; /* rad/s^2; at the point of evaluation */" in files["estimator.h"]
 
 
 def test_each_matrix_of_a_page_is_told_of_once() -> None:

@@ -132,7 +132,7 @@ def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
 def test_what_a_rewind_does_at_most_is_printed() -> None:
     """3 ticks back: one look at each and now, one at the end of a step, 24 halvings."""
     text = explain_spec("hko", "numbers", {}, ROOT)
-    assert "rewind drive -> gap: at most 29 looks at `until` and 3 runs" in text
+    assert "rewind drive -> gap: at most 29 evaluations of `until` and 3 runs" in text
     assert "longest tick: at most 31570 operations" in text
     assert "transition 1 gap: 1 -> 0 rewind 3 ticks" in explain_spec("hko", "program", {}, ROOT)
 
