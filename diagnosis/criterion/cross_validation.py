@@ -1,4 +1,7 @@
-"""Blocked cross-validation of a gain, by an infinitesimal jackknife."""
+"""Cross-validation: squares on left-out blocks of recordings, by an infinitesimal jackknife.
+
+Every fifth block in time of each recording is left out in turn (Efron 1982).
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,10 @@ from diagnosis.estimation.normal_equations import damped_step
 from diagnosis.model.parameter_vector import ParameterVector
 
 STEP_FRACTIONS = (1.0, 0.5, 0.25, 0.1)
-"""Parts of a step that are tried."""
+"""Fractions of a step that are tried, the largest first."""
 
 CACHE_SIZE = 8
-"""Models of which what was left out is kept, the latest ones; known by their identity."""
+"""Number of models whose result is cached, by their identity."""
 
 CacheKey = tuple[int, tuple[int, ...]]
 
@@ -26,9 +29,9 @@ _cache: OrderedDict[CacheKey, tuple[Estimate, Sequence[SampledRecording], Reals]
 
 
 def _cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the squares (recordings, seen) of each block at the point that the others ask for.
+    """Return the sums of squares (recordings, outputs) of left-out blocks; infinite if not fitted.
 
-    What was found of the latest models is kept: a base is asked beside each candidate.
+    The result is cached, because the base is compared with every candidate.
     """
     key = id(model), tuple(id(one) for one in series)
     if key not in _cache:
@@ -40,6 +43,7 @@ def _cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]
 
 
 def _compute_cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    """Return the sums of squares of left-out blocks without the cache."""
     found = np.zeros((len(series), len(model.candidate.predictor.outputs)))
     if model.normal_equations is None:
         return np.full(found.shape, np.inf)
@@ -54,10 +58,10 @@ def _compute_cross_validated_squares(model: Estimate, series: Sequence[SampledRe
 def _predict_without_fold(
     model: Estimate, series: Sequence[SampledRecording], fold: int
 ) -> PredictionResult:
-    """Return the recordings foreseen from where a model would be without a fold.
+    """Return the prediction at the point that the normal equations give without a fold.
 
-    A step that does not do the others any good is shortened: the model is not as linear as that.
-    Where not even a tenth of it does, the model stays where it is.
+    A step that increases the cost of the other folds is shortened; if a tenth of it still does, the
+    prediction of the model is returned.
     """
     assert model.normal_equations is not None
     scale = model.prediction.variances
@@ -82,13 +86,15 @@ def _predict_without_fold(
 def _training_cost(
     model: Estimate, prediction: PredictionResult, point: ParameterVector, fold: int, scale: Reals
 ) -> float:
-    """Return the cost [nats] of what is not left out."""
+    """Return the cost [nats] of all folds but one."""
     squares = _fold_squares(prediction, fold, True)
     return 0.5 * float(np.sum(squares.sum(axis=0) / scale)) + point.prior_cost(model.candidate)
 
 
 def _fold_squares(prediction: PredictionResult, fold: int, is_training: bool) -> Reals:
-    """Return the sums of squares (recordings, seen) of a fold, or of all others."""
+    """Return the sums of squares (recordings, outputs) of a fold, or of all others for
+    `is_training`.
+    """
     squares = prediction.robust_squares
     found = np.zeros((len(prediction.slices), squares.shape[1]))
     for block in prediction.blocks:

@@ -1,4 +1,7 @@
-"""Integrated autocorrelation: how many innovations count as one (Bartlett 1946)."""
+"""Effective sample size: the integrated autocorrelation of innovations (Bartlett 1946).
+
+The number of samples divided by it is the effective number of independent samples.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,14 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 
 MAX_LAG = 0.25
-"""Seconds over which innovations may hang together."""
+"""Longest lag [s]."""
 
 
 def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecording]) -> float:
-    """Return how many innovations count as one: 1 + 2 sum of squared autocorrelations, at least 1.
+    """Return 1 + 2 times the sum of squared autocorrelations up to `MAX_LAG`, the mean over
+    outputs.
 
-    (Bartlett 1946, for a quadratic function of them.)
+    Squared autocorrelations apply to quadratic functions such as log-likelihoods (Bartlett 1946).
     """
     return _integrated_autocorrelation(model.prediction.innovations, float(series[0].period))
 
@@ -25,7 +29,7 @@ def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecordin
 def integrated_autocorrelation_by_recording(
     model: Estimate, series: Sequence[SampledRecording]
 ) -> Reals:
-    """Return how many innovations of each recording count as one: (recordings,)."""
+    """Return the integrated autocorrelation of each recording (recordings,)."""
     period = float(series[0].period)
     return np.array(
         [_integrated_autocorrelation([one], period) for one in model.prediction.innovations]
@@ -33,6 +37,9 @@ def integrated_autocorrelation_by_recording(
 
 
 def _integrated_autocorrelation(innovations: Sequence[Reals], period: float) -> float:
+    """Return the integrated autocorrelation over some recordings; unknown innovations are
+    dropped.
+    """
     lags = max(1, round(MAX_LAG / period))
     by_output = []
     for channel in range(innovations[0].shape[1]):

@@ -1,8 +1,7 @@
-"""Evidence: what a model gains over another on the training recordings, and on parts left out.
+"""Likelihood gain: the gain of a model over another one, penalised and cross-validated.
 
-Every fifth block in time of each recording is left out by influence: the point without them is one
-step of the normal equations of the others away (the infinitesimal jackknife, Efron 1982); from
-there they are foreseen.
+The cross-validation leaves out every fifth block in time of each recording. The parameters without
+a block follow from one step of the normal equations (infinitesimal jackknife, Efron 1982).
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ from diagnosis.estimation.estimate import Estimate
 
 @dataclass(frozen=True)
 class LikelihoodGain:
-    """Gains [nats]: `train` after the price of the parameters, `left_out` over all blocks.
+    """Gains [nats]: `penalised` in training (BIC), `cross_validated` over all left-out blocks.
 
-    `each` (recordings,) is what is gained left out in each.
+    `by_recording` (recordings,) are the parts of the cross-validated gain.
     """
 
     penalised: float
@@ -32,19 +31,23 @@ class LikelihoodGain:
 
     @property
     def smaller(self) -> float:
-        """The smaller of the two."""
+        """The smaller of both gains."""
         return min(self.penalised, self.cross_validated)
 
     @property
     def total(self) -> float:
-        """Their sum: what candidates are ranked by."""
+        """The sum of both gains."""
         return self.penalised + self.cross_validated
 
 
 def likelihood_gain(
     model: Estimate, base: Estimate, series: Sequence[SampledRecording]
 ) -> LikelihoodGain:
-    """Return what a model gains over a base that it extends; one that is unstable loses all."""
+    """Return the gain of a model over a base that it extends; -inf for a model with infinite cost.
+
+    Gains are divided by the integrated autocorrelation of the model's innovations. The penalty is
+    log(n_eff) / 2 for each additional parameter; a parameter per recording counts once for each.
+    """
     if not np.isfinite(model.cost):
         return LikelihoodGain(-np.inf, -np.inf, (-np.inf,) * len(series))
     effective_fraction = 1.0 / integrated_autocorrelation(model, series)
@@ -58,7 +61,7 @@ def likelihood_gain(
 
 
 def subtract_gains(total: LikelihoodGain, parts: Sequence[LikelihoodGain]) -> LikelihoodGain:
-    """Return what is left of a gain when others have theirs."""
+    """Return the difference of a gain and other gains, component by component."""
     each = zip(total.by_recording, *(part.by_recording for part in parts), strict=True)
     return LikelihoodGain(
         total.penalised - sum(part.penalised for part in parts),
@@ -68,7 +71,7 @@ def subtract_gains(total: LikelihoodGain, parts: Sequence[LikelihoodGain]) -> Li
 
 
 def add_gains(base_gain: LikelihoodGain, added_gain: LikelihoodGain) -> LikelihoodGain:
-    """Return a gain with what was gained after it."""
+    """Return the sum of two gains, component by component."""
     each = zip(base_gain.by_recording, added_gain.by_recording, strict=True)
     total = tuple(first + second for first, second in each)
     return LikelihoodGain(
@@ -79,14 +82,18 @@ def add_gains(base_gain: LikelihoodGain, added_gain: LikelihoodGain) -> Likeliho
 
 
 def _parameter_count(model: Estimate, recordings: int) -> int:
+    """Return the number of parameters of a model, those per recording counted for each
+    recording.
+    """
     return sum(recordings if one.per_recording else 1 for one in model.candidate.free_parameters)
 
 
 def _gain_by_recording(before: Reals, after: Reals, counts: Reals) -> Reals:
-    """Return the gain [nats] in each recording, N/2 log of the ratio of mean squares in all.
+    """Return the gain [nats] of each recording: its share of the sum of N/2 log of mean-square
+    ratios.
 
-    `before` and `after` are sums of squares (recordings, seen). What a recording has of the gain is
-    what it has of the difference.
+    `before` and `after` are sums of squares (recordings, outputs). Each recording has the share
+    that it has in the difference of the squares.
     """
     if not (np.all(np.isfinite(before)) and np.all(np.isfinite(after))):
         return np.full(len(before), np.inf if np.all(np.isfinite(after)) else -np.inf)

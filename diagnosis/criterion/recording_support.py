@@ -1,6 +1,7 @@
-"""Share: how much of what an effect gains counts, by how many recordings have a share in it.
+"""Recording support: the part of a gain that counts, by how many recordings contribute to it.
 
-Physics acts wherever it is stirred. What one recording gains alone is more often an accident of it.
+Physics acts in every recording that excites it. A gain in a single recording is more often a
+chance.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ from collections.abc import Sequence
 from diagnosis.criterion.likelihood_gain import LikelihoodGain
 
 FEW_RECORDINGS = 3
-"""Recordings of which none can be against all others."""
+"""With fewer recordings a single one cannot be outvoted."""
 MIN_SHARED_FRACTION = 0.2
-"""The part of what an effect gains that must be left without the recording that gains most."""
+"""Fraction of a gain that must remain without the recording that gains most."""
 SINGLE_RECORDING_FACTOR = 10.0
-"""Times the threshold that is enough where less than that is left: of 760 first names that two
-studies had right none left so little and gained less, two imitations did."""
+"""Divisor of a gain that comes from a single recording.
+
+Of 760 right effects in two studies none had so little support and a smaller gain; two imitations
+had.
+"""
 OPPOSED_FACTOR = 3.0
-"""The same where one recording denies what all others show, and where there are few."""
+"""The same if one recording contradicts all others, and if there are few recordings."""
 
 
 def supported_gain(
@@ -25,11 +29,11 @@ def supported_gain(
     cross_validated_fraction: float = 1.0,
     single_recording_factor: float = SINGLE_RECORDING_FACTOR,
 ) -> float:
-    """Return what an effect gains [nats] as it counts: less where one recording is against all.
+    """Return the smaller gain [nats] of an effect, reduced if few recordings support it.
 
-    What one recording gains `single_recording_factor` is divided by that. One that denies what all others show may be
-    the only one that tells how large it is. `cross_validated_fraction` is the part of the threshold that is asked
-    for what is left out.
+    A gain of one recording is divided by `single_recording_factor`. A recording that contradicts
+    all others may be ignored at the price of `OPPOSED_FACTOR`. `cross_validated_fraction` is the
+    fraction of the threshold that the cross-validated gain needs.
     """
     gained = min(gain.penalised, gain.cross_validated / cross_validated_fraction)
     if len(gain.by_recording) < FEW_RECORDINGS:
@@ -47,8 +51,9 @@ def supported_gain(
 def discount_unsupported(
     gain: float, gains: Sequence[float], single_recording_factor: float = SINGLE_RECORDING_FACTOR
 ) -> float:
-    """Return what is `gain` [nats], less where recordings do not share it: `gains` is what it has
-    left out.
+    """Return `gain`, divided by the factor if one recording has nearly all of `gains`.
+
+    A negative gain, and the gain of a single recording, are returned unchanged.
     """
     total = sum(gains)
     is_shared = len(gains) == 1 or total - max(gains) > MIN_SHARED_FRACTION * total
@@ -58,7 +63,5 @@ def discount_unsupported(
 def ranking_gain(
     gain: LikelihoodGain, single_recording_factor: float = SINGLE_RECORDING_FACTOR
 ) -> float:
-    """Return what an effect is ranked by [nats]: what it gained where it was fitted, and what it
-    gains as it counts.
-    """
+    """Return the gain [nats] by which effects are ranked: the penalised plus the supported one."""
     return gain.penalised + supported_gain(gain, single_recording_factor=single_recording_factor)

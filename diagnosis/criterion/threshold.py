@@ -1,4 +1,4 @@
-"""Threshold: how much an effect has to gain before it is accepted [nats]."""
+"""Thresholds: the log-likelihood gain [nats] that an effect needs to be accepted."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pathlib import Path
 from diagnosis.model.placed_effect import PlacedEffect
 
 DEFAULT_THRESHOLD = 75.0
-"""Nats that an effect must gain both in training and left out; a bootstrap gives better ones."""
+"""Gain [nats] that is needed in training and in cross-validation, without a bootstrap."""
 FORMAT = "modewright-thresholds/1"
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Nats that an effect must gain: `usual`, or those of its group of effects; `origin` in words.
+    """The threshold [nats] of each group of effects, and the `default` one; `origin` in words.
 
-    A group is an effect at all its places. One that brings modes has to gain `modes` times the
-    usual: with each mode an observer has gains of its own, which may gain a little by accident.
+    A group is an effect at all its places. An effect that adds modes needs `mode_factor` times the
+    default, because the observer has additional gains in each mode.
     """
 
     groups: Mapping[str, float] = field(default_factory=dict)
@@ -29,41 +29,41 @@ class Thresholds:
     mode_factor: float = 2.0
 
     def threshold_of(self, placed_effect: PlacedEffect) -> float:
-        """Return what a layer has to gain [nats]."""
-        brings_modes = placed_effect.effect.body.get("regions") is not None
-        usual = self.default * (self.mode_factor if brings_modes else 1.0)
+        """Return the threshold [nats] of a placed effect."""
+        adds_modes = placed_effect.effect.body.get("regions") is not None
+        usual = self.default * (self.mode_factor if adds_modes else 1.0)
         return self.groups.get(group_of(placed_effect), usual)
 
     @property
     def largest(self) -> float:
-        """The largest of them [nats]."""
+        """The largest threshold [nats]."""
         return max((self.default, *self.groups.values()))
 
     @property
     def text(self) -> str:
-        """The number, or the smallest and the largest, for a sentence: `45`, `20 to 61`."""
+        """The threshold as text, or the smallest and the largest one: `45`, `20 to 61`."""
         least, most = min((self.default, *self.groups.values())), self.largest
         return f"{least:.0f}" if round(least) == round(most) else f"{least:.0f} to {most:.0f}"
 
 
 DEFAULT_THRESHOLDS = Thresholds()
-"""The usual threshold for all effects."""
+"""The default threshold for all effects."""
 
 
 def group_of(placed_effect: PlacedEffect) -> str:
-    """Return the group of a layer."""
+    """Return the name of the group of a placed effect."""
     return placed_effect.effect.name
 
 
 def format_thresholds(thresholds: Thresholds) -> str:
-    """Return thresholds as the text of a file."""
+    """Return thresholds as the JSON text of a file."""
     groups = {name: round(value, 2) for name, value in sorted(thresholds.groups.items())}
     known = {"format": FORMAT, "usual": round(thresholds.default, 2), "effects": groups}
     return json.dumps({**known, "origin": thresholds.origin}, indent=1) + "\n"
 
 
 def read_thresholds(path: Path) -> Thresholds:
-    """Return the thresholds of a file: `usual` and `effects` by name. Raises ValueError."""
+    """Return the thresholds of a JSON file. Raises ValueError if it is unreadable or invalid."""
     try:
         known = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -81,5 +81,6 @@ def read_thresholds(path: Path) -> Thresholds:
 
 
 def _is_positive(value: object) -> bool:
+    """Return whether a value is a finite positive number."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return is_number and math.isfinite(float(str(value))) and float(str(value)) > 0.0

@@ -230,7 +230,7 @@ def _choose_thresholds(
 def _outcome_of(
     selection: Selection, unexplained: float, model_set: ModelSet, min_gain: float
 ) -> DecisionOutcome:
-    """Return the verdict of a selection; `unexplained` is what the base leaves unexplained [nats]."""
+    """Return the outcome of a selection; `unexplained` is the gain [nats] that the base leaves."""
     if not selection.accepted:
         return "unknown" if unexplained > UNKNOWN_FACTOR * min_gain else "nothing_missing"
     best, automaton = selection.accepted[0], model_set.automaton

@@ -1,4 +1,4 @@
-"""Dossier: all that is known when a diagnosis has ended, for those who tell it on."""
+"""Diagnosis report: all results of a diagnosis, from which files and sentences are made."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ from language.model.automaton import Automaton
 class DiagnosisReport:
     """A verdict on `case`, with the check of its recordings.
 
-    `diagnosis` is None where nothing was concluded: the recordings are not usable, or the
-    diagnosis was ended before it came to a verdict, as `ended` says.
-    `left_out` are recordings that were not used for what was found of them.
-    `held_out` are hashes of the files that were opened after the verdict.
+    `diagnosis` is None if the recordings are not usable, or if the diagnosis ended early for
+    `end_reason`. `held_out` are digests of the files that were read after the verdict, by name.
+    `unused_recordings` are those that were left out because of findings.
     """
 
     case: Case
@@ -37,24 +36,24 @@ class DiagnosisReport:
 
     @property
     def name(self) -> str:
-        """The name of what was diagnosed."""
+        """The name of the automaton."""
         return self.automaton.name
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was found of the recordings, the worst first."""
+        """The findings on the recordings, errors first."""
         return self.check.findings
 
 
 def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
-    """Return a verdict as JSON has it: a number that is not finite is null."""
+    """Return the JSON object of a verdict; numbers that are not finite become None."""
     found = replace_non_finite(verdict.to_json())
     assert isinstance(found, dict)
     return found
 
 
 def replace_non_finite(value: Any) -> Any:
-    """Return plain data in which numbers that are not finite are None."""
+    """Return nested dicts and lists with None in place of numbers that are not finite."""
     if isinstance(value, dict):
         return {key: replace_non_finite(one) for key, one in value.items()}
     if isinstance(value, list):
@@ -63,7 +62,7 @@ def replace_non_finite(value: Any) -> Any:
 
 
 def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
-    """Return why no conclusion can be drawn from recordings."""
+    """Return the messages of a verdict on unusable recordings: a headline and the errors."""
     return (
         "the recordings are not usable",
         *(text for _, text in format_findings(recording_errors(check))),
@@ -73,7 +72,10 @@ def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
 def undecided_verdict(
     messages: tuple[str, ...], train: Mapping[str, str], runtime_s: float
 ) -> Verdict:
-    """Return the verdict where nothing was concluded, for the reasons in its messages."""
+    """Return the verdict `unknown` without a diagnosis; `messages` give the reasons.
+
+    `train` are digests of the files by name.
+    """
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )

@@ -1,4 +1,4 @@
-"""Drawing: the figures of a report, with what they say in words."""
+"""Figures: the figures of a report with their captions and texts for screen readers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from diagnosis.localisation.acting_scale import disturbance_unit
 from diagnosis.localisation.cause import balance_of
 from diagnosis.localisation.location import SIGNIFICANT_STDS, DisturbanceEstimate, Location
 from diagnosis.localisation.location_text import PLACE_PHRASES
-from diagnosis.report import sentences as wording
+from diagnosis.report import sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.model_comparison import ModelComparison
 from diagnosis.report.number_text import format_percent, format_significant
@@ -34,10 +34,9 @@ BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 
 
 def draw_locations(locations: Sequence[Location]) -> Picture:
-    """Return a bar for each place, the largest gain [nats] on top.
+    """Draw a bar for each location, the largest gain [nats] on top.
 
-    An infinite one, where the model does not run at all without it, is drawn beyond the others;
-    a place where it does not run in any case is left out.
+    An infinite gain (the base diverges) is drawn beyond the others; a gain of NaN is left out.
     """
     known = [location for location in locations if not math.isnan(location.gain)]
     shown = sorted(known, key=lambda location: location.gain)
@@ -70,10 +69,10 @@ def draw_disturbance(
     unit: str,
     inputs: Mapping[str, str],
 ) -> Picture:
-    """Return the picture of what is `disturbance` in a recording, give or take what makes a window.
+    """Draw a disturbance in one recording with its band of three standard deviations.
 
-    `title` it is and its `unit` are told; beneath stand those of the `inputs` (names with units)
-    that move, in the unit of the first.
+    Significant windows are shaded. Below are up to three varying inputs, those in the unit of the
+    first one; `inputs` are all inputs with their units.
     """
     values, reach = disturbance.values, SIGNIFICANT_STDS * disturbance.stds
     first = series.count - len(values)
@@ -112,7 +111,10 @@ def draw_disturbance(
 def draw_experiment(
     plan: ExperimentPlan, inputs: Mapping[str, str], signals: Sequence[tuple[str, str]]
 ) -> Picture:
-    """Return the inputs on top, the signals under them; `inputs` and `signals` with their units."""
+    """Draw the best manoeuvre of a plan: inputs on top, the outputs of each candidate below.
+
+    `inputs` and `signals` give names with units.
+    """
     best = plan.options[0]
     series = best.manoeuvre.series
     time = np.arange(series.count) * float(series.period)
@@ -158,7 +160,7 @@ OSCILLATION_LABELS = ("simulated, recalibrated", "simulated, with what was found
 
 
 def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
-    """Return the cycles of a recording and of one or two models of it; `unit` of the signal."""
+    """Draw frequency over amplitude of the cycles, recorded and simulated by one or two models."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     axis = figure.subplots()
     first = oscillations[0]
@@ -187,9 +189,9 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
 def draw_whiteness(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> Picture:
-    """Return the correlations by lag of both models, with the band of white noise.
+    """Draw the autocorrelations of innovations of both models by lag, with the 99 % band.
 
-    `is_base_only`: nothing was laid over the base, so that one model is all there is.
+    With `is_base_only` no effect was accepted, so there is one model.
     """
     figure = Figure(figsize=(8.5, 2.7), layout="constrained")
     axes = figure.subplots(1, len(before), squeeze=False, sharey=True)[0]
@@ -215,12 +217,14 @@ SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 
 SVG_IDENTIFIER = re.compile(r'(\bid="|href="#|url\(#)')
-"""Where an SVG names its parts: names of several figures in one page must differ."""
+"""Places where an SVG defines or uses an identifier; these must differ between figures of a
+page.
+"""
 
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure: the name of its files, its caption, and what it shows to those who see it not."""
+    """A figure: the name of its files, its caption, and its text for screen readers."""
 
     name: str
     caption: str
@@ -231,7 +235,11 @@ class ReportFigure:
 def report_figures(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> list[ReportFigure]:
-    """Return the worst window of each set of recordings, what is left, and the places."""
+    """Return the figures of a report: worst windows, whiteness, locations, disturbance,
+    oscillation, plan.
+
+    Figures without content, such as a plan that does not discriminate, are left out.
+    """
     assert report.diagnosis
     is_same = not report.diagnosis.selection.accepted
     inputs = {name: format_si_unit(i.unit.dimension) for name, i in report.automaton.inputs.items()}
@@ -254,7 +262,7 @@ def report_figures(
 
 
 def window_caption(window: WorstWindow, is_base_only: bool) -> str:
-    """Return how much is missed at most in a window where the models are alone."""
+    """Return the caption of a window with the largest error of each signal in free simulation."""
     alone = window.times >= window.free_from
     texts = []
     for k, (name, unit) in enumerate(zip(window.signals, window.units, strict=True)):
@@ -273,6 +281,7 @@ def window_caption(window: WorstWindow, is_base_only: bool) -> str:
 
 
 def _whiteness_figure(comparison: ModelComparison, is_base_only: bool) -> ReportFigure:
+    """Return the figure of the innovations' autocorrelation on one set of recordings."""
     parts = []
     for before, after in zip(comparison.before, comparison.after, strict=True):
         text = f"{before.signal} {format_percent(before.predictable_fraction)}"
@@ -282,17 +291,16 @@ def _whiteness_figure(comparison: ModelComparison, is_base_only: bool) -> Report
             else f"{text} without, {format_percent(after.predictable_fraction)} with"
         )
     caption = (
-        f"What is missed from one sample to the next ({comparison.label} recordings): its correlation "
-        f"with itself a time later. Its own past tells of it: {'; '.join(parts)}; of white noise "
-        "nothing."
+        f"Autocorrelation of the errors of one-step prediction ({comparison.label} recordings). "
+        f"Part that is predictable from their past: {'; '.join(parts)}; none for white noise."
     )
     picture = draw_whiteness(comparison.before, comparison.after, is_base_only)
     return ReportFigure("whiteness", caption, caption, picture)
 
 
 def _oscillation_figure(report: DiagnosisReport, comparison: ModelComparison) -> list[ReportFigure]:
-    """Return how the frequency goes with the amplitude, where the model has another one."""
-    text = wording.format_oscillation(report)
+    """Return the figure of frequency over amplitude as a list; empty if the model follows."""
+    text = sentences.format_oscillation(report)
     if not text or report.diagnosis is None:
         return []
     found = report.diagnosis.oscillations
@@ -304,15 +312,22 @@ def _oscillation_figure(report: DiagnosisReport, comparison: ModelComparison) ->
 
 
 def _location_figure(report: DiagnosisReport) -> ReportFigure:
+    """Return the figure of the gains of all locations."""
     locations = report.verdict.location
-    caption = "Where an unknown torque, force or error would explain most, before effects are laid"
+    caption = (
+        "Where an unknown torque, force or error would explain most, before effects are applied"
+    )
     ranked = ", ".join(f"{one.path} {max(one.gain, 0.0):.0f}" for one in locations)
     alternative = f"{caption}, in nats: {ranked}."
     return ReportFigure("places", f"{caption}.", alternative, draw_locations(locations))
 
 
 def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> list[ReportFigure]:
-    """Return what the base lacks over time, in the recording in which that is loud for longest."""
+    """Return the figure of the disturbance at the first location, in the recording of its longest
+    window.
+
+    The list is empty if nothing is missing or there is no significant window.
+    """
     best = report.verdict.location[0]
     if report.diagnosis is None or report.verdict.verdict == "nothing_missing":
         return []
@@ -325,7 +340,7 @@ def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> l
     unit = disturbance_unit(model_set, section, name)
     what = f"missing {PLACE_PHRASES[section]} {name}"
     is_beside = best.free_model is not None and bool(best.free_model.candidate.placed_effects)
-    when = "beside the effects that were found" if is_beside else "before effects are laid"
+    when = "beside the effects that were found" if is_beside else "before effects are applied"
     caption = (
         f"What is {what} over time, {when}: the unknown that would explain what is recorded in "
         f"{names[place]}, give or take three standard deviations."
@@ -336,7 +351,9 @@ def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> l
 
 
 def embed_svg(figure: ReportFigure, data: bytes) -> str:
-    """Return an SVG as a part of a page: with its words, its names like no other's."""
+    """Return an SVG as an element of a page, with a label and identifiers that are unique to the
+    figure.
+    """
     label = html.escape(figure.alternative_text, quote=True)
     text = SVG_IDENTIFIER.sub(rf"\g<1>{figure.name}-", METADATA.sub("", data.decode()))
     return SVG_HEAD.sub(f'<svg role="img" aria-label="{label}" ', text, count=1)

@@ -1,4 +1,4 @@
-"""Shown: both models beside one set of recordings - free runs, worst window, what is missed."""
+"""Model comparison: the base and the final model on one set of recordings."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from language.overlays.tree_types import format_si_unit
 
 @dataclass(frozen=True)
 class ModelComparison:
-    """One set of recordings: `part` as verdicts call it, `words` for a reader; `units` by signal.
+    """A set of recordings: `dataset` as in verdicts, `label` in words, `units` by signal.
 
-    `before` and `after` say how white the innovations of both models are.
+    `window` is the worst window; `before` and `after` are whiteness tests of both models.
     """
 
     dataset: str
@@ -37,7 +37,11 @@ class ModelComparison:
 
 
 def compare_models(report: DiagnosisReport) -> list[ModelComparison]:
-    """Return what was held out, then what was trained on; nothing without a diagnosis."""
+    """Return the comparison on held-out recordings (if any), then on training recordings.
+
+    The list is empty without a diagnosis. For held-out recordings, parameters per recording are
+    fitted.
+    """
     found = report.diagnosis
     if found is None:
         return []
@@ -58,6 +62,7 @@ def _compare_on(
     model: Estimate,
     series: Sequence[SampledRecording],
 ) -> ModelComparison:
+    """Return the comparison of two models on one set of recordings."""
     runs = simulate_free_runs(base, model, series)
     columns = {one.compare: one for one in report.case.mapping.columns.values()}
     units = tuple(format_si_unit(column_dimension(columns[name])) for name in runs.signals)

@@ -1,4 +1,4 @@
-"""Digits: numbers as a reader wants them - as many digits as count, and a unit."""
+"""Number text: numbers with significant digits and units, for sentences and tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ DIMENSIONLESS = ("1", "")
 
 
 def format_with_std(value: float, std: float) -> str:
-    """Return a value and its standard deviation: two digits of the latter, and as many places."""
+    """Return `value ± std` with two digits of the standard deviation, and as many places.
+
+    Without a finite positive standard deviation the value has four digits.
+    """
     if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
         return format_significant(value, 4)
     std = float(f"{std:.2g}")
@@ -24,13 +27,15 @@ def format_with_std(value: float, std: float) -> str:
 
 
 def format_quantity(quantity: Quantity) -> str:
-    """Return a fitted number as `3.77 ± 0.05 N*m`."""
+    """Return an estimated value as `3.77 ± 0.05 N*m`."""
     text = format_with_std(quantity.value, quantity.std)
     return text if quantity.unit in DIMENSIONLESS else f"{text} {quantity.unit}"
 
 
 def format_significant(value: float, digits: int = 3) -> str:
-    """Return a number with so many digits that count, without an exponent where it can be read."""
+    """Return a number with significant digits, without exponent from 1e-4 to 1e6; `-` if not
+    finite.
+    """
     if not math.isfinite(value):
         return "-"
     value = float(f"{value:.{digits}g}")
@@ -41,7 +46,7 @@ def format_significant(value: float, digits: int = 3) -> str:
 
 
 def format_percent(part: float) -> str:
-    """Return a part as `0.96 %`, `3.2 %` or `45 %`."""
+    """Return a fraction as `0.96 %`, `3.2 %` or `45 %`; `-` if it is not finite."""
     value = 100.0 * part
     if not math.isfinite(value):
         return "-"
@@ -50,7 +55,7 @@ def format_percent(part: float) -> str:
 
 
 def format_change(before: float, after: float) -> str:
-    """Return how much a misfit has changed: `-52 %`, `+7 %`, `as before`."""
+    """Return the relative change of a misfit: `-52 %`, `+7 %`, `as before`, or `-` if undefined."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return "-"
     part = 100.0 * (after / before - 1.0)
@@ -58,7 +63,7 @@ def format_change(before: float, after: float) -> str:
 
 
 def format_probability(share: float) -> str:
-    """Return a probability; what is beyond a tenth of a per cent is not told."""
+    """Return a probability in per cent, limited to `< 0.1 %` and `> 99.9 %`."""
     if share < 0.001:
         return "< 0.1 %"
     return "> 99.9 %" if share > 0.999 else f"{100.0 * share:.1f} %"

@@ -1,4 +1,4 @@
-"""Report: a diagnosis as files - verdict, variant, figures, and one page that holds it all."""
+"""Report page: the files of a diagnosis - verdict, variant, figures and one HTML page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from diagnosis.model.compile_cache import node_text
 from diagnosis.model.equation_change import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
 from diagnosis.quality.finding import format_findings
-from diagnosis.report import sentences as wording, tables as listing
+from diagnosis.report import sentences, tables
 from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json
 from diagnosis.report.figures import embed_svg, report_figures
 from diagnosis.report.model_comparison import ModelComparison, compare_models
@@ -43,11 +43,11 @@ from language.overlays.tree_types import format_si_unit
 from language.text.diagnostic import MissingToolError
 
 DIGEST_LENGTH = 16
-"""Hexadecimal digits of SHA-256 that are told."""
+"""Hexadecimal digits of SHA-256 that are shown."""
 
 
 def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return use, name and hash of each file and spec."""
+    """Return use, name and digest of the spec, the map, the effects and each recording."""
     case = report.case
     effects = case.effects if case.effects is not None else shipped_effects()
     library = "\n".join(f"{one.name} {node_text(one.body)}" for one in effects)
@@ -67,11 +67,12 @@ def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
 
 
 def _text_digest(text: str) -> str:
+    """Return the first digits of the SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def tool_versions() -> str:
-    """Return the versions of what a diagnosis was made with."""
+    """Return the versions of the product, Python, libraries and the C compiler in one line."""
     try:
         compiler = compiler_version().partition(": ")[2]
     except (BuildError, MissingToolError):
@@ -82,9 +83,12 @@ def tool_versions() -> str:
 
 
 def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:
-    """Return the files of a diagnosis by name, as they are in `folder`; the verdict is the last."""
-    shown = compare_models(report)
-    figures = report_figures(report, shown) if shown else []
+    """Return the contents of all files of a diagnosis by name; the verdict is the last one.
+
+    `variant` is the text of the variant file, `folder` the folder that commands on the page name.
+    """
+    comparisons = compare_models(report)
+    figures = report_figures(report, comparisons) if comparisons else []
     files = {"variant.yaml": variant.encode()}
     if report.diagnosis and report.diagnosis.equation:
         formula = report.diagnosis.equation.formula
@@ -92,14 +96,14 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
     for one in figures:
         files[f"{one.name}.svg"] = one.picture.data("svg")
         files[f"{one.name}.png"] = one.picture.data("png")
-    if shown:
+    if comparisons:
         inputs = {n: format_si_unit(i.unit.dimension) for n, i in report.automaton.inputs.items()}
-        files[WINDOW] = format_window_csv(shown[0].window, inputs).encode()
-        files[SCENARIO] = format_scenario(report, shown[0].window).encode()
+        files[WINDOW] = format_window_csv(comparisons[0].window, inputs).encode()
+        files[SCENARIO] = format_scenario(report, comparisons[0].window).encode()
     svg = {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures}
     context = {
-        **_verdict_context(report, shown),
-        **_model_context(report, shown),
+        **_verdict_context(report, comparisons),
+        **_model_context(report, comparisons),
         **_data_context(report),
         **_usage_context(report, folder),
         "variant": variant,
@@ -115,6 +119,7 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
 def _verdict_context(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> dict[str, Any]:
+    """Return the values of the template for the verdict, the cards and the changed equations."""
     verdict, found = report.verdict, report.diagnosis
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
     return {
@@ -123,15 +128,15 @@ def _verdict_context(
         "verdict": verdict,
         "has_model": bool(placed_effects),
         "laid": [placed_effect.id for placed_effect in placed_effects],
-        "headline": listing.split_code_spans(wording.format_headline(report)),
+        "headline": tables.split_code_spans(sentences.format_headline(report)),
         "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
-        "location": wording.format_missing_location(report) if found else "",
+        "location": sentences.format_missing_location(report) if found else "",
         "messages": verdict.messages,
         "abouts": _effect_summaries(report),
         "changes": equation_changes(report.case.document, placed_effects),
-        "places": listing.location_rows(verdict.location[0]) if verdict.location else [],
-        "rivals": [wording.format_effect(one) for one in verdict.ambiguous_with],
-        "separation": wording.format_separation(report),
+        "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
+        "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
+        "separation": sentences.format_separation(report),
         "signals": list(zip(comparisons[0].runs.signals, comparisons[0].units, strict=True))
         if comparisons
         else [],
@@ -139,7 +144,7 @@ def _verdict_context(
 
 
 def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return name, what it is, and how it shows, of each accepted effect."""
+    """Return name, description and signature text of each accepted effect."""
     found = report.diagnosis
     accepted = found.selection.accepted if found else ()
     effects = [one.placed_effect.effect for one in accepted]
@@ -149,6 +154,7 @@ def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
 def _model_context(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> dict[str, Any]:
+    """Return the values of the template for misfits, candidates, parameters and residuals."""
     found = report.diagnosis
     if found is None:
         return {"fit": [], "candidates": [], "unfitted": [], "parameters": [], "whiteness": []}
@@ -158,11 +164,11 @@ def _model_context(
         "fit": [
             row
             for s in comparisons
-            for row in listing.misfit_rows(report, s.label, s.dataset, s.runs)
+            for row in tables.misfit_rows(report, s.label, s.dataset, s.runs)
         ],
-        "noise": listing.format_noise(selection, one.runs.signals, one.units),
-        "candidates": listing.candidate_rows(report, selection),
-        "unfitted": listing.unfitted_candidates(report, selection),
+        "noise": tables.format_noise(selection, one.runs.signals, one.units),
+        "candidates": tables.candidate_rows(report, selection),
+        "unfitted": tables.unfitted_candidates(report, selection),
         "other": format_probability(report.verdict.other),
         "parameters": parameter_rows(report, selection),
         "astray": format_biased_parameters(selection),
@@ -173,19 +179,21 @@ def _model_context(
 
 
 def _data_context(report: DiagnosisReport) -> dict[str, Any]:
+    """Return the values of the template for the recordings and their findings."""
     return {
         "unread": report.diagnosis.unread if report.diagnosis else (),
         "findings": [
-            (s, listing.split_code_spans(text)) for s, text in format_findings(report.findings)
+            (s, tables.split_code_spans(text)) for s, text in format_findings(report.findings)
         ],
-        "recordings": listing.recording_rows(report),
-        "untestable": listing.untestable_effects(report),
+        "recordings": tables.recording_rows(report),
+        "untestable": tables.untestable_effects(report),
         "fixed": format_fixed_parameters(report),
         "thresholds": report.case.thresholds,
     }
 
 
 def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
+    """Return the values of the template for commands and provenance."""
     return {
         "commands": reproduction_commands(report, folder),
         "made_by": report_command(report, folder),
@@ -195,6 +203,7 @@ def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
 
 
 def _render_page(context: Mapping[str, Any]) -> str:
+    """Return the HTML page for the values of the template."""
     folder = resources.files("diagnosis.report").joinpath("templates")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),

@@ -1,4 +1,4 @@
-"""Parameter list: what a diagnosis did to each parameter, as texts."""
+"""Parameter table: declared, recalibrated and final values of each parameter as texts."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from diagnosis.selection.forward_selection import Selection
 from language.text.document import MappingNode, ScalarNode
 
 MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
-"""Part of a value, and standard deviations, from which recalibration was led astray; most told."""
+"""Relative bias and standard deviations from which a parameter is biased, and how many are
+named.
+"""
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A parameter: its values as texts, how far they are from what was declared, what it is."""
+    """A parameter with its values as texts, its change from the declared value, and its
+    description.
+    """
 
     name: str
     unit: str
@@ -30,9 +34,11 @@ class ParameterRow:
 
 
 def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return each fitted parameter: declared, recalibrated, and with what was found."""
+    """Return a row for each parameter of the final model: declared, recalibrated and final
+    value.
+    """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
-    brought = {
+    effect_abouts = {
         placed_effect.qualified_name(own): text_of(entry, "about")
         for placed_effect in (tried.placed_effect for tried in selection.accepted)
         for own, entry in _parameter_tables(placed_effect.effect.body)
@@ -50,7 +56,7 @@ def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[Parame
                 format_with_std(before[name].value, before[name].std) if name in before else "",
                 format_with_std(now.value, now.std),
                 "" if value is None else _format_change(value, now.value),
-                about_of(report, "parameters", name) or brought.get(name, ""),
+                about_of(report, "parameters", name) or effect_abouts.get(name, ""),
                 parameter_note(now, coordinates[name]),
             )
         )
@@ -58,13 +64,17 @@ def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[Parame
 
 
 def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
+    """Return the names and tables of the parameters of an effect."""
     table = body.get("parameters")
     entries = table if isinstance(table, MappingNode) else ()
     return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, MappingNode)]
 
 
 def format_biased_parameters(selection: Selection) -> str:
-    """Return how far recalibration without the effects takes parameters, the farthest first."""
+    """Return how far the recalibration without effects moves parameters, the largest change first.
+
+    The text is empty if no parameter is biased.
+    """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
     for name, one in before.items():
@@ -78,24 +88,25 @@ def format_biased_parameters(selection: Selection) -> str:
 
 
 def _format_change(declared: float, current: float) -> str:
+    """Return the relative change of a positive value, else ""."""
     return format_change(declared, current) if declared > 0.0 else ""
 
 
 def about_of(report: DiagnosisReport, section: str, name: str) -> str:
-    """Return what the spec says a parameter, input or state is; empty where it says nothing."""
+    """Return the description of an entry in a section of the spec; "" if there is none."""
     table = report.case.document.root.get(section)
     entry = table.get(name) if isinstance(table, MappingNode) else None
     return text_of(entry, "about") if isinstance(entry, MappingNode) else ""
 
 
 def text_of(table: MappingNode, key: str) -> str:
-    """Return the text of a key; empty where there is none."""
+    """Return the text of a key; "" if it is absent or not a scalar."""
     node = table.get(key)
     return node.text if isinstance(node, ScalarNode) else ""
 
 
 def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
-    """Return the parameters that have no range, with their values: they were taken as exact."""
+    """Return `name = value` of each real parameter without a range: these are taken as exact."""
     return [
         f"{name} = {float(one.value):.5g}"
         for name, one in report.automaton.parameters.items()

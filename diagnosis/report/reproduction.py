@@ -1,4 +1,4 @@
-"""Rerun: how to use what was found - the worst window as a scenario, and the commands."""
+"""Reproduction: the worst window as a scenario, and commands that use the result."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ SCENARIO = "scenario.yaml"
 
 
 def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
-    """Return a window as CSV, in SI: inputs, what was recorded, and both simulations.
+    """Return a window as CSV in SI: time, inputs, recorded outputs, and both simulations.
 
-    `inputs` are names with units. What was not recorded is blank.
+    `inputs` are names with units. Values that were not recorded are blank.
     """
     seen = window.signals
     names = ["t_s", *inputs, *seen]
@@ -36,13 +36,14 @@ def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
 
 
 def _format_value(value: float) -> str:
+    """Return a number with nine digits; "" if it is not finite."""
     return f"{value:.9g}" if math.isfinite(value) else ""
 
 
 def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
-    """Return a scenario that runs the variant through a window, beside whose table it stands.
+    """Return the YAML of a scenario that runs the variant through a window's CSV file.
 
-    Inputs are held from sample to sample: C can be given them like this too.
+    Inputs are held between samples, as in C. Compared states start at their first recorded value.
     """
     automaton = report.automaton
     fed = {name: format_si_unit(one.unit.dimension) for name, one in automaton.inputs.items()}
@@ -72,7 +73,10 @@ def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
 
 
 def reproduction_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
-    """Return what can be done with the variant: words, and the command."""
+    """Return what can be done with the variant: a description and a command each.
+
+    Without a diagnosis only the check is listed.
+    """
     variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
     found = [
         *_effect_copy_commands(report, folder),
@@ -90,18 +94,18 @@ def reproduction_commands(report: DiagnosisReport, folder: Path) -> list[tuple[s
 
 
 def _effect_copy_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
-    """Return how effects that the project does not have are put where a variant finds them."""
+    """Return commands that copy missing effects into the project."""
     formula = report.diagnosis.equation if report.diagnosis else None
     own = formula.formula.placed_effect.effect.name if formula else ""
     found = []
     for effect in missing_effects(report):
         file = folder / f"{own}.yaml" if effect.name == own else effect.body.span.source.name
-        found.append(("lay its effect below spec/", f"cp {shlex.quote(str(file))} spec/"))
+        found.append(("copy its effect below spec/", f"cp {shlex.quote(str(file))} spec/"))
     return found
 
 
 def report_command(report: DiagnosisReport, folder: Path) -> str:
-    """Return the command that makes this report."""
+    """Return the command that makes this report, quoted for a shell."""
     words = ["modewright", "diagnose", report.name]
     for path in report.case.train:
         words += ["--train", str(path)]

@@ -1,4 +1,4 @@
-"""Wording: a diagnosis in plain words, for the console and the report."""
+"""Sentences: a diagnosis in words, for the console and the report."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from diagnosis.selection.candidate_search import (
 )
 from diagnosis.selection.confusion_set import CONFUSION_GAIN, is_confusable
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.validation.misfit import Misfit as FitMisfit
+from diagnosis.validation.misfit import Misfit
 
 MAX_NAMED = 4
-"""Most rivals, windows or findings told in a sentence."""
+"""Maximum number of rivals, windows or findings in a sentence."""
 
 
 def format_headline(report: DiagnosisReport) -> str:
@@ -53,15 +53,16 @@ def format_headline(report: DiagnosisReport) -> str:
 
 
 def _format_equation(report: DiagnosisReport) -> str:
-    """Return what an unknown was turned into, as the end of a sentence."""
+    """Return the discovered formula as the end of a sentence; "" without one."""
     found = report.diagnosis.equation if report.diagnosis else None
     if found is None:
         return ""
-    return f"; it is like `{found.text}` {PLACE_PHRASES[found.location.section]} {found.location.place}"
+    where = f"{PLACE_PHRASES[found.location.section]} {found.location.place}"
+    return f"; it is like `{found.text}` {where}"
 
 
 def _format_nearest(report: DiagnosisReport) -> str:
-    """Return the effects that come nearest to what is unknown, as the end of a sentence."""
+    """Return the effects nearest to an unknown cause as the end of a sentence; "" without any."""
     names = [format_effect(one) for one in report.verdict.ambiguous_with]
     return f"; the nearest is {' or '.join(names[:MAX_NAMED])}" if names else ""
 
@@ -73,6 +74,7 @@ def format_effect(effect: NamedEffect) -> str:
 
 
 def _format_effect_values(effect: NamedEffect) -> str:
+    """Return an effect with its place and parameter values."""
     values = ", ".join(
         f"{name} = {format_fitted_quantity(q)}" for name, q in effect.parameters.items()
     )
@@ -85,12 +87,14 @@ def format_fitted_quantity(fitted: Quantity) -> str:
 
 
 def format_rounded(value: float) -> str:
-    """Return a number with two digits that count, `100` and not `1e+02`."""
+    """Return a number with two significant digits: `100`, not `1e+02`."""
     return f"{float(f'{value:.2g}'):g}"
 
 
 def format_improvement(report: DiagnosisReport) -> str:
-    """Return what the model gains in free simulation, in one sentence; empty without a fit."""
+    """Return the misfits of free simulation and the confirmation in one sentence; ""
+    without a fit.
+    """
     fit = report.verdict.fit
     parts = [
         f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
@@ -103,7 +107,8 @@ def format_improvement(report: DiagnosisReport) -> str:
     return f"misfit of free simulation, {'; '.join(parts)}{confirmed[report.verdict.confirmed]}"
 
 
-def _format_misfits(signals: Mapping[str, FitMisfit]) -> str:
+def _format_misfits(signals: Mapping[str, Misfit]) -> str:
+    """Return the misfit of each signal before and after, in per cent."""
     found = []
     for name, one in signals.items():
         before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
@@ -112,7 +117,7 @@ def _format_misfits(signals: Mapping[str, FitMisfit]) -> str:
 
 
 def format_missing_location(report: DiagnosisReport) -> str:
-    """Return where something is missing, in one sentence; empty where nothing is."""
+    """Return where physics is missing in one sentence; "" if nothing is missing."""
     found = report.diagnosis
     if found is None or report.verdict.verdict == "nothing_missing":
         return ""
@@ -120,7 +125,10 @@ def format_missing_location(report: DiagnosisReport) -> str:
 
 
 def format_separation(report: DiagnosisReport) -> list[str]:
-    """Return what would separate what was found from what it is confused with."""
+    """Return what would separate the accepted effects from those with which they are confused.
+
+    The list has the experiment and, for each effect and rival, its notes in the library.
+    """
     if report.diagnosis is None:
         return []
     selection = report.diagnosis.selection
@@ -135,7 +143,10 @@ def format_separation(report: DiagnosisReport) -> list[str]:
 
 
 def format_oscillation(report: DiagnosisReport) -> str:
-    """Return until when the model follows the largest step; empty where nothing is missing."""
+    """Return how long the models follow the largest step.
+
+    The text is empty if nothing is missing, or if the base has no other frequency.
+    """
     found = report.diagnosis.oscillations if report.diagnosis else ()
     if not found or not found[0].has_other_frequency or report.verdict.verdict == "nothing_missing":
         return ""
@@ -152,7 +163,7 @@ def format_oscillation(report: DiagnosisReport) -> str:
 
 
 def format_experiment(report: DiagnosisReport) -> str:
-    """Return what to record to be sure, as it was simulated; empty where there is no doubt."""
+    """Return the experiment to record in one sentence; "" without a plan."""
     found = report.diagnosis.plan if report.diagnosis else None
     return found.format_sentence() if found else ""
 
@@ -160,7 +171,7 @@ def format_experiment(report: DiagnosisReport) -> str:
 def format_reason(
     candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
 ) -> str:
-    """Return why a candidate was accepted or not; `rank` is its rank."""
+    """Return why a candidate was accepted or not; `rank` is its index in the table."""
     ids = {one.placed_effect.id for one in selection.accepted}
     if candidate_fit.placed_effect.id in ids:
         return "accepted"
@@ -173,16 +184,15 @@ def format_reason(
     known = candidate_fit.likelihood_gain
     if known is None:
         if candidate_fit.screening_gain < ENTRY_THRESHOLD:
-            return f"not fitted: promises less than {ENTRY_THRESHOLD:g} nats"
+            return f"not fitted: gains less than {ENTRY_THRESHOLD:g} nats in screening"
         best = max(
             (t.likelihood_gain.penalised for t in selection.first_round if t.likelihood_gain),
             default=0.0,
         )
         if candidate_fit.screening_gain < PRUNING_FRACTION * best:
-            return (
-                f"not fitted: promises less than {100 * PRUNING_FRACTION:g} % of what another gains"
-            )
-        return f"not fitted: {MAX_FITS} others promise more"
+            part = f"{100 * PRUNING_FRACTION:g} % of another's gain"
+            return f"not fitted: gains less than {part} in screening"
+        return f"not fitted: {MAX_FITS} others gain more in screening"
     threshold = thresholds.threshold_of(candidate_fit.placed_effect)
     if known.penalised <= threshold:
         return f"gains less than {threshold:.0f} nats in training"
@@ -194,14 +204,14 @@ def format_reason(
 
 
 def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str:
-    """Return the name of a candidate as verdicts have it."""
+    """Return `name@section.place` of a candidate as in verdicts."""
     return f"{verdict_id(placed_effect, report.automaton)}@{place_path(placed_effect)}"
 
 
 def summary_lines(report: DiagnosisReport) -> list[str]:
-    """Return at most four lines: verdict, place, what else is to be told, improvement, doubt.
+    """Return at most four lines: verdict, location, experiment or oscillation, improvement, caveat.
 
-    Where all five are to be told, the second and third are one.
+    If there are five, the second and the third one are joined. Empty lines are left out.
     """
     is_ambiguous = report.verdict.verdict == "ambiguous"
     more = format_experiment(report) if is_ambiguous else format_oscillation(report)
@@ -213,7 +223,9 @@ def summary_lines(report: DiagnosisReport) -> list[str]:
 
 
 def _format_caveat(report: DiagnosisReport) -> str:
-    """Return what a reader has to know before believing the verdict."""
+    """Return the worst finding on recordings, or effects that are nearly as good; ""
+    without any.
+    """
     worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
     if worst:
         more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
@@ -227,5 +239,6 @@ def _format_caveat(report: DiagnosisReport) -> str:
 
 
 def _join_first(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are."""
     more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
     return ", ".join(names[:MAX_NAMED]) + more

@@ -1,4 +1,4 @@
-"""Leftover: what an earlier diagnosis has written into a folder that this one may not write."""
+"""Stale files: files of an earlier diagnosis in a folder that the present one may not overwrite."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from diagnosis.result.verdict import FORMAT as VERDICT
 FIGURE_NAMES = (
     *("window_train", "window_held_out", "missing", "whiteness", "places", "shuffle", "plan"),
 )
-"""The figures of a report; which of them are drawn follows from the verdict."""
+"""Names of the figures of a report; the verdict determines which of them are drawn."""
 
 
 def find_stale_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that an earlier diagnosis wrote there, not in every case.
+    """Return the existing files of an earlier diagnosis that are not written in every case.
 
-    A folder without a verdict holds none, and of files with common names only those are ours that
-    say so themselves: others are a user's.
+    A folder without `verdict.json` has none. Files with common names count only if their contents
+    identify them; others belong to the user.
     """
     if _json_format(folder / "verdict.json") != VERDICT:
         return []
@@ -31,19 +31,23 @@ def find_stale_files(folder: Path) -> list[Path]:
 
 
 def _is_scenario(path: Path) -> bool:
+    """Return whether a file is the scenario of a report."""
     return {f"of: {VARIANT}", f"  file: {WINDOW}"} <= set(_read_text(path).splitlines())
 
 
 def _is_window(path: Path) -> bool:
+    """Return whether a file is the CSV of a worst window."""
     names = _read_text(path).partition("\n")[0].split(",")
     return names[0] == "t_s" and names[-1].endswith("_with")
 
 
 def _is_thresholds(path: Path) -> bool:
+    """Return whether a file has the format of thresholds."""
     return _json_format(path) == THRESHOLDS
 
 
 def _is_effect(path: Path) -> bool:
+    """Return whether a file is an effect with the name of the file."""
     return f"effect: {path.stem}" in _read_text(path).splitlines()
 
 
@@ -55,7 +59,7 @@ OWNERSHIP_CHECKS: Mapping[str, Callable[[Path], bool]] = {
 
 
 def _json_format(path: Path) -> object:
-    """Return the format that a JSON file says it has, None where it says none."""
+    """Return the `format` of a JSON file, None if it has none or is invalid."""
     try:
         found = json.loads(_read_text(path))
     except (ValueError, RecursionError):
@@ -64,6 +68,7 @@ def _json_format(path: Path) -> object:
 
 
 def _read_text(path: Path) -> str:
+    """Return the text of a file, "" if it cannot be read."""
     try:
         return path.read_text("utf-8") if path.is_file() else ""
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Cards: what a reader wants to know first, in four short answers."""
+"""Summary cards: four short answers at the top of a report."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from diagnosis.quality.finding import format_findings
-from diagnosis.report import sentences as wording
+from diagnosis.report import sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_change, format_percent, format_probability
 from diagnosis.report.tables import location_rows
@@ -19,7 +19,7 @@ MAX_LINES = 4
 
 @dataclass(frozen=True)
 class Card:
-    """A question and its answer, line by line."""
+    """A question and its answer in lines."""
 
     title: str
     lines: tuple[str, ...]
@@ -28,9 +28,10 @@ class Card:
 def summary_cards(
     report: DiagnosisReport, residual_tests: Sequence[WhitenessTest] = ()
 ) -> list[Card]:
-    """Return the answers: where, how sure, how much better, what to keep in mind.
+    """Return the cards for location, confidence, improvement and caveats; those without lines are
+    left out.
 
-    `residual_tests` is what the model with what was found leaves over, signal by signal.
+    `residual_tests` are whiteness tests of the final model. Without a diagnosis there are no cards.
     """
     if report.diagnosis is None:
         return []
@@ -45,9 +46,10 @@ def summary_cards(
 
 
 def _location_card(report: DiagnosisReport) -> Card:
+    """Return the card on where physics is missing."""
     verdict = report.verdict
     named = verdict.effects or verdict.ambiguous_with
-    lines = [wording.format_effect(one) for one in named]
+    lines = [sentences.format_effect(one) for one in named]
     if verdict.verdict == "unknown":
         lines = [f"most at {one.path}" for one in verdict.location[:1] if one.gain > 0.0]
     if not lines:
@@ -59,6 +61,7 @@ def _location_card(report: DiagnosisReport) -> Card:
 
 
 def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
+    """Return the card on probabilities, gains and the confirmation."""
     fitted = [one for one in selection.first_round if one.likelihood_gain]
     count = f"{len(selection.first_round)} candidates, {len(fitted)} fitted in full"
     lines = []
@@ -66,9 +69,8 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
         shares = selection.probabilities()
         for one in (selection.accepted[0], *selection.rivals):
             if one.placed_effect.id in shares:
-                lines.append(
-                    f"{format_probability(shares[one.placed_effect.id])} probable: {one.placed_effect.id}"
-                )
+                share = format_probability(shares[one.placed_effect.id])
+                lines.append(f"{share} probable: {one.placed_effect.id}")
         lines += [f"best of {count}", *(_format_gain(one) for one in selection.accepted)]
         lines.append(f"{report.case.thresholds.text} nats are needed")
     else:
@@ -88,16 +90,20 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
 
 
 def _smaller_gain(candidate_fit: CandidateFit) -> float:
+    """Return the smaller gain [nats] of a candidate, 0 if it was not fitted."""
     return candidate_fit.likelihood_gain.smaller if candidate_fit.likelihood_gain else 0.0
 
 
 def _format_gain(candidate_fit: CandidateFit) -> str:
+    """Return both gains of a candidate as text."""
     assert candidate_fit.likelihood_gain
     known = candidate_fit.likelihood_gain
-    return f"{candidate_fit.placed_effect.id}: {known.penalised:.0f} nats in training, {known.cross_validated:.0f} left out"
+    gains = f"{known.penalised:.0f} nats in training, {known.cross_validated:.0f} left out"
+    return f"{candidate_fit.placed_effect.id}: {gains}"
 
 
 def _improvement_card(report: DiagnosisReport) -> Card:
+    """Return the card on the misfits, of held-out recordings if there are any."""
     fit = report.verdict.fit
     part = "held_out" if fit.get("held_out") else "train"
     lines = []
@@ -115,6 +121,7 @@ def _improvement_card(report: DiagnosisReport) -> Card:
 
 
 def _caveat_card(report: DiagnosisReport, residual_tests: Sequence[WhitenessTest]) -> Card:
+    """Return the card on residuals, rivals, findings and excitation."""
     verdict = report.verdict
     coloured = [one.signal for one in residual_tests if one.rating == "coloured"]
     lines = []
@@ -123,7 +130,7 @@ def _caveat_card(report: DiagnosisReport, residual_tests: Sequence[WhitenessTest
     if verdict.verdict == "ambiguous":
         lines.append("more than one effect explains it: see what to record to be sure")
     if verdict.verdict == "effect":
-        rivals = [wording.format_effect(one) for one in verdict.ambiguous_with]
+        rivals = [sentences.format_effect(one) for one in verdict.ambiguous_with]
         lines.append(
             f"nearly as good: {', '.join(rivals)}"
             if rivals

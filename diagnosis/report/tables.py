@@ -1,4 +1,4 @@
-"""Listing: the tables of a report, as texts."""
+"""Tables: the tables of a report as texts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.localisation.location import Location
-from diagnosis.report import sentences as wording
+from diagnosis.report import sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import (
     format_change,
@@ -23,15 +23,15 @@ from diagnosis.validation.worst_window import FreeRuns, rms_by_recording
 MAX_WINDOWS = 6
 
 MIN_CORRELATION = 0.3
-"""A correlation below this is not told."""
+"""A smaller correlation is not shown."""
 
 CHANGE_TOLERANCE = 0.02
-"""Part of a misfit below which a change is none."""
+"""Relative change of a misfit below which it is unchanged."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A misfit without and with what was found, what has changed, and whether to the `better`."""
+    """A misfit before and after, its change, and the trend: `better`, `worse` or `same`."""
 
     before: str
     after: str
@@ -41,7 +41,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class FitRow:
-    """Misfits of one recording, or of a whole set, signal by signal."""
+    """The misfits of one recording, or of a whole set, by signal."""
 
     name: str
     words: str
@@ -50,7 +50,7 @@ class FitRow:
 
 
 def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
-    """Return the misfits [SI] of each recording of a set, then those of all over their spread."""
+    """Return the misfits [SI] of each recording of a set, then the normalised ones of the set."""
     rows = []
     for name, before, after in rms_by_recording(runs):
         pairs = zip(before, after, strict=True)
@@ -64,6 +64,7 @@ def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRun
 
 
 def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
+    """Return the cell of a misfit; `text` formats its values."""
     part = after / before - 1.0 if before > 0.0 else 0.0
     trend = "same" if abs(part) < CHANGE_TOLERANCE else "better" if part < 0.0 else "worse"
     return Cell(text(before), text(after), format_change(before, after), trend)
@@ -71,7 +72,7 @@ def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> C
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A candidate: `bar` is its gain as a part of the largest, in per cent."""
+    """A candidate; `bar` is its gain in per cent of the largest one."""
 
     effect: str
     place: str
@@ -84,7 +85,7 @@ class CandidateRow:
 
 
 def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
-    """Return those that were fitted: what was accepted first, then by rank."""
+    """Return the rows of fitted candidates: accepted ones first, then the others by rank."""
     ids = {one.placed_effect.id for one in selection.accepted}
     first = [one for one in selection.first_round if one.placed_effect.id not in ids]
     listed = [one for one in (*selection.accepted, *first) if one.likelihood_gain]
@@ -101,17 +102,18 @@ def _candidate_row(
     largest: float,
     shares: Mapping[str, float],
 ) -> CandidateRow:
+    """Return the row of a candidate at a rank."""
     assert candidate_fit.likelihood_gain
     known, share = candidate_fit.likelihood_gain, shares.get(candidate_fit.placed_effect.id)
     is_accepted = candidate_fit.placed_effect.id in {
         one.placed_effect.id for one in selection.accepted
     }
-    reason = wording.format_reason(candidate_fit, rank, selection, report.case.thresholds)
+    reason = sentences.format_reason(candidate_fit, rank, selection, report.case.thresholds)
     if is_accepted and report.verdict.verdict == "ambiguous":
-        reason = "best, but not told from others: laid in what is shown here"
+        reason = "best, but not separated from others: applied in the model shown here"
     if is_accepted and report.verdict.verdict == "unknown":
-        reason = "a formula, no effect of the library: laid in what is shown here"
-    effect, _, place = wording.candidate_title(candidate_fit.placed_effect, report).partition("@")
+        reason = "a formula, no effect of the library: applied in the model shown here"
+    effect, _, place = sentences.candidate_title(candidate_fit.placed_effect, report).partition("@")
     return CandidateRow(
         effect,
         place,
@@ -125,37 +127,38 @@ def _candidate_row(
 
 
 def _format_nats(gain: float) -> str:
+    """Return a gain [nats] as an integer, `diverges` if it is not finite."""
     return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
 
 
 def unfitted_candidates(
     report: DiagnosisReport, selection: Selection
 ) -> list[tuple[str, list[str]]]:
-    """Return why the other candidates were not fitted, each reason with their names."""
+    """Return the reasons why candidates were not fitted, each with their names."""
     found: dict[str, list[str]] = {}
     ids = {one.placed_effect.id for one in selection.accepted}
     for tried in selection.first_round:
         if not tried.likelihood_gain and tried.placed_effect.id not in ids:
-            why = wording.format_reason(tried, 0, selection, report.case.thresholds)
-            found.setdefault(why, []).append(wording.candidate_title(tried.placed_effect, report))
+            why = sentences.format_reason(tried, 0, selection, report.case.thresholds)
+            found.setdefault(why, []).append(sentences.candidate_title(tried.placed_effect, report))
     return list(found.items())
 
 
 def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tuple[str, str]]:
-    """Return what is known of what is missing at a place: modes, windows, companions."""
+    """Return windows, modes and correlates of a location as texts; empty rows are left out."""
     modes = sorted(location.modes.items(), key=lambda pair: -pair[1])
     shares = [f"{name} {format_percent(share)}" for name, share in modes if share >= 0.005]
     shares = shares if len(modes) > 1 else []
     windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in location.windows]
     more = len(windows) - max_windows
-    told = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
+    window_text = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
     along = [
         f"{name} (correlation {r:.2f})"
         for name, r in location.correlates
         if abs(r) >= MIN_CORRELATION
     ]
     rows = [
-        ("strongest in", told),
+        ("strongest in", window_text),
         ("by mode", ", ".join(shares)),
         ("goes along with", ", ".join(along)),
     ]
@@ -163,7 +166,7 @@ def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tu
 
 
 def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
-    """Return name, length, rate, lost samples and findings of each training recording."""
+    """Return name, use, length, rate, lost samples and findings of each training recording."""
     check = report.check
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys(one.recording for one in check.channels):
@@ -191,7 +194,7 @@ def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
 
 
 def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
-    """Return what recordings would have to show, and the effects that ask for it."""
+    """Return what recordings lack in words, and the effects that need it."""
     lacking: dict[str, list[str]] = {}
     for one in report.check.excitation.effects:
         if one.lacking:
@@ -200,7 +203,7 @@ def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
 
 
 def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
-    """Return the noise of the recorded signals: no model misses less."""
+    """Return the noise of the recorded signals, below which no model can predict."""
     noise = selection.base.noise_levels.outputs
     parts = zip(signals, noise, units, strict=True)
     return ", ".join(
@@ -209,7 +212,7 @@ def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[s
 
 
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
-    """Return a sentence in parts, with whether each stood between back quotes."""
+    """Return the parts of a sentence with whether each was between back quotes."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
 
 
@@ -219,7 +222,7 @@ def whiteness_rows(
     units: Sequence[str],
     is_base_only: bool,
 ) -> list[tuple[str, ...]]:
-    """Return a row by signal and model: size, what its past tells, lags outside, chance."""
+    """Return a row for each signal and model: size, predictable fraction, lags outside, p-value."""
     models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
     rows: list[tuple[str, ...]] = []
     for k, unit in enumerate(units):
@@ -243,8 +246,8 @@ def whiteness_rows(
 def describe_residuals(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> list[tuple[str, str]]:
-    """Return for each signal what is left of it, in words."""
-    says = {
+    """Return for each signal in words what the final model leaves."""
+    ratings = {
         "white": "noise",
         "nearly white": "next to nothing but noise",
         "coloured": "not noise alone: something else is still missing, or slow",
@@ -252,6 +255,8 @@ def describe_residuals(
     found = []
     for old, new in zip(before, after, strict=True):
         was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
-        told = f"its past tells {format_percent(new.predictable_fraction)} of it{was}"
-        found.append((new.signal, f"{says[new.rating]}; {told}"))
+        detail = (
+            f"{format_percent(new.predictable_fraction)} of it is predictable from its past{was}"
+        )
+        found.append((new.signal, f"{ratings[new.rating]}; {detail}"))
     return found

@@ -1,4 +1,4 @@
-"""Missed: signals that a model, as it was concluded, follows worse than a constant would."""
+"""Unfollowed signals: signals whose free simulation is worse than a constant."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 from diagnosis.result.verdict import Verdict
 
 CONSTANT_MODEL_NRMSE = 1.0
-"""NRMSE of the mean of a recorded signal: a model that misses more shows nothing of it."""
+"""Normalised error of the mean of a recorded signal."""
 
 
 def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
-    """Yield what free simulation misses by more than the spread of the signal, in words."""
+    """Yield a message for each signal whose final misfit exceeds that of a constant, or is NaN."""
     for part, signals in verdict.fit.items():
         for name, misfit in signals.items():
             share = misfit.nrmse_after
@@ -23,7 +23,9 @@ def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
 
 
 def withdraw_nothing_missing(verdict: Verdict, unfollowed: Sequence[str]) -> Verdict:
-    """Return a verdict beside what it misses: where nothing was to be missing, something is."""
+    """Return the verdict, with `nothing_missing` changed to `unknown` if signals are not
+    followed.
+    """
     if unfollowed and verdict.verdict == "nothing_missing":
         return dataclasses.replace(verdict, verdict="unknown")
     return verdict

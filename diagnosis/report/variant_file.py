@@ -1,4 +1,4 @@
-"""Variant: what a diagnosis has found, as a variant of the base that every command runs."""
+"""Variant file: the result of a diagnosis as a variant of the base, for all commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from codegen.toolchain.templates import product_version
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter_text import format_value
-from diagnosis.model.placed_effect import automaton_with_effects as laid_automaton
+from diagnosis.model.placed_effect import automaton_with_effects
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.sentences import format_rounded
 from diagnosis.selection.candidate_search import CandidateFit
@@ -23,18 +23,18 @@ NAME_SUFFIX = "_diagnosed"
 MAX_NAME_LENGTH = 31
 
 MIN_RELATIVE_CHANGE = 1e-6
-"""Relative change below which a parameter is not written down."""
+"""Relative change below which a parameter is not written."""
 
 
 def variant_name(base: str, ending: str = NAME_SUFFIX) -> str:
-    """Return the name of the variant of a base, or of what goes with it."""
+    """Return a base's name with a suffix, shortened to `MAX_NAME_LENGTH`."""
     return base[: MAX_NAME_LENGTH - len(ending)] + ending
 
 
 def format_variant(report: DiagnosisReport, extends: str) -> str:
-    """Return the variant as YAML: `extends` names the base, or its file.
+    """Return the variant as YAML text; `extends` is the name or the file of the base.
 
-    Values are in SI; standard deviations and what was declared stand beside them as comments.
+    Values are in SI; standard deviations and declared values are comments.
     """
     lines = [
         "language: 1",
@@ -53,9 +53,13 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
-    """Return what has to be done before the variant can be read: its effects found by name."""
+    """Return comments on effects that must be copied into the project before the variant is
+    read.
+    """
     names = [effect.body.span.source.name for effect in missing_effects(report)]
-    return [f"{name} has to be below spec/: the variant lays this effect by name" for name in names]
+    return [
+        f"{name} has to be below spec/: the variant finds this effect by name" for name in names
+    ]
 
 
 def missing_effects(report: DiagnosisReport) -> list[Effect]:
@@ -72,14 +76,16 @@ def missing_effects(report: DiagnosisReport) -> list[Effect]:
 
 
 def _about_text(report: DiagnosisReport) -> str:
+    """Return the description of the variant: verdict, effects and recordings."""
     verdict = report.verdict
     found = [f"{one.id}@{one.place}" for one in verdict.effects]
-    says = ", ".join([verdict.verdict, *found])
+    outcome = ", ".join([verdict.verdict, *found])
     files = ", ".join(f"{name} {digest}" for name, digest in verdict.inputs.items())
-    return f"diagnosed by modewright {product_version()}: {says}; fitted to {files}"
+    return f"diagnosed by modewright {product_version()}: {outcome}; fitted to {files}"
 
 
 def _parameter_lines(automaton: Automaton, fitted: Mapping[str, Quantity]) -> list[str]:
+    """Return the lines of changed parameters."""
     lines = []
     for name, quantity in fitted.items():
         parameter = automaton.parameters.get(name)
@@ -88,18 +94,19 @@ def _parameter_lines(automaton: Automaton, fitted: Mapping[str, Quantity]) -> li
         was = float(parameter.value)
         if abs(quantity.value - was) > MIN_RELATIVE_CHANGE * abs(was):
             text = format_value(quantity.value, parameter)
-            told = f"sd {format_rounded(quantity.std)}, declared {was:.6g}"
-            lines.append(f"  {name}: {{value: {text}}}  # {told}")
+            note = f"sd {format_rounded(quantity.std)}, declared {was:.6g}"
+            lines.append(f"  {name}: {{value: {text}}}  # {note}")
     return ["parameters:", *lines] if lines else []
 
 
 def _effect_lines(
     report: DiagnosisReport, selection: Selection, fitted: Mapping[str, Quantity]
 ) -> list[str]:
+    """Return the lines of the accepted effects."""
     if not selection.accepted:
         return []
     placed_effects = selection.model.candidate.placed_effects
-    whole = laid_automaton(report.case.document, report.case.project, placed_effects)
+    whole = automaton_with_effects(report.case.document, report.case.project, placed_effects)
     lines = ["effects:"]
     for tried in selection.accepted:
         lines += _single_effect_lines(tried, whole, selection, fitted)
@@ -112,7 +119,11 @@ def _single_effect_lines(
     selection: Selection,
     fitted: Mapping[str, Quantity],
 ) -> list[str]:
-    placed_effect, brought = (
+    """Return the lines of an effect with its fitted values.
+
+    A parameter per recording has its mean, and the single values as a comment.
+    """
+    placed_effect, own_names = (
         candidate_fit.placed_effect,
         added_names(candidate_fit.placed_effect.effect.body),
     )
@@ -122,7 +133,7 @@ def _single_effect_lines(
     for final, quantity in fitted.items():
         own = final.removesuffix(f"_{placed_effect.suffix}")
         parameter = whole.parameters.get(final)
-        if own not in brought or placed_effect.qualified_name(own) != final or parameter is None:
+        if own not in own_names or placed_effect.qualified_name(own) != final or parameter is None:
             continue
         text = format_value(quantity.value, parameter)
         note = f"sd {format_rounded(quantity.std)}"

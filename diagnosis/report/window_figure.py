@@ -1,4 +1,4 @@
-"""Window picture: a window as recorded and as simulated, and what the simulation misses."""
+"""Window figure: a window as recorded and as simulated, with the error of the simulation."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ MAX_INPUTS = 3
 
 
 def draw_window(window: WorstWindow, inputs: Mapping[str, str], is_base_only: bool) -> Picture:
-    """Return the picture of a window: what drives it, signals, and beneath each what is missed.
+    """Draw a window: its varying inputs, and for each signal the values and the errors below.
 
-    `inputs` are names with units; those that rest are not drawn. `is_base_only`: nothing was laid over
-    the base, so that one simulation is all there is.
+    `inputs` are names with units. With `is_base_only` no effect was accepted, so there is one
+    simulation.
     """
     driven = _moving_inputs(window, inputs)
     count = len(window.signals)
@@ -46,7 +46,7 @@ def draw_window(window: WorstWindow, inputs: Mapping[str, str], is_base_only: bo
 
 
 def _moving_inputs(window: WorstWindow, inputs: Mapping[str, str]) -> list[int]:
-    """Return the columns of inputs that move, all in the unit of the first one."""
+    """Return the indices of up to three varying inputs with the unit of the first one."""
     moving = [k for k in range(len(inputs)) if float(np.ptp(window.inputs[:, k])) > 0.0]
     units = list(inputs.values())
     return [k for k in moving if units[k] == units[moving[0]]][:MAX_INPUTS]
@@ -55,6 +55,7 @@ def _moving_inputs(window: WorstWindow, inputs: Mapping[str, str]) -> list[int]:
 def _draw_inputs(
     axis: Axes, window: WorstWindow, inputs: Mapping[str, str], driven: list[int]
 ) -> None:
+    """Draw inputs over time."""
     names, units = list(inputs), list(inputs.values())
     for k, colour in zip(driven, (GREEN, PURPLE, GREY), strict=False):
         axis.plot(
@@ -73,6 +74,7 @@ def _draw_inputs(
 def _draw_signal(
     above: Axes, beneath: Axes, window: WorstWindow, k: int, is_base_only: bool
 ) -> None:
+    """Draw a signal as recorded and simulated, and the errors below."""
     known = np.isfinite(window.measured[:, k])
     times, measured = window.times[known], window.measured[known, k]
     above.plot(times, measured, color="black", alpha=0.3, lw=5.0, label="recorded")

@@ -1,7 +1,7 @@
-"""Pressed: where a parameter that acts in one balance alone was led to the end of its range.
+"""Active bounds: parameters of a single balance that a fit has moved to the end of their range.
 
-A friction that takes up an offset, or a drag that takes up a grade, stands there; beside it what it
-takes up promises little.
+A friction that absorbs an offset, or a drag that absorbs a grade, has an active bound; the effect
+that it replaces then has a small screening gain.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ MIN_CORRELATION = 0.2
 
 
 def active_bound_locations(model: Estimate, automaton: Automaton) -> frozenset[str]:
-    """Return the balances in which parameters that act there alone stand at ends of their ranges,
-    and the inputs that act there alone.
+    """Return the balances with parameters at a bound that act there alone, and the inputs
+    of these.
     """
     where = _single_balances(automaton)
     ends = {where[name] for name in _active_bounds(model) if name in where}
@@ -31,7 +31,10 @@ def active_bound_locations(model: Estimate, automaton: Automaton) -> frozenset[s
 
 
 def release_active_bounds(model: Estimate, automaton: Automaton) -> ParameterVector:
-    """Return a model's point with the parameters that are pressed where they are declared."""
+    """Return the point of a model with parameters at a bound moved to their declared values.
+
+    Only parameters that act in a single balance move.
+    """
     where = _single_balances(automaton)
     candidate, point = model.candidate, model.point
     start = vector_of(candidate, len(point.per_recording), {})
@@ -44,8 +47,10 @@ def release_active_bounds(model: Estimate, automaton: Automaton) -> ParameterVec
 def has_opposing_active_bound(
     model: Estimate, placed_effect: PlacedEffect, automaton: Automaton
 ) -> bool:
-    """Tell whether a parameter of the balance in which an effect was laid is at the end of its
-    range where it takes away what the effect adds: dry friction for one that falls with the speed.
+    """Return whether a parameter at a bound counteracts an effect in the same balance.
+
+    An example is dry friction at 0 beside an effect that decreases with the speed. The test is the
+    correlation of Jacobian columns.
     """
     where, columns = _single_balances(automaton), model.jacobian
     brought = [name for name in model.candidate.names if name in effect_names(placed_effect)]

@@ -1,7 +1,7 @@
-"""Needed: which of the accepted effects are, beside those that were found after them.
+"""Backward elimination: removal of accepted effects that later ones make unnecessary.
 
-The first one was accepted while all others were missing: it may have stood in for one of them, or
-be less of it than the other. What needless ones seemed to gain goes to those at their place.
+An effect is accepted while others are still missing, so it may have replaced one of them. The gain
+of a removed effect is reassigned to effects at its place.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ may have stood in for it."""
 
 @dataclass(frozen=True)
 class AcceptedEffects:
-    """Effects over a `base` that a `model` holds, the order in which they are named."""
+    """Effects that extend `base` to `model`, in the order of their acceptance."""
 
     base: Estimate
     model: Estimate
@@ -42,8 +42,8 @@ def eliminate_backward(
     thresholds: Thresholds,
     log: LogCallback,
 ) -> AcceptedEffects:
-    """Take out what the effects found after it have made needless; put first at a place what is
-    worth most there.
+    """Return the effects without unnecessary ones, and with the most valuable one at a
+    place first.
     """
     for tried in accepted.effects[:-1]:
         without = _fit_without(model_set, accepted, tried, units)
@@ -115,8 +115,8 @@ def _reassign_gain(
 def update_first_round(
     first: Sequence[CandidateFit], before: Sequence[CandidateFit], retained: Sequence[CandidateFit]
 ) -> list[CandidateFit]:
-    """Return the candidates of the first round: those that stood aside for another are none, the
-    first one that is kept gains what it does now.
+    """Return the first round: removed effects are not fitted, the first retained one has its new
+    gain.
     """
     out = {t.placed_effect.id for t in before} - {t.placed_effect.id for t in retained}
     left = [

@@ -1,9 +1,9 @@
-"""Bootstrap: thresholds from recordings that the recalibrated base itself would have given.
+"""Bootstrap: thresholds from simulated recordings of the recalibrated base (parametric bootstrap).
 
-Nothing is missing in them, so what an effect gains there is by accident (parametric bootstrap,
-Efron and Tibshirani 1993, section 6.5). Each replicate is refitted and searched like recordings.
-What counts is how often anything at all is accepted: an effect's threshold is as many times what
-it gains in one replicate of ten as any effect does in one of forty.
+Nothing is missing in them, so all gains are by chance (Efron and Tibshirani 1993, section 6.5).
+Each replicate is fitted and searched like recordings. The rate of false acceptance of any effect is
+controlled: the threshold of an effect is its gain in one of ten replicates, times the factor that
+the largest relative gain exceeds in one of forty.
 """
 
 from __future__ import annotations
@@ -54,9 +54,8 @@ GroupGains = Mapping[str, float]
 
 
 def threshold_key(model_set: ModelSet, full_rate_series: Sequence[SampledRecording]) -> str:
-    """Return the key of what thresholds are a property of: spec, rate, total length, rounded.
-
-    The code, the effects and the compared outputs are in it as well.
+    """Return the cache key of thresholds: code, spec, effects, outputs, rate and rounded total
+    length.
     """
     length = sum(float(one.period) * one.count for one in full_rate_series)
     effects = [f"{one.name} {node_text(one.body)}" for one in model_set.effects]
@@ -84,7 +83,9 @@ def round_to_preferred(value: float) -> float:
 def cached_thresholds(
     model_set: ModelSet, full_rate_series: Sequence[SampledRecording]
 ) -> Thresholds | None:
-    """Return the thresholds that an earlier bootstrap has left in the user's cache, if any."""
+    """Return the thresholds of an earlier bootstrap from the user's cache, None without a complete
+    one.
+    """
     found = _read_replicates(_replicates_file(threshold_key(model_set, full_rate_series)))
     return thresholds_of(found[:REPLICATES]) if len(found) >= REPLICATES else None
 
@@ -96,9 +97,10 @@ def bootstrap_thresholds(
     full_rate_series: Sequence[SampledRecording],
     log: LogCallback = lambda text: None,
 ) -> Thresholds:
-    """Return thresholds by bootstrap; replicates of an earlier run are not made again.
+    """Return thresholds by bootstrap; replicates are stored, and those of an earlier run are
+    reused.
 
-    `full_rate_series` are the training recordings before they were thinned.
+    `full_rate_series` are the training recordings before decimation.
     """
     file = _replicates_file(threshold_key(model_set, full_rate_series))
     known = _read_replicates(file)
@@ -130,10 +132,10 @@ def accidental_gains(
     units: Mapping[str, float],
     replicate: Sequence[SampledRecording],
 ) -> GroupGains:
-    """Return what each group of effects gains in recordings by accident [nats].
+    """Return the largest gain [nats] of each group of effects in a replicate.
 
-    What promises less than the least threshold is not fitted; where something gains more than
-    that, the base is looked at again as it is for recordings.
+    Effects with a screening gain below the least threshold are not fitted. If something gains more
+    than that, the base is fitted again as for recordings.
     """
     series = resample(
         replicate,
@@ -165,7 +167,7 @@ def _best_by_group(candidate_fits: Sequence[CandidateFit]) -> GroupGains:
 
 
 def thresholds_of(replicates: Sequence[GroupGains]) -> Thresholds:
-    """Return the thresholds that some replicates ask for."""
+    """Return the thresholds from the gains of replicates."""
     names = sorted({name for gains in replicates for name in gains})
     scales = {name: _gain_scale([gains.get(name, 0.0) for gains in replicates]) for name in names}
     worst = [
@@ -183,10 +185,10 @@ def _clip_threshold(value: float) -> float:
 
 
 def exponential_tail_quantile(values: Sequence[float], level: float) -> float:
-    """Return the quantile of a distribution whose upper half falls off exponentially.
+    """Return a quantile of values whose upper half is taken to decay exponentially.
 
-    How fast is told by the median of what is above the middle: one replicate in which the observer
-    lost its way, and everything gains, does not raise the thresholds of all.
+    The rate follows from the median of the values above the middle, so a single replicate in which
+    the observer diverges does not raise all thresholds.
     """
     middle = float(np.quantile(values, TAIL_START))
     over = [value - middle for value in values if value > middle]

@@ -1,6 +1,6 @@
-"""Strain: what effects would gain beyond the ranges of their own parameters.
+"""Bound score: the gain of accepted effects if their parameters could leave their ranges.
 
-What imitates another effect is pulled out of the ranges that its own physics has.
+An effect that imitates another one is driven out of its own physical ranges.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ they gained, from which on they are pulled out of these: what imitates another e
 
 
 def rejects_bounds(model: Estimate, accepted: Sequence[CandidateFit]) -> bool:
-    """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
+    """Return whether accepted effects would gain much beyond the ranges of their parameters."""
     gained = sum(tried.likelihood_gain.penalised for tried in accepted if tried.likelihood_gain)
     return bound_score(model, accepted) > max(MIN_SCORE, MIN_SCORE_FRACTION * gained)
 
 
 def bound_score(model: Estimate, accepted: Sequence[CandidateFit]) -> float:
-    """Return what accepted effects would gain [nats] if their own parameters that are at the end of
-    a range had none, as the normal equations foresee it.
+    """Return the predicted gain [nats] if effect parameters at a bound were free (Rao 1948).
+
+    It is the difference of the gains of the normal equations with and without these parameters.
     """
     if model.normal_equations is None:
         return 0.0
@@ -44,8 +45,8 @@ def bound_score(model: Estimate, accepted: Sequence[CandidateFit]) -> float:
 
 
 def prefer_interior(best: CandidateFit, candidate_fits: Sequence[CandidateFit]) -> CandidateFit:
-    """Return the best candidate, or where it is at a limit one at its place that is at none and
-    gains nearly as much.
+    """Return the best candidate, or one at its place that is at no bound and gains nearly
+    as much.
     """
     if best.likelihood_gain is None or not is_at_bound(best.estimate, best.placed_effect):
         return best
@@ -56,8 +57,9 @@ def prefer_interior(best: CandidateFit, candidate_fits: Sequence[CandidateFit]) 
 
 
 def is_at_bound(model: Estimate | None, placed_effect: PlacedEffect) -> bool:
-    """Tell whether a parameter of an effect is at an end of its range that was set to it: nothing
-    ends a quantity but zero, and one where it is a share.
+    """Return whether a parameter of an effect is at a bound other than a natural one.
+
+    Natural bounds are 0, and 1 for a fraction.
     """
     if model is None:
         return False

@@ -1,4 +1,4 @@
-"""Search: which effects at which places foresee the training recordings better than the base."""
+"""Candidate search: effects at places that predict the training recordings better than the base."""
 
 from __future__ import annotations
 
@@ -45,10 +45,11 @@ LogCallback = Callable[[str], None]
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A candidate with what it promised; `estimate` and `evidence` where it was fitted.
+    """A candidate with its screening gain [nats]; `estimate` and `likelihood_gain` if it was
+    fitted.
 
-    `lead` [nats] is what puts it before one that gave way to it, `beside` what it gains beside all
-    that were accepted, where that was looked for.
+    `lead` [nats] puts a restricted form before the full one; `joint_gain` is its gain beside all
+    accepted effects, 0 if unknown.
     """
 
     placed_effect: PlacedEffect
@@ -60,7 +61,7 @@ class CandidateFit:
 
     @property
     def shared_values(self) -> dict[str, float]:
-        """What the effect's own parameters are that all recordings share; none if not fitted."""
+        """The fitted values [SI] of the effect's shared parameters; empty if it was not fitted."""
         if self.estimate is None:
             return {}
         values, brought = self.estimate.values(0), effect_names(self.placed_effect)
@@ -73,18 +74,20 @@ class CandidateFit:
 
     @property
     def gain(self) -> float:
-        """What it gained [nats] when it was accepted, or gains beside the others where that is
-        more: while something else is missing, the right one may gain little.
+        """The gain [nats] at acceptance or beside the other effects, whichever is larger.
+
+        The right effect may gain little while something else is missing.
         """
         return max(self.likelihood_gain.penalised if self.likelihood_gain else 0.0, self.joint_gain)
 
     @property
     def score(self) -> float:
-        """What candidates are ranked by: what they gain, less for each number that they bring.
+        """The score [nats] for ranking: gains and lead, less a penalty for each parameter of the
+        effect.
 
-        One that brings more also takes up what the form of a plainer one gets wrong. What is left
-        out counts as much as what was fitted at most: more is an accident. So is what one recording
-        gains alone, but for an input without parameters.
+        An effect with more parameters also absorbs errors of a simpler form. The supported gain
+        counts no more than the penalised one. A candidate that was not fitted ranks behind all
+        others.
         """
         if self.likelihood_gain is None or self.estimate is None:
             return self.screening_gain - 1e6
@@ -105,8 +108,9 @@ def search_candidates(
     min_gain: float = ENTRY_THRESHOLD,
     fitted_before: Iterable[CandidateFit] = (),
 ) -> list[CandidateFit]:
-    """Return the candidates that could be laid on the base's layers, best first; they start where
-    they were fitted `fitted_before`, too.
+    """Return the candidates beside the effects of the base, best first.
+
+    Fits start also where candidates of `fitted_before` ended.
     """
     least = max(MIN_SCREENING_GAIN, SUBSET_FRACTION * min_gain)
     there = {placed_effect.id for placed_effect in base.candidate.placed_effects}
@@ -145,9 +149,8 @@ def search_candidates(
             found.append(CandidateFit(placed_effect, gain))
             continue
         gains = likelihood_gain(estimate, base, model_set.series)
-        log(
-            f"{placed_effect.id}: train {gains.penalised:.0f}, left out {gains.cross_validated:.0f} nats"
-        )
+        text = f"train {gains.penalised:.0f}, left out {gains.cross_validated:.0f} nats"
+        log(f"{placed_effect.id}: {text}")
         found.append(CandidateFit(placed_effect, gain, estimate, gains))
     return sorted(found, key=lambda one: -one.score)
 

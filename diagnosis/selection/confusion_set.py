@@ -1,4 +1,4 @@
-"""Rival: a candidate that may be it as well, or comes nearest where no effect is it."""
+"""Confusion set: candidates that recordings do not separate from the accepted effect."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ are not quite those of the car differ by more than a tenth."""
 def confusion_set(
     first_round: Sequence[CandidateFit], accepted: Sequence[CandidateFit]
 ) -> tuple[CandidateFit, ...]:
-    """Return candidates that cannot be told from the first accepted one, or gain nearly as much as
-    the best one.
+    """Return fitted candidates that are confusable with the first accepted one or gain nearly as
+    much.
+
+    The set is empty without an accepted effect.
     """
     if not accepted or accepted[0].likelihood_gain is None:
         return ()
@@ -32,12 +34,12 @@ def confusion_set(
 
 
 def is_confusable(candidate_fit: CandidateFit, best: CandidateFit) -> bool:
-    """Tell whether recordings cannot tell a candidate from the best one."""
+    """Return whether the score of a candidate is within `CONFUSION_GAIN` of the best one."""
     return candidate_fit.score > best.score - CONFUSION_GAIN
 
 
 def near_best(candidate_fits: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
-    """Return the candidates that gain nearly as much as the best of them, all where none gains."""
+    """Return the candidates with a positive gain of nearly the largest one, in their order."""
     fitted = [
         (tried, tried.likelihood_gain.penalised)
         for tried in candidate_fits

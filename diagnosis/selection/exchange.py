@@ -1,7 +1,7 @@
-"""Swap: an effect that was accepted first stands aside for one that goes better with the others.
+"""Exchange step: an accepted effect is replaced by one that fits better together with the others.
 
-While something else is missing too, the effect with the most freedom explains some of that as
-well: friction with a rise at rest takes up part of an offset that dry friction alone cannot.
+While other effects are missing, the candidate with the most freedom explains some of them as well:
+friction with a rise at standstill absorbs part of an offset, which dry friction cannot.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def exchange_effects(
     units: Mapping[str, float],
     log: LogCallback,
 ) -> tuple[list[CandidateFit], Estimate]:
-    """Return the accepted effects and their model, each but the last swapped where that is better.
+    """Return the accepted effects and their model, each but the last exchanged if that gains.
 
-    What it is swapped with are `rivals` at the same place; what is known to be confused with it is
-    tried though it did not promise enough alone to be fitted: it then gains more than the old one.
+    Replacements are `rivals` at the same place. One that is known to be confused with the effect is
+    tried even if it was not fitted alone, and then needs a larger gain.
     """
     kept = list(accepted)
     for k, old in enumerate(accepted[:-1]):
@@ -61,9 +61,8 @@ def exchange_effects(
                 continue
             gained = likelihood_gain(tried, model, model_set.series)  # prices counted
             if gained.penalised > _required_gain(kept[k], tried, rival.placed_effect):
-                log(
-                    f"{rival.placed_effect.id} goes better with the others than {kept[k].placed_effect.id}"
-                )
+                old_id = kept[k].placed_effect.id
+                log(f"{rival.placed_effect.id} fits the others better than {old_id}")
                 kept[k], model = _assign_gain(rival, kept[k], tried, gained), tried
     return kept, model
 

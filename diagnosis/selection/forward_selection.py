@@ -1,4 +1,4 @@
-"""Selection: which effects are accepted - one after the other, then each looked at again."""
+"""Forward selection: effects are accepted one after the other, then each is checked again."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ NONE_MARGIN = 5.0
 
 @dataclass(frozen=True)
 class Selection:
-    """What was accepted: `model` over `base`, the candidates of the first round, best first.
+    """The accepted effects: `model` extends `base`, `first_round` are all candidates, best first.
 
-    `rivals` may be it as well as the first accepted one. `other` is the evidence
-    [nats] for none of the candidates: that of a formula where one explains more.
+    `rivals` are confusable with the first accepted effect. `other` is the score [nats] of none of
+    the candidates, or of a formula.
     """
 
     base: Estimate = field(repr=False)
@@ -67,11 +67,14 @@ class Selection:
 
     @property
     def has_unknown_input(self) -> bool:
-        """Whether an input that explains anything at all was accepted."""
+        """Whether an unknown input, which has no parameters, was accepted."""
         return any(not has_parameters(tried.placed_effect) for tried in self.accepted)
 
     def probabilities(self) -> dict[str, float]:
-        """Return the probability of each fitted candidate of the first round, and of `other`."""
+        """Return the probability of each fitted candidate of the first round by id, and of `other`.
+
+        The weights are exp(score / 2).
+        """
         totals = {t.placed_effect.id: t.score for t in self.first_round if t.likelihood_gain}
         totals["other"] = self.other
         most = max(totals.values())
@@ -114,11 +117,11 @@ def select_effects(
     earlier: Sequence[CandidateFit] = (),
     screening_fraction: float = SCREENING_FRACTION,
 ) -> Selection:
-    """Return the effects that the training recordings ask for: at most three, none too many.
+    """Return the effects that the training recordings support, at most three.
 
-    `cross_validated_fraction` is the part of the threshold that is asked for what is left out, `screening_fraction` the part that
-    a candidate has to promise alone. `earlier` candidates, best first, were tried with the recordings
-    read in another way: only the best are tried again.
+    `cross_validated_fraction` is the fraction of the threshold that the cross-validated gain needs,
+    and `screening_fraction` the one that the screening gain needs. If `earlier` candidates of
+    another inter-sample behaviour are given, only the best of them are tried.
     """
     asked = _SelectionSettings(
         model_set, units, thresholds, cross_validated_fraction, screening_fraction, log
@@ -278,9 +281,10 @@ def rescreen_after_refit(
     log: LogCallback = lambda text: None,
     min_gain: float = 0.0,
 ) -> tuple[Estimate | None, list[CandidateFit]]:
-    """Return a better fit of the model itself, if there is one, and the candidates beside it.
+    """Return a better fit of the base if there is one (else None), and the candidates beside it.
 
-    Beside accepted effects they are only looked for again where one still gains what is `min_gain` it.
+    The candidates are screened again unless their gains are clearly larger than the improvement,
+    or, beside accepted effects, too small.
     """
     better = _refit_base(model_set, model, units, candidate_fits)
     if better is None:

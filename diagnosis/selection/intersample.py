@@ -1,7 +1,7 @@
-"""Ways: the base recalibrated with inputs held from sample to sample, and straight in between.
+"""Inter-sample behaviour: the base recalibrated with held inputs and with linear ones.
 
-Which one a recording asks for cannot always be told before something missing is found: half a
-sample is a delay as well.
+Which one holds cannot always be determined before missing physics is found, because half a sample
+is a delay as well.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ RecalibratedSet = tuple[ModelSet, Estimate]
 def recalibrate_by_hold(
     model_set: ModelSet, log: LogCallback = lambda text: None
 ) -> list[RecalibratedSet]:
-    """Return benches of paced recordings with their recalibrated bases, to be tried in turn.
+    """Return model sets with decimated recordings and their recalibrated bases, in the order of
+    trial.
 
-    With inputs that run straight between samples the truth is reached sooner; held ones are tried
-    beside it where the base alone is better with them.
+    First-order hold comes first; zero-order hold is added if the base fits better with it.
     """
     firsts = []
     for is_linear in (True, False):
@@ -66,7 +66,7 @@ def recalibrate_by_hold(
 
 
 def best_hold(recalibrated: Sequence[RecalibratedSet]) -> RecalibratedSet:
-    """Return the way whose base foresees the recordings better."""
+    """Return the model set whose base has the larger likelihood."""
     return min(recalibrated, key=lambda way: way[1].negative_log_likelihood)
 
 
@@ -75,9 +75,10 @@ def select_hold(
     thresholds: Thresholds,
     log: LogCallback = lambda text: None,
 ) -> tuple[ModelSet, Estimate, Selection]:
-    """Return the way in which the recordings are foreseen best with what is missing, and that.
+    """Return the model set, base and selection with the smallest cost.
 
-    Where something was accepted in one way another is gone only if that fits better there.
+    After a selection with accepted effects, another inter-sample behaviour is tried only if the
+    model with these effects fits better with it.
     """
     found: list[tuple[float, ModelSet, Estimate, Selection]] = []
     known: tuple[CandidateFit, ...] = ()

@@ -1,6 +1,7 @@
-"""Form: which of two is shown, an effect or the plainer one that it is without some of its numbers.
+"""Nested forms: the choice between an effect and a restricted form with fewer parameters.
 
-Prices of numbers do not tell: those that the recordings hardly determine cost as much as others.
+A complexity penalty does not decide this, because a parameter that recordings hardly determine
+costs as much as others. The choice is a likelihood-ratio test.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ RESTRICTED_LEAD = 4.0
 def restricted_candidates(
     best: CandidateFit, candidate_fits: Sequence[CandidateFit]
 ) -> Iterator[CandidateFit]:
-    """Yield the candidates that one which may be plainer may be: at its place, with fewer numbers,
-    that gained nearly as much.
+    """Yield fitted candidates at the same place with fewer parameters and nearly the same gain.
+
+    There are none if the best candidate has no restricted form.
     """
     if (
         best.estimate is None
@@ -62,8 +64,8 @@ def restricted_candidates(
 def promote_restricted(
     first: CandidateFit, candidate_fits: Sequence[CandidateFit]
 ) -> tuple[CandidateFit, list[CandidateFit]]:
-    """Return the candidate that others gave way to, and all with it, best first: it leads those at
-    its place.
+    """Return a candidate with a lead over others at its place, and all candidates, best score
+    first.
     """
     path = place_path(first.placed_effect)
     others = [t for t in candidate_fits if t.placed_effect.id != first.placed_effect.id]
@@ -76,7 +78,9 @@ def promote_restricted(
 def accepts_restriction(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> bool:
-    """Tell whether an effect that a model holds may as well be a plainer one."""
+    """Return whether recordings do not reject a restricted value of an effect's parameter (Wald
+    test).
+    """
     if model.normal_equations is None:
         return False
     covariance, names = covariance_of(model)
@@ -90,7 +94,9 @@ def accepts_restriction(
 
 
 def has_restricted_form(placed_effect: PlacedEffect) -> bool:
-    """Tell whether an effect is a plainer one at some value of one of its parameters."""
+    """Return whether an effect declares a `plain` value of a parameter, at which it is a simpler
+    one.
+    """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
     return any(isinstance(one.node, MappingNode) and "plain" in one.node.entries for one in entries)
@@ -122,9 +128,10 @@ def choose_form(
     best: CandidateFit,
     candidate_fits: Sequence[CandidateFit],
 ) -> CandidateFit:
-    """Return the best candidate, or its plainer or fuller form where the recordings show that one.
+    """Return the best candidate, or its nested form if the likelihood-ratio test prefers that.
 
-    Each is fitted from where the other is as well: which one fits better is not to be an accident.
+    Both are fitted from the optimum of the other one, so that the comparison is not one of local
+    optima.
     """
     for other in candidate_fits:
         if best.estimate is None or not _is_nested_with(other, best):

@@ -1,8 +1,8 @@
-"""Alone: a model that forgets where it started is judged by simulation, with nothing fed back.
+"""Output error: the criterion of free simulation, for models with fading memory.
 
-A closed loop, a shaft beside a measured speed: what happened long ago does not matter there, so
-whole recordings can be simulated. An observer would only take over what such a model misses; and
-it does not know when a gap opens. A model that integrates a torque to a speed forgets nothing.
+Examples are a closed loop, or a shaft beside a measured speed: the initial state is forgotten, so
+whole recordings can be simulated. An observer would absorb the errors of such a model, and does not
+know when a gap opens. A model that integrates a torque to a speed has no fading memory.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ OUTPUT_ERROR_SCREENING_FRACTION = 0.1
 
 @dataclass(frozen=True)
 class OutputErrorFit:
-    """A bench without drifts, and the `base` fitted so that it simulates best."""
+    """A model set without disturbances, and the base fitted by the output-error criterion."""
 
     model_set: ModelSet
     base: Estimate
 
 
 def has_fading_memory(model: Estimate, series: Sequence[SampledRecording]) -> bool:
-    """Tell whether a shift of all states at the start is forgotten halfway through recordings."""
+    """Return whether a shift of all initial states has decayed halfway through each recording."""
     return all(
         _remaining_shift(model, one, k) < MAX_REMAINING_SHIFT for k, one in enumerate(series)
     )
@@ -72,9 +72,10 @@ def _remaining_shift(model: Estimate, series: SampledRecording, recording: int) 
 
 
 def fit_output_error(full_rate_set: ModelSet, base: Estimate) -> OutputErrorFit:
-    """Return the base fitted so that it simulates best; `full_rate_set` has the recordings as they are.
+    """Return the base fitted by the output-error criterion to the recordings, decimated if
+    possible.
 
-    Inputs are held, or run straight between samples: what is better.
+    It is the best of both inter-sample behaviours, from the fitted and the declared parameters.
     """
     limits = np.full_like(base.noise_levels.huber_limits, np.inf)
     noise_levels = dataclasses.replace(

@@ -1,8 +1,7 @@
-"""Replicate: recordings as the recalibrated base would have given them, from random numbers.
+"""Replicates: simulated recordings of the recalibrated base with random noise.
 
-The base runs freely over the inputs that were recorded, without their noise, from where each
-recording starts, with the slow torques that its drifts stand for; signals and inputs get new noise
-and are quantised.
+The base is simulated under denoised recorded inputs from the start of each recording, with random
+disturbances. Outputs and inputs get new noise and quantisation.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ def simulate_replicate(
     series: Sequence[SampledRecording],
     random: np.random.Generator,
 ) -> tuple[SampledRecording, ...] | None:
-    """Return simulated recordings on the grid of `series`, None where the base leaves all bounds.
+    """Return simulated recordings on the grid of `series`, or None if the base diverges.
 
-    `model` is the base compiled for that grid. The first inputs stay as they were: on which side
-    of a gap a shaft starts may hang on their sign.
+    `model` is the base compiled for that grid. The first inputs are the recorded ones, because
+    their sign can determine the side of a gap at which a shaft starts.
     """
     found = []
     predictor = model.predictor

@@ -1,4 +1,4 @@
-"""Screening: what candidates promise by steps from their starts: on some recordings, then all."""
+"""Screening: gains of candidates after few steps, on some recordings first, then on all."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ One = TypeVar("One")
 
 @dataclass(frozen=True)
 class ScreeningResult:
-    """What a candidate gains [nats] some steps from its start, and where it then is: None where it
-    was not looked at on all recordings.
+    """The screening gain [nats] of a candidate, and its estimate; None if not screened on all
+    recordings.
     """
 
     placed_effect: PlacedEffect
@@ -63,8 +63,9 @@ class ScreeningResult:
 
 @dataclass(frozen=True)
 class ScreeningSubset:
-    """Some recordings, the `rows` of a bench, as a `bench` of their own, with the `base` there;
-    candidates start where they were fitted `alone`, too.
+    """A subset of recordings (`rows` of the model set) as a model set with its base.
+
+    `fitted_values` are further starts of candidates.
     """
 
     rows: list[int]
@@ -73,7 +74,7 @@ class ScreeningSubset:
     fitted_values: FittedValues = field(default_factory=dict, repr=False)
 
     def point(self, whole: ParameterVector) -> ParameterVector:
-        """Return a point of all recordings for these."""
+        """Return the part of a point of all recordings for this subset."""
         return ParameterVector(whole.shared, whole.per_recording[self.rows])
 
 
@@ -84,9 +85,10 @@ def screen_candidates(
     min_gain: float,
     fitted_values: FittedValues | None = None,
 ) -> list[ScreeningResult]:
-    """Return what candidates promise, the best first; one that gains `min_gain` [nats] is looked at on
-    all recordings, unless many gain more or one much more. They start where they were fitted
-    `fitted_values`, too.
+    """Return the screening results of candidates, the largest gain first.
+
+    A candidate that gains at least `min_gain` [nats] on the subset is screened on all recordings,
+    unless many gain more. Candidates start also at `fitted_values`.
     """
     some, fair = (
         screening_subset(model_set, base, fitted_values or {}),
@@ -132,7 +134,7 @@ def _split_by_gain(
 def screening_subset(
     model_set: ModelSet, base: Estimate, fitted_values: FittedValues
 ) -> ScreeningSubset:
-    """Return the recordings to begin with, spread over all."""
+    """Return the recordings that are screened first, evenly spread over all, with their base."""
     count = len(model_set.series)
     screened = min(max(round(SCREENED_FRACTION * count), MIN_SCREENED), MAX_SCREENED)
     if count <= screened:
@@ -296,7 +298,9 @@ def _continue_screening(subset: ScreeningSubset, screened: Estimate) -> Estimate
 
 
 def start_values(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return where a fit may start: each start of the parameters that the base does not have."""
+    """Return the starts of a candidate's fit: values of the parameters that the base does
+    not have.
+    """
     own = [one for one in candidate.free_parameters if one.name not in base]
     most = max((len(one.starts) for one in own if not one.per_recording), default=1)
     return [{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own} for k in range(most)]

@@ -1,7 +1,7 @@
-"""Room: what drifts that are let free gain beside a model: about what further effects could.
+"""Stopping rule: an upper bound of the gain of further effects, from free disturbances.
 
-A drift follows anything at its place, late. Where those that there are have little to do, and none
-finds more when it is let free, no effect does.
+A disturbance follows any error at its place with a delay. If the present disturbances are small,
+and free ones gain little, no effect does.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ the effect gains what it explains better."""
 def meets_stopping_rule(
     model_set: ModelSet, model: Estimate, units: Mapping[str, float], min_gain: float
 ) -> bool:
-    """Tell whether a further effect cannot gain what is `min_gain` [nats].
+    """Return whether a further effect cannot gain `min_gain` [nats].
 
-    Drifts that lose much when they are let free did not find their way: they tell nothing.
+    Free disturbances that lose much have not converged and show nothing.
     """
     drifts = model.noise_levels.process
     is_low = all(
@@ -47,8 +47,10 @@ def meets_stopping_rule(
 
 
 def further_gain_bound(model_set: ModelSet, model: Estimate) -> float:
-    """Return what drifts at all places gain [nats]: balances, elements and outputs, but for those
-    where the model has effects if they do not go along with these; infinity where none do.
+    """Return the gain [nats] of free disturbances in balances, elements and outputs.
+
+    Places of effects are left out if the model with disturbances there has no finite cost; the
+    bound is infinite if it still has none.
     """
     inside = [
         placed_effect
@@ -70,8 +72,8 @@ def disturbance_gain(
     disturbances: Sequence[PlacedEffect],
     fixed_places: Collection[str] = (),
 ) -> float:
-    """Return what some drifts gain [nats] that are let free, but for those of `fixed_places` places; -inf
-    where they do not go along.
+    """Return the gain [nats] of free disturbances, except at `fixed_places`; -inf if not
+    compilable.
     """
     try:
         candidate = model_set.compile_candidate(model.candidate.placed_effects, disturbances)

@@ -1,8 +1,7 @@
-"""Stirring: whether what is unknown is loud when known inputs move, or near rest.
+"""Input dependence: whether a disturbance is large while known inputs vary, or near standstill.
 
-A hidden input comes when it likes. What a model gets wrong of its actuator, shaft or tyre is heard
-whenever the known inputs change, what it gets wrong of a friction near rest: it is no input,
-whatever its sign.
+An unknown input is independent of known ones. Errors of an actuator, a shaft or a tyre appear when
+known inputs change, and errors of friction near standstill; these are no inputs.
 """
 
 from __future__ import annotations
@@ -25,9 +24,10 @@ STANDSTILL_STDS = 0.1
 
 
 def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[Reals]) -> float:
-    """Return how loudness goes with the movement or the amount of an input: a correlation.
+    """Return the largest correlation of a disturbance's amplitude with an input's rate or
+    amplitude.
 
-    `disturbances` (samples,) in each recording is known from where its states were found.
+    `disturbances` (samples,) of each recording begin after the burn-in.
     """
     pairs = list(zip(series, disturbances, strict=True))
     columns = range(series[0].inputs.shape[1])
@@ -47,7 +47,9 @@ def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[
 def standstill_dependence(
     series: Sequence[SampledRecording], disturbances: Sequence[Reals]
 ) -> float:
-    """Return how loudness goes with a compared signal being near rest, at most: a correlation."""
+    """Return the largest correlation of a disturbance's amplitude with an output near
+    standstill.
+    """
     most = 0.0
     for column in range(series[0].measured.shape[1]):
         spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))

@@ -1,7 +1,7 @@
-"""Hidden: an unknown force or torque that acts in windows: a brake, a pulse, a hit.
+"""Unknown input: detection of a force or torque that acts in windows, such as a brake or an impact.
 
-Found as a drift that is let free at a balance (see freedom). It takes no parameters to explain
-anything at all: it is named only where it is silent most of the time.
+It is found as a free disturbance in a balance. Because that explains anything without parameters,
+it is accepted only if it is small most of the time.
 """
 
 from __future__ import annotations
@@ -94,11 +94,11 @@ def detect_unknown_input(
     min_gain: float,
     log: LogCallback = lambda text: None,
 ) -> tuple[Selection, tuple[Location, ...]]:
-    """Return a selection with a hidden input, and the places with what it does over time.
+    """Return the selection with an unknown input, and the locations with its time course.
 
-    It stands for effects that explain less than it, and behind those that explain more. Gains are
-    those over a model without drifts, of which the one as it is may have taken its part. `min_gain`
-    are the nats that it must gain at least.
+    It replaces effects that explain less, and follows those that explain more. Gains are relative
+    to a model without disturbances. If none gains `min_gain` [nats], both arguments are returned
+    unchanged.
     """
     found = _find_unknown_input(model_set, selection, locations, min_gain)
     if found is None or _supported_gain(found.likelihood_gain) < min_gain:
@@ -290,11 +290,10 @@ def _fit_small_disturbances(model_set: ModelSet, model: Estimate) -> Estimate:
 def _refit_on_quiet_intervals(
     model_set: ModelSet, location: Location, free_model: Estimate
 ) -> Location:
-    """Return a place with a model in which it is `free_model`, its parameters from where it is silent.
+    """Return a location with a model whose parameters are fitted on the input's quiet intervals.
 
-    First from where it is not among what is loudest, then from where it is nothing for sure, if
-    all is foreseen better so. What it shows in silence is its error, and no standard deviation is
-    less than that.
+    The intervals are first those outside the largest values, then those without a significant
+    value, if that costs less. The standard deviation is at least the size in quiet intervals.
     """
     least = _energy_level([one.values for one in location.disturbances])
     silent = [np.abs(one.values) < least for one in location.disturbances]
@@ -322,7 +321,7 @@ def _refit_on_quiet_intervals(
 
 
 def is_intermittent(disturbances: Sequence[Reals]) -> bool:
-    """Tell whether a drift is silent most of the time."""
+    """Return whether a disturbance is small most of the time."""
     whole = np.abs(np.concatenate(disturbances))
     return bool(np.mean(whole >= _energy_level(disturbances)) < MAX_ACTIVE_FRACTION)
 

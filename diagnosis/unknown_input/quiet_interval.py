@@ -1,7 +1,7 @@
-"""Silence: parameters from where a hidden input is silent, for what it does where it is not.
+"""Quiet intervals: parameters estimated where an unknown input does not act.
 
-While it is free everywhere it takes up what a wrong mass or drag leaves over, and nothing tells the
-two apart. Where it is silent the model has to follow without it.
+An input that is free everywhere also absorbs the error of a wrong mass or drag. In its quiet
+intervals the model must follow without it.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ MIN_QUIET_FRACTION = 1.0 / 3.0
 def refit_on_quiet_intervals(
     model: Estimate, series: Sequence[SampledRecording], active: Sequence[Booleans], name: str
 ) -> Estimate:
-    """Return a model whose drift of a `name` is free, its parameters from where that is not `active`,
-    told for each recording behind its burn-in (samples,).
+    """Return a model with the disturbance `name` free and parameters from its quiet intervals.
 
-    As it is where there is not silence enough.
+    `active` (samples,) of each recording after its burn-in marks where the input acts. The model is
+    returned unchanged if the quiet intervals are too short.
     """
     pieces, places = _quiet_recordings(series, active)
     if sum(one.count for one in pieces) < MIN_QUIET_FRACTION * sum(one.count for one in series):

@@ -214,7 +214,7 @@ def test_an_effect_that_the_project_does_not_have_is_asked_for(dossier: mw.Diagn
     diagnosis = dataclasses.replace(dossier.diagnosis, selection=selection)
     (told,) = missing_effect_notes(dataclasses.replace(dossier, diagnosis=diagnosis))
     assert told.endswith(
-        "library/coulomb_friction.yaml has to be below spec/: the variant lays this effect by name"
+        "library/coulomb_friction.yaml has to be below spec/: the variant finds this effect by name"
     )
 
 
@@ -258,7 +258,7 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
         "passage through zero speed",
         "coulomb_friction@w",
         "Where it improved and where not",
-        "told by its past",
+        "predictable from its past",
         "What it changes in the equations (1 line)",
         "Nothing odd was found",
     ):
