@@ -23,8 +23,8 @@ class ModeEntryEvent:
 def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEntryEvent | None:
     """Return the event that a text like `plant.no_contact` or `plant.drive -> plant.coast` names.
 
-    Returns None with a problem reported if a mode does not exist or no transition enters it. In a
-    chart the existence of a transition is not checked.
+    Returns None with a problem reported if a mode does not exist or no transition enters it. The
+    fault mode counts as entered from any mode. In a chart the transitions are not examined.
     """
     head, arrow, tail = (part.strip() for part in scalar.text.partition("->"))
     known = modes_by_name(system)

@@ -62,12 +62,14 @@ class Rewind:
 class Transition:
     """A change from the mode `source` to `target`, enabled when `when` has been true for `wait`.
 
-    The other fields matter in a chart. `events` are the events that the transition reacts to
-    (empty: any micro-step), `raises` the events that it raises. `targets` are its target modes; an
-    empty tuple means that it has none. `history` says whether a superstate is entered at the modes
-    that were active last. An `internal` transition does not leave its source. The guard of a
-    completion transition (`is_completion`) is that a final mode is active in the source.
-    `is_table_cell` marks a transition of a transition table.
+    `reset` gives the assignments to states and discrete variables. `memory` tells whether the wait
+    counters of the target are reset or continue. The remaining fields matter in a chart only.
+    `events` are the events that the transition reacts to (empty: any micro-step), `raises` the
+    events that it raises. `targets` are its target modes; without any it is taken without a change
+    of mode. `history` tells whether a superstate is entered at the modes that were active last. An
+    `internal` transition does not leave its source. The guard of a completion transition
+    (`is_completion`) is that a final mode is active in the source. `is_table_cell` marks a
+    transition of a transition table.
     """
 
     name: str

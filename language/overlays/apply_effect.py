@@ -110,8 +110,8 @@ class _EffectApplier:
         table = body.get("equations")
         if isinstance(table, MappingNode):
             own = set(self.private_names.values())
-            entries = {key: entry for key, entry in table.entries.items() if key in own}
-            body = put_node(body, ("equations",), MappingNode(entries, table.span))
+            new = {key: entry for key, entry in table.entries.items() if key in own}
+            body = put_node(body, ("equations",), MappingNode(new, table.span))
         return body
 
     def _choose_private_names(self) -> dict[str, str]:

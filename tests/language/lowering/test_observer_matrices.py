@@ -144,7 +144,7 @@ def test_what_a_balance_reads_has_a_value_here(tmp_path: Path) -> None:
 def test_matrices_are_taken_from_the_model_or_written_not_both(tmp_path: Path) -> None:
     lines = problem_lines(lambda: made(tmp_path, ("of: m.still", "of: m.still\n      f: {x: c}")))
     assert [line.partition(" ")[2] for line in lines] == [
-        "`f` is taken from the model: `of` stands beside it"
+        "`f` is taken from the model, because `of` is given"
     ]
 
 
