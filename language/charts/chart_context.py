@@ -61,9 +61,9 @@ class ChartContext:
         """Return the transitions whose source is in a region, each with its chart endpoints."""
         nodes = (node for node in self.chart.nodes if node.region == region)
         return [
-            (way, self.chart.transitions[way.key])
+            (transition, self.chart.transitions[transition.key])
             for node in nodes
-            for way in self.transitions_of(node)
+            for transition in self.transitions_of(node)
         ]
 
     @cached_property
@@ -83,10 +83,10 @@ class ChartContext:
         nodes = self.chart.nodes
         found = {node.parent for node in nodes if node.kind == "history"}
         deep = [node.parent for node in nodes if node.history == "deep"]
-        for transition, way in self.all_transitions:
+        for transition, chart_transition in self.all_transitions:
             if transition.history:
-                found.update(way.targets)
-                deep += way.targets if transition.history == "deep" else ()
+                found.update(chart_transition.targets)
+                deep += chart_transition.targets if transition.history == "deep" else ()
         for outer in deep:
             inner = (r for r in self.chart.regions if nodes[outer].contains(r.index))
             found.update(region.index for region in inner if region.kind == "compound")
@@ -99,11 +99,14 @@ class ChartContext:
         Their wait counters are kept when they are left.
         """
         found: set[int] = set()
-        for transition, way in self.all_transitions:
-            if transition.memory == "continue" and way.domain is not None:
-                domain = self.chart.nodes[way.domain]
+        for transition, chart_transition in self.all_transitions:
+            if transition.memory == "continue" and chart_transition.domain is not None:
+                domain = self.chart.nodes[chart_transition.domain]
                 for node in self.chart.nodes[domain.index + 1 : domain.last_descendant + 1]:
-                    if any(self.chart.are_nested(node.index, target) for target in way.targets):
+                    if any(
+                        self.chart.are_nested(node.index, target)
+                        for target in chart_transition.targets
+                    ):
                         found.add(node.index)
         return frozenset(found)
 

@@ -144,9 +144,9 @@ class _EntrySet:
 
         Its entry action follows later as a stage.
         """
-        charting = self.context
+        context = self.context
         ops: list[Op] = []
-        mode = charting.mode_of(node)
+        mode = context.mode_of(node)
         if node.number is not None:
             variable = mode_variable("memory.mode", node.region)
             ops.append(Assign(variable, integer(node.number)))
@@ -154,10 +154,10 @@ class _EntrySet:
             return ops
         if mode.entry:
             ops.append(Assign(entry_flag(node).name, Value(True)))
-        if self.transition.memory == "reset" and node.index in charting.timer_keeping_nodes:
-            timers = [charting.info_of(way).timer for way in mode.transitions]
+        if self.transition.memory == "reset" and node.index in context.timer_keeping_nodes:
+            timers = [context.info_of(transition).timer for transition in mode.transitions]
             ops += [Assign(timer, integer(0)) for timer in timers if timer]
-        ops += start_timers(charting.automaton, mode)
+        ops += start_timers(context.automaton, mode)
         if node.number is not None:
-            ops += start_run(charting.automaton, mode)
+            ops += start_run(context.automaton, mode)
         return ops

@@ -17,7 +17,9 @@ def exit_blocks(context: ChartContext) -> dict[str, Block]:
     """
     chart = context.chart
     blocks: dict[str, Block] = {}
-    for index in sorted(chart.exited_domains(way for _, way in context.all_transitions)):
+    for index in sorted(
+        chart.exited_domains(chart_transition for _, chart_transition in context.all_transitions)
+    ):
         node = chart.nodes[index]
         blocks[f"leave_{to_identifier(node.path)}"] = _exit_active_nodes(context, node, node.index)
     for region in chart.regions:
@@ -68,7 +70,7 @@ def _exit_node(context: ChartContext, node: ChartNode) -> list[Op]:
     if mode.exit:
         ops.append(Assign(exit_flag(node).name, Value(True)))
     if node.index not in context.timer_keeping_nodes:
-        timers = [context.info_of(way).timer for way in mode.transitions]
+        timers = [context.info_of(transition).timer for transition in mode.transitions]
         ops += [Assign(timer, integer(0)) for timer in timers if timer]
     edges = edge_detectors_by_mode(context.automaton).get(mode.key, ())
     return [*ops, *(Assign(edge.armed_variable, Value(False)) for edge in edges)]

@@ -242,9 +242,9 @@ def _log_and_exit(context: ChartContext) -> Block:
     for region in context.chart.regions:
         chosen = Ref(_selected_variable_name(context)(region.region))
         cases = []
-        for transition, way in context.transitions_in(region.region):
-            if way.domain is not None:
-                block = (run_exit_block(context.chart.nodes[way.domain]),)
+        for transition, chart_transition in context.transitions_in(region.region):
+            if chart_transition.domain is not None:
+                block = (run_exit_block(context.chart.nodes[chart_transition.domain]),)
                 cases.append((context.info_of(transition).number, block))
         if not context.transitions_in(region.region):
             continue
@@ -318,8 +318,8 @@ def _enter_targets(context: ChartContext) -> Block:
     ops: list[Op] = []
     for region in context.chart.regions:
         cases = []
-        for transition, way in context.transitions_in(region.region):
-            block = lower_entry_set(context, transition, way)
+        for transition, chart_transition in context.transitions_in(region.region):
+            block = lower_entry_set(context, transition, chart_transition)
             if block:
                 cases.append((context.info_of(transition).number, block))
         if cases:

@@ -45,7 +45,7 @@ from language.lowering.edge_detection import (
 )
 from language.lowering.event_queue import event_condition
 from language.lowering.expressions import lower_expression
-from language.lowering.fault_mode import FAULT_PRIORITY as FAULT_FIRST
+from language.lowering.fault_mode import FAULT_PRIORITY
 from language.lowering.range_saturation import FAULT_HAPPENED
 from language.lowering.transition_infos import wait_ticks
 from language.model.automaton import Mode, Transition
@@ -189,7 +189,9 @@ def _is_left_by_fault(context: ChartContext, region: ChartNode) -> bool:
     """Return whether the transition into the fault mode leaves a region."""
     holding = [leaf for leaf in context.chart.leaves(CHART) if leaf.contains(region.index)]
     return any(
-        way.priority == FAULT_FIRST for leaf in holding for way in context.transitions_of(leaf)
+        transition.priority == FAULT_PRIORITY
+        for leaf in holding
+        for transition in context.transitions_of(leaf)
     )
 
 
@@ -207,7 +209,7 @@ def _request_in_leaf(context: ChartContext, leaf: ChartNode, blocks: dict[str, B
     for name in reversed(order):
         more: Block = (Branch(none, chosen),) if chosen else ()
         chosen = (RunBlock(f"choose_{name}"), *more)
-    fault = next((w for w in context.transitions_of(leaf) if w.priority == FAULT_FIRST), None)
+    fault = next((w for w in context.transitions_of(leaf) if w.priority == FAULT_PRIORITY), None)
     if fault and context.chart.order == "outer_first" and len(names) > 1:
         at_once = Assign(request_variable(leaf.region), integer(context.info_of(fault).number))
         chosen = (Branch(Ref(FAULT_HAPPENED), (at_once,), chosen),)
@@ -238,10 +240,14 @@ def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
 def _conflicting_regions(context: ChartContext, region: ChartNode) -> list[ChartNode]:
     """Return the other regions with a transition that may leave nodes that this region leaves."""
     chart = context.chart
-    own = chart.exited_domains(way for _, way in context.transitions_in(region.region))
+    own = chart.exited_domains(
+        chart_transition for _, chart_transition in context.transitions_in(region.region)
+    )
     found = []
     for other in chart.regions:
-        theirs = chart.exited_domains(way for _, way in context.transitions_in(other.region))
+        theirs = chart.exited_domains(
+            chart_transition for _, chart_transition in context.transitions_in(other.region)
+        )
         if other is not region and any(chart.are_nested(a, b) for a in own for b in theirs):
             found.append(other)
     return found
@@ -250,10 +256,13 @@ def _conflicting_regions(context: ChartContext, region: ChartNode) -> list[Chart
 def _set_exit_span(context: ChartContext, region: ChartNode) -> Block:
     """Return the operations that set the first and last node which a region's request leaves."""
     cases = []
-    for transition, way in context.transitions_in(region.region):
+    for transition, chart_transition in context.transitions_in(region.region):
         low, high = EMPTY_SPAN
-        if way.domain is not None:
-            low, high = way.domain, context.chart.nodes[way.domain].last_descendant
+        if chart_transition.domain is not None:
+            low, high = (
+                chart_transition.domain,
+                context.chart.nodes[chart_transition.domain].last_descendant,
+            )
         ops = (Assign(_span_first(region), integer(low)), Assign(_span_last(region), integer(high)))
         cases.append((context.info_of(transition).number, ops))
     return (
@@ -311,14 +320,14 @@ def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
     They resolve the first request of the region and those around it, by `order`.
     """
     chart = context.chart
-    plain = [leaf for leaf in chart.leaves(region.region) if leaf.kind == "atomic"]
-    around = [region]
-    while (outer := chart.parent_region(around[-1])) is not None:
-        around.append(outer)
+    leaves = [leaf for leaf in chart.leaves(region.region) if leaf.kind == "atomic"]
+    enclosing = [region]
+    while (outer := chart.parent_region(enclosing[-1])) is not None:
+        enclosing.append(outer)
     if chart.order == "outer_first":
-        around.reverse()
+        enclosing.reverse()
     ops: Block = ()
-    for each in reversed(around):
+    for each in reversed(enclosing):
         if not context.transitions_in(each.region):
             continue
         fresh = Branch(
@@ -327,7 +336,7 @@ def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
         ops = (
             Branch(Compare("!=", Ref(request_variable(each.region)), integer(0)), (fresh,), ops),
         )
-    cases = tuple((leaf.number, ops) for leaf in plain if leaf.number is not None)
+    cases = tuple((leaf.number, ops) for leaf in leaves if leaf.number is not None)
     if not ops or not cases:
         return ()
     return (Switch(mode_variable("memory.mode", region.region), cases),)

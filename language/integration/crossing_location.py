@@ -190,12 +190,14 @@ def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Bl
     there.
     """
     high = Ref("work.high")
-    kept = (Assign("work.s", high), *_accept_point(field))
+    accept = (Assign("work.s", high), *_accept_point(field))
     if len(guard_slots(mode)) < 2:
-        return (Branch(is_before_end, kept),)
+        return (Branch(is_before_end, accept),)
     return (
         Branch(
-            is_before_end, (*kept, RunBlock(f"guards_{mode.name}")), _evaluate_guards_at(mode, high)
+            is_before_end,
+            (*accept, RunBlock(f"guards_{mode.name}")),
+            _evaluate_guards_at(mode, high),
         ),
     )
 

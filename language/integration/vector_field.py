@@ -260,8 +260,8 @@ def lower_entry_at_point(
     if not assignments:
         return []
     known = bindings_at_point(field)
-    wanted = names_read(formula.tree for formula in assignments.values())
-    ops = lower_equations(target, known, "work.at_", field.key_prefix, wanted)
+    required = names_read(formula.tree for formula in assignments.values())
+    ops = lower_equations(target, known, "work.at_", field.key_prefix, required)
     return [*set_point_to_state(field), *ops, *lower_stage(field.automaton, assignments, known)]
 
 
@@ -277,10 +277,10 @@ def _lower_rates(field: VectorField, mode: Mode) -> Block:
     A balance of a parallel region is chosen by the mode of that region.
     """
     known = bindings_at_point(field)
-    wanted = names_read(
+    required = names_read(
         tree for balance in possible_balances(mode) for tree in (balance.right, balance.left)
     )
-    ops = lower_equations(mode, known, "work.at_", field.key_prefix, wanted)
+    ops = lower_equations(mode, known, "work.at_", field.key_prefix, required)
 
     def rate_is(balance: Balance) -> Assign:
         """Return the assignment of the rate of a balance."""

@@ -93,13 +93,21 @@ def lower_stage_of_regions(
     reads: list[Op] = []
     commits: list[Op] = []
     for region in automaton.all_regions:
-        ways = [
-            way for mode in region.modes.values() for way in mode.transitions if assignments_of(way)
+        transitions = [
+            transition
+            for mode in region.modes.values()
+            for transition in mode.transitions
+            if assignments_of(transition)
         ]
-        numbers = [number_of(way) for way in ways]
-        read = [tuple(read_stage(automaton, assignments_of(way), known)) for way in ways]
-        commit = [tuple(commit_stage(automaton, assignments_of(way))) for way in ways]
-        if ways:
+        numbers = [number_of(transition) for transition in transitions]
+        read = [
+            tuple(read_stage(automaton, assignments_of(transition), known))
+            for transition in transitions
+        ]
+        commit = [
+            tuple(commit_stage(automaton, assignments_of(transition))) for transition in transitions
+        ]
+        if transitions:
             reads.append(
                 Switch(selected_variable(region.name), tuple(zip(numbers, read, strict=True)))
             )
@@ -119,8 +127,8 @@ def lower_entry(
     if not assignments:
         return ()
     inside = {name: place for name, place in known.items() if name not in equation_formulas(target)}
-    wanted = names_read(formula.tree for formula in assignments.values())
-    ops = lower_equations(target, inside, "equation.", f"{automaton.name} ", wanted)
+    required = names_read(formula.tree for formula in assignments.values())
+    ops = lower_equations(target, inside, "equation.", f"{automaton.name} ", required)
     return (*ops, *lower_stage(automaton, assignments, inside))
 
 

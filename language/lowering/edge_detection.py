@@ -107,9 +107,9 @@ def guard_memory_bindings(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
         if ticks:
             over = Compare(">=", Ref(timers[mode.key][0]), integer(ticks))
         found[memory_key(part)] = over
-    for key, beat in _periodic_triggers(automaton).items():
+    for key, trigger in _periodic_triggers(automaton).items():
         if key[0] == mode.key:
-            found[key[1]] = Compare(">=", Ref(beat.timer), integer(beat.period_ticks))
+            found[key[1]] = Compare(">=", Ref(trigger.timer), integer(trigger.period_ticks))
     return found
 
 
@@ -140,11 +140,11 @@ def count_ticks(automaton: Automaton) -> Iterator[Op]:
     """
     for timer, mode, longest in _after_timers(automaton).values():
         yield Count(timer, _is_active(automaton, mode), longest, f"{automaton.name} {mode.key}")
-    for beat in _periodic_triggers(automaton).values():
-        count = Ref(beat.timer)
-        full = Compare(">=", count, integer(beat.period_ticks))
-        on = Assign(beat.timer, Select(full, integer(1), add(count, integer(1))))
-        yield Branch(_is_active(automaton, beat.mode), (on,))
+    for trigger in _periodic_triggers(automaton).values():
+        count = Ref(trigger.timer)
+        full = Compare(">=", count, integer(trigger.period_ticks))
+        on = Assign(trigger.timer, Select(full, integer(1), add(count, integer(1))))
+        yield Branch(_is_active(automaton, trigger.mode), (on,))
 
 
 def reset_activation(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
@@ -162,8 +162,12 @@ def start_timers(automaton: Automaton, target: Mode) -> list[Op]:
     ops: list[Op] = []
     if target.key in timers:
         ops.append(Assign(timers[target.key][0], integer(0)))
-    beats = [beat for beat in _periodic_triggers(automaton).values() if beat.mode.key == target.key]
-    return [*ops, *(Assign(beat.timer, integer(0)) for beat in beats)]
+    triggers = [
+        trigger
+        for trigger in _periodic_triggers(automaton).values()
+        if trigger.mode.key == target.key
+    ]
+    return [*ops, *(Assign(trigger.timer, integer(0)) for trigger in triggers)]
 
 
 def activation_variables(automaton: Automaton) -> list[Variable]:
@@ -184,9 +188,9 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
     for timer, mode, longest in _after_timers(automaton).values():
         about = f"ticks since entry of `{mode.name}`, at most {longest}"
         found.append(Variable(timer, "whole", about=about))
-    for beat in _periodic_triggers(automaton).values():
-        about = f"ticks in `{beat.mode.name}`, from 1 to {beat.period_ticks} in turn"
-        found.append(Variable(beat.timer, "whole", about=about))
+    for trigger in _periodic_triggers(automaton).values():
+        about = f"ticks in `{trigger.mode.name}`, from 1 to {trigger.period_ticks} in turn"
+        found.append(Variable(trigger.timer, "whole", about=about))
     return found
 
 
@@ -220,12 +224,12 @@ def _periodic_triggers(automaton: Automaton) -> dict[tuple[str, str], PeriodicTr
     for mode in automaton.all_modes:
         for part in _calls_in_guards(mode, ("every",)):
             ticks = evaluate_ticks(automaton, part.arguments[0])
-            beat = PeriodicTrigger(f"timer.every_{len(found) + 1}", mode, ticks)
-            found.setdefault((mode.key, memory_key(part)), beat)
+            trigger = PeriodicTrigger(f"timer.every_{len(found) + 1}", mode, ticks)
+            found.setdefault((mode.key, memory_key(part)), trigger)
     return found
 
 
 def _calls_in_guards(mode: Mode, functions: tuple[str, ...]) -> list[FunctionCall]:
     """Return the calls of some functions in the guards of a mode, in order, with repetitions."""
-    parts = [part for way in mode.transitions for part in walk(way.when.tree)]
+    parts = [part for transition in mode.transitions for part in walk(transition.when.tree)]
     return [part for part in parts if isinstance(part, FunctionCall) and part.function in functions]

@@ -62,7 +62,7 @@ def queue_capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
     It is the number of input events, plus the bound of micro-steps if a transition raises events: a
     tick cannot take more of them.
     """
-    raised = any(way.raises for way in transitions)
+    raised = any(transition.raises for transition in transitions)
     inputs = sum(signal.is_input for signal in chart.events.values())
     return inputs + (chart.micro_steps if raised else 0)
 

@@ -39,11 +39,13 @@ def add_fault_transitions(automaton: Automaton) -> Automaton:
 def _add_chart_transitions(automaton: Automaton, chart: Chart) -> Chart:
     """Return the chart with these transitions and the nodes that they leave."""
     target = mode_paths(chart)[automaton.fault_mode or ""]
-    ways = dict(chart.transitions)
+    transitions = dict(chart.transitions)
     for leaf in chart.leaves(CHART):
         domain = chart.domain(leaf, [target], internal=False)
-        ways[f"{leaf.mode_key}.fault_mode"] = ChartTransition(leaf.index, (target.index,), domain)
-    return dataclasses.replace(chart, transitions=ways)
+        transitions[f"{leaf.mode_key}.fault_mode"] = ChartTransition(
+            leaf.index, (target.index,), domain
+        )
+    return dataclasses.replace(chart, transitions=transitions)
 
 
 def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
@@ -52,7 +54,7 @@ def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
         return mode
     assert automaton.fault_mode is not None
     key = f"{mode.key}.fault_mode"
-    way = Transition(
+    transition = Transition(
         name="fault_mode",
         source=mode.name,
         target=automaton.fault_mode,
@@ -63,7 +65,7 @@ def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
         key=key,
         span=mode.span,
     )
-    return dataclasses.replace(mode, transitions=(*mode.transitions, way))
+    return dataclasses.replace(mode, transitions=(*mode.transitions, transition))
 
 
 def fault_names(

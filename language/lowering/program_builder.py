@@ -211,9 +211,9 @@ def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix
     start value is held in the range of its variable (rule 18).
     """
     ops: list[Op] = []
-    carried = automaton.state_variables
-    for name in post_order({name: state.initial.reads for name, state in carried.items()}):
-        state = carried[name]
+    variables = automaton.state_variables
+    for name in post_order({name: state.initial.reads for name, state in variables.items()}):
+        state = variables[name]
         value = lower_assigned_value(state.initial.tree, known, state.type in WHOLE_TYPES)
         ops += store_initial_value(automaton, name, value, prefix + state.initial.key)
     return ops
@@ -310,9 +310,11 @@ def _remove_unused_before(
     if "remember" not in blocks:
         return variables
     reading = {n for name, b in blocks.items() if name != "remember" for n in block_names(b)}
-    kept = tuple(op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading)
-    blocks["remember"] = kept
-    targets = {op.target for op in kept}
+    assignments = tuple(
+        op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading
+    )
+    blocks["remember"] = assignments
+    targets = {op.target for op in assignments}
     return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
 
 

@@ -78,9 +78,12 @@ def _chart_endpoints(automaton: Automaton, transition: Transition) -> tuple[str,
     """
     if automaton.statechart is None:
         return None
-    way, nodes = automaton.statechart.transitions[transition.key], automaton.statechart.nodes
-    source = nodes[way.source].path
-    return source, ", ".join(nodes[target].path for target in way.targets)
+    chart_transition, nodes = (
+        automaton.statechart.transitions[transition.key],
+        automaton.statechart.nodes,
+    )
+    source = nodes[chart_transition.source].path
+    return source, ", ".join(nodes[target].path for target in chart_transition.targets)
 
 
 def infos_of_mode(

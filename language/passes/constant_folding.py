@@ -170,10 +170,10 @@ def eliminate_redundancy(program: Program) -> Program:
 def _remove_unused_constants(program: Program) -> Program:
     """Return the Program without the fixed parameters that no block reads."""
     used = {name for block in program.blocks.values() for name in block_names(block)}
-    kept = tuple(
+    constants = tuple(
         c for c in program.constants if c.name in used or not c.name.startswith(CONSTANT_PREFIX)
     )
-    return _replace(program, constants=kept)
+    return _replace(program, constants=constants)
 
 
 class _HoistedValues:

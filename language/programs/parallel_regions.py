@@ -92,19 +92,28 @@ def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
     `in(...)` reads the source modes up to the entries.
     """
     automaton = field.automaton
-    before = _lower_stage(field, selection, lambda way: automaton.source_mode(way).exit)
-    resets = _lower_stage(field, selection, lambda way: way.reset)
+    before = _lower_stage(
+        field, selection, lambda transition: automaton.source_mode(transition).exit
+    )
+    resets = _lower_stage(field, selection, lambda transition: transition.reset)
     if before and resets:
         before = (*before, *set_point_to_state(field))
     moved = []
     for region in automaton.all_regions:
-        ways = [way for mode in region.modes.values() for way in mode.transitions]
+        transitions = [
+            transition for mode in region.modes.values() for transition in mode.transitions
+        ]
         cases = [
-            (selection.number_of(w), (set_target_mode(field, w), *selection.after_switch(w)))
-            for w in ways
+            (
+                selection.number_of(transition),
+                (set_target_mode(field, transition), *selection.after_switch(transition)),
+            )
+            for transition in transitions
         ]
         moved.append(Switch(selection.selected_variable(region.name), tuple(cases)))
-    after = _lower_stage(field, selection, lambda way: automaton.target_mode(way).entry)
+    after = _lower_stage(
+        field, selection, lambda transition: automaton.target_mode(transition).entry
+    )
     if after:
         after = (*set_point_to_state(field), *_entry_equations(field), *after)
     return (*before, *resets, *moved, *after)
@@ -126,10 +135,12 @@ def _entry_equations(field: VectorField) -> Block:
     """Return the equations that entries read, evaluated in the new modes after the reset."""
     automaton = field.automaton
     entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
-    wanted = names_read(formula.tree for formula in entries)
+    required = names_read(formula.tree for formula in entries)
     cases = []
     for mode in automaton.modes.values():
-        ops = lower_equations(mode, bindings_at_point(field), "work.at_", field.key_prefix, wanted)
+        ops = lower_equations(
+            mode, bindings_at_point(field), "work.at_", field.key_prefix, required
+        )
         cases.append((mode.number, tuple(ops)))
     return (
         (Switch(field.mode_variable_name, tuple(cases)),)

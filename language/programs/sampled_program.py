@@ -286,10 +286,12 @@ class _SampledLowering:
 
     def _step_block(self) -> Block:
         """Return the block `step`."""
-        carried = {mode.name: self._advance_of_mode(mode) for mode in self.automaton.modes.values()}
-        silent = {name: reset_innovations(self.observers, name) for name in self.automaton.modes}
+        advances = {
+            mode.name: self._advance_of_mode(mode) for mode in self.automaton.modes.values()
+        }
+        resets = {name: reset_innovations(self.observers, name) for name in self.automaton.modes}
         keeps = bool(self._keep_block())
-        return tick_block(self.automaton, carried, silent, keeps, self._has_start_block())
+        return tick_block(self.automaton, advances, resets, keeps, self._has_start_block())
 
     def _has_start_block(self) -> bool:
         """Return whether the first tick differs from `init` or later ticks have an advance."""

@@ -113,23 +113,28 @@ def lower_sampled_commit(
     """
     numbers = {info.key: info.number for info in infos}
 
-    def number(way: Transition) -> int:
+    def number(transition: Transition) -> int:
         """Return the number of a transition."""
-        return numbers[f"{automaton.name} {way.key}"]
+        return numbers[f"{automaton.name} {transition.key}"]
 
     def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
         """Return the stage of all regions with the assignments that `written` gives."""
         return lower_stage_of_regions(automaton, fired_variable, number, written, known)
 
     known = {**now, **equation_bindings(automaton, "equation.")}
-    before = stage_of(lambda way: automaton.source_mode(way).exit)
-    before = (*before, *stage_of(lambda way: way.reset))
+    before = stage_of(lambda transition: automaton.source_mode(transition).exit)
+    before = (*before, *stage_of(lambda transition: transition.reset))
     moved = []
     for region in automaton.all_regions:
-        ways = [way for mode in region.modes.values() for way in mode.transitions]
-        cases = tuple((number(way), _enter_target(automaton, way, infos)) for way in ways)
+        transitions = [
+            transition for mode in region.modes.values() for transition in mode.transitions
+        ]
+        cases = tuple(
+            (number(transition), _enter_target(automaton, transition, infos))
+            for transition in transitions
+        )
         moved.append(Switch(fired_variable(region.name), cases))
-    after = stage_of(lambda way: automaton.target_mode(way).entry)
+    after = stage_of(lambda transition: automaton.target_mode(transition).entry)
     return (
         *before,
         *moved,
@@ -192,5 +197,9 @@ def _keeps_timers(automaton: Automaton, mode: Mode) -> bool:
 @cache_on_owner
 def _timer_keeping_targets(automaton: Automaton) -> frozenset[tuple[str, str]]:
     """Return the (region, mode) pairs that transitions with `memory: continue` enter."""
-    ways = [way for mode in automaton.all_modes for way in mode.transitions]
-    return frozenset((way.region, way.target) for way in ways if way.memory == "continue")
+    transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
+    return frozenset(
+        (transition.region, transition.target)
+        for transition in transitions
+        if transition.memory == "continue"
+    )

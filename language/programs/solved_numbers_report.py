@@ -66,10 +66,10 @@ def _format_rewind_lines(program: Program) -> Iterator[str]:
     """Yield the bound of work of each transition with `rewind` in its tick."""
     for info in program.transitions:
         if info.rewind_ticks:
-            way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
+            modes = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
             evaluations = info.rewind_ticks + RUN_BISECTIONS + 2
             yield (
-                f"  rewind {way}: at most {evaluations} evaluations of `until` and "
+                f"  rewind {modes}: at most {evaluations} evaluations of `until` and "
                 f"{info.rewind_ticks} runs, one of them over a part of a period"
             )
 
