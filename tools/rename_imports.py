@@ -3,8 +3,8 @@
 In the repository the packages are top-level. In the wheel each is below `modewright`, so that it
 meets no `engine.py` of a user. Rewritten are, by their places in the syntax tree:
 
-    from engine.interpreter.value_frame import Frame    ->  from modewright._engine.frame import Frame
-    import engine.interpreter.value_frame as frame      ->  import modewright._engine.frame as frame
+    from engine.frame import Frame    ->  from modewright._engine.frame import Frame
+    import engine.frame as frame      ->  import modewright._engine.frame as frame
     import engine                     ->  import modewright._engine as engine
     files("engine"), "-m", "engine.x" ->  files("modewright._engine"), "-m", "modewright._engine.x"
     "engine.interpreter.value_frame"                    ->  "modewright._engine.frame"

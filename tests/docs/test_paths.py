@@ -13,7 +13,9 @@ PACKAGES = (
 )  # fmt: skip
 READMES = [f"{package}/README.md" for package in (*PACKAGES, "spec", "tests")]
 PAGES = [*READMES, "README.md", *sorted(f"docs/{page.name}" for page in ROOT.glob("docs/*.md"))]
-PATH = re.compile(rf"`((?:{'|'.join((*PACKAGES, 'spec', 'tests', 'docs', 'tools'))})/[\w./-]*\w/?)`")
+PATH = re.compile(
+    rf"`((?:{'|'.join((*PACKAGES, 'spec', 'tests', 'docs', 'tools'))})/[\w./-]*\w/?)`"
+)
 LINK = re.compile(r"\]\(([\w./-]+)(?:#[\w-]+)?\)")
 NAMED_CONSTANT = re.compile(r"`([\w/]+\.py)` \(`(\w+)`\)")
 

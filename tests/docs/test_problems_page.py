@@ -18,8 +18,8 @@ HEAD = """# Problems and their codes
 
 Each kind of problem has a code, which stays. `modewright check` tells it behind the message;
 `--json`, `--sarif` and `--github` have it too. Warnings do not fail a check. The examples are those
-of `tests/semantics/refused/`, where a repaired neighbour stands beside each; this page is made from them
-(`pytest tests/docs/test_problems_page.py --update`).
+of `tests/semantics/refused/`, where a repaired neighbour stands beside each; this page is made from
+them (`pytest tests/docs/test_problems_page.py --update`).
 """
 TITLES = {
     "1": "Text and files",
@@ -63,7 +63,7 @@ def first_told(texts: Iterable[str]) -> dict[str, str]:
 
 
 def test_every_kind_has_a_code_and_every_code_a_kind() -> None:
-    """A new kind gets the next free code in `language/text/error_codes.py`; codes are never given again."""
+    """A new kind gets the next free code in `language/text/error_codes.py`; no code is reused."""
     assert set(CODES) == set(kinds())
 
 

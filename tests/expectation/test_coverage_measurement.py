@@ -77,8 +77,9 @@ def test_what_tests_reach_is_summed(tmp_path: Path) -> None:
     parts = [reached(tmp_path, HEAD.replace("20 ms: -2 V, ", "")), reached(tmp_path, late)]
     (both,) = merge_coverages(parts)
     assert both.count()["transitions"] == (1, 2)
-    assert both.combinations == {k: parts[0].combinations.get(k, set()) | parts[1].combinations.get(k, set())
-                         for k in both.combinations}  # fmt: skip
+    first, second = (part.combinations for part in parts)
+    joined = {key: first.get(key, set()) | second.get(key, set()) for key in both.combinations}
+    assert both.combinations == joined
 
 
 def test_probes_change_no_bit_of_a_run_and_each_guard_has_one() -> None:

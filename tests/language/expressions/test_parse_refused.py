@@ -21,8 +21,8 @@ def first(text: str) -> tuple[int, str, str]:
     ("text", "column", "label"),
     [
         ("", 1, "the expression ends too early"),
-        ("a < b < c", 7, "one relation only"),
-        ("a == b != c", 8, "one relation only"),
+        ("a < b < c", 7, "an expression has one relation only"),
+        ("a == b != c", 8, "an expression has one relation only"),
         ("a = b", 3, "`=` is not part of an expression"),
         ("x y", 3, "`y` was not expected here"),
         ("2 (x)", 3, "`(x)` was not expected here"),
@@ -59,7 +59,7 @@ def first(text: str) -> tuple[int, str, str]:
         ("1e3 m", 1, "`1e3` has an exponent but no point"),
         ("a + 010", 5, "`010` starts with a zero"),
         ("1.0e309", 1, "`1.0e309` is out of the range of a double"),
-        ("a\nb", 1, "an expression stands on one line"),
+        ("a\nb", 1, "an expression is written on one line"),
     ],
 )
 def test_it_is_refused_at_its_place(text: str, column: int, label: str) -> None:

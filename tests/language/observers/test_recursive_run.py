@@ -115,8 +115,8 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
     assert problem_lines(
         lambda: make_program(("gain: recursive, covariance: keep", "covariance: keep"))
     )
-    (line,) = problem_lines(lambda: make_program(("initial: on_1", "equations: {w: u * 1}\ninitial: on_1"),
-                                noise="0.2 1/s^5 + 0 1/s^3 * w"))  # fmt: skip
+    change = ("initial: on_1", "equations: {w: u * 1}\ninitial: on_1")
+    (line,) = problem_lines(lambda: make_program(change, noise="0.2 1/s^5 + 0 1/s^3 * w"))
     assert line.endswith("`w` is an equation: an observer reads states and inputs")
     other = OBSERVING.format(states="[v, x, b]")
     (line,) = problem_lines(lambda: make_program(("  on_2: {}", other)))

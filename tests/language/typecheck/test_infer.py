@@ -94,7 +94,7 @@ def test_an_expression_is_true_or_false(text: str) -> None:
         ("not x", "5 `not` is a condition, this is a quantity"),
         ("flag and x", "10 `and` is a condition, this is a quantity"),
         ("if x then 1 else 2", "4 `if` is a condition, this is a quantity"),
-        ("if flag then x else flag", "4 one arm is a condition, the other a quantity"),
+        ("if flag then x else flag", "4 one alternative is a condition, the other a quantity"),
         ("c == 1", "1 `==` is not for real numbers"),
         ("c != 1", "1 `!=` is not for real numbers"),
         ("max(x)", "1 `max` takes 2 argument(s), not 1"),

@@ -19,7 +19,8 @@ def _reciprocal(whole: Binary, operator: str, left: Expr, right: Expr, place: An
     if operator != "/":
         return _BINARY(whole, operator, left, right, place)
     one = printed.format_literal(1.0, place.number)
-    return f"({printed.emit_expression(left, place)}) * ({one} / ({printed.emit_expression(right, place)}))"
+    first, second = (printed.emit_expression(operand, place) for operand in (left, right))
+    return f"({first}) * ({one} / ({second}))"
 
 
 def _rough(digits: int) -> Callable[[float, NumberType], str]:

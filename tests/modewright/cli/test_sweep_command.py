@@ -71,7 +71,7 @@ def test_what_was_interrupted_is_kept_and_gone_on_with(
 def test_a_full_disk_says_what_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The write itself fails in tests/sweep/execution/test_study_run.py; here what the user is told."""
+    """The message when a write fails; the write is in tests/sweep/execution/test_study_run.py."""
     write = store_module.write_atomically
 
     def filling(path: Path, data: bytes) -> None:

@@ -87,7 +87,7 @@ def test_what_is_no_committed_file_is_refused_and_its_neighbour_passes(
 
 
 def test_every_kind_of_problem_has_a_case(tmp_path: Path) -> None:
-    """Add `tests/semantics/refused/<case>.yaml` and its neighbour for a new kind; see README.md there."""
+    """Add `<case>.yaml` and its neighbour here for a new kind; see README.md."""
     seen = {problem.kind for case in cases() for problem in problems_of(case.path)}
     for name, make in GENERATED_CASES.items():
         folder = tmp_path / name

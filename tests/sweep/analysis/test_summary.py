@@ -124,10 +124,8 @@ def test_points_of_a_path_are_one_draw(tmp_path: Path) -> None:
 def test_a_grid_is_no_sample_and_its_replicates_are(tmp_path: Path) -> None:
     for count in (1, 8):
         made = make_study("alone", ("sampling: one_at_a_time", f"replicates: {count}"))
-        (final,) = [
-            x for x in summary_of(run_study(made, tmp_path / str(count), QUICK_EXECUTOR).store).lines
-            if x.measure == "final"
-        ]  # fmt: skip
+        store = run_study(made, tmp_path / str(count), QUICK_EXECUTOR).store
+        (final,) = [line for line in summary_of(store).lines if line.measure == "final"]
         assert (final.count, final.draws) == (4 * count, count)
         assert (final.mean_interval is None) == (count == 1)
 

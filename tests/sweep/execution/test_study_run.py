@@ -112,7 +112,9 @@ def slow(batch: Batch) -> BatchResult:
 def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
     tmp_path: Path,
 ) -> None:
-    """kill -9 of what computes and writes; 20 times through the command line: tests/validation/figures."""
+    """kill -9 of the process that computes and writes; tests/validation/figures/studies.py does it
+    20 times through the command line.
+    """
     made = make_study()
     run_study(made, tmp_path / "undisturbed", QUICK_EXECUTOR, block_size=2)
     random = np.random.default_rng(4)

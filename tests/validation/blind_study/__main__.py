@@ -30,10 +30,14 @@ VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
 ASKED = 0.1
 """Seconds of a compiler that compiled nothing, at most: it is asked what it is."""
 EXAMPLES = """\
-python -m tests.validation.blind_study --seal             # make all cases, write the hashes of their labels
-python -m tests.validation.blind_study                    # diagnose what is not diagnosed yet, write docs/proof.md
-python -m tests.validation.blind_study --carry            # results so far into docs/evidence, to go on elsewhere
-python -m tests.validation.blind_study --seed 5 --share 0.1 --plans full,clean    # a look at other cases"""
+# make all cases, write the hashes of their labels
+python -m tests.validation.blind_study --seal
+# diagnose what is not diagnosed yet, write docs/proof.md
+python -m tests.validation.blind_study
+# results so far into docs/evidence, to go on elsewhere
+python -m tests.validation.blind_study --carry
+# a look at other cases
+python -m tests.validation.blind_study --seed 5 --share 0.1 --plans full,clean"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -63,7 +63,8 @@ def test_a_look_ends_the_process(tmp_path: Path, look: str) -> None:
     concealed = tmp_path / "truth"
     concealed.mkdir()
     code = (
-        "import sys; from tests.validation.blind_study import sealed; sys.addaudithook(sealed.guard(sealed._end));"
+        "import sys; from tests.validation.blind_study import sealed;"
+        "sys.addaudithook(sealed.guard(sealed._end));"
         f"{look.format(str(concealed))}; print('went on')"
     )
     done = subprocess.run(

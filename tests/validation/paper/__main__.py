@@ -18,8 +18,10 @@ from tests.validation.paper.pictures import draw
 SEED, SAMPLES = 2018, 200
 """Manoeuvres that nothing was tuned on."""
 EXAMPLES = """\
-python -m tests.validation.paper                            # all of it: docs/paper, build/paper.json
-python -m tests.validation.paper --seed 7 --samples 200     # other manoeuvres; the page is left as it is"""
+# all of it: docs/paper, build/paper.json
+python -m tests.validation.paper
+# other manoeuvres; the page is left as it is
+python -m tests.validation.paper --seed 7 --samples 200"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
