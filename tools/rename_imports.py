@@ -7,7 +7,7 @@ meets no `engine.py` of a user. Rewritten are, by their places in the syntax tre
     import engine.frame as frame      ->  import modewright._engine.frame as frame
     import engine                     ->  import modewright._engine as engine
     files("engine"), "-m", "engine.x" ->  files("modewright._engine"), "-m", "modewright._engine.x"
-    "engine.interpreter.value_frame"                    ->  "modewright._engine.frame"
+    "engine.frame"                    ->  "modewright._engine.frame"
 
 A string is rewritten where it stands for a module by its position (the argument of a function in
 `MODULE_FUNCTIONS`, a key of `sys.modules`, what follows "-m"), or where all of it is the dotted

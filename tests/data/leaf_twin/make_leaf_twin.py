@@ -1,6 +1,6 @@
 """Leaf twin: writes a synthetic drive that looks like a CAN recording of a Nissan LEAF.
 
-    python tests/data/leaf_twin/make_leaf_twin.py [FILE]     (default: drive_twin.csv beside the script)
+    python tests/data/leaf_twin/make_leaf_twin.py [FILE]     (default: drive_twin.csv beside it)
 
 Two inertias and one backlash (Guercioni et al. 2018, eqs 1-9; Nordin's form of the gap) with the
 values of spec/nissan_leaf/leaf.yaml, over those of spec/ev_driveline/plant.yaml. It imports
