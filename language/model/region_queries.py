@@ -92,21 +92,6 @@ def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 
 
-def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
-    """Return the source of a transition with the equations of one mode configuration.
-
-    All other regions are in their initial mode. The result has no parallel regions. It serves the
-    search of witnesses, which proves nothing.
-    """
-    source = automaton.source_mode(transition)
-    equations: dict[str, Formula] = {}
-    for region in automaton.all_regions:
-        own = region.name == transition.region
-        mode = source if own else region.modes[region.initial]
-        equations.update(mode.equations)
-    return dataclasses.replace(source, equations=equations, parallel_regions=())
-
-
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
     """Return copies of modes whose `parallel_regions` are `regions`, by name."""
     return {
