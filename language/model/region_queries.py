@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.model.analysis_cache import cache_on_owner
-from language.model.automaton import Automaton, Balance, Mode, Region, Transition
+from language.model.automaton import Balance, Mode, Region, Transition
 from language.model.declaration import Formula
 
 
