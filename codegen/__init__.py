@@ -1,3 +1,1 @@
-"""C code generation: prints a Program as C99, compiles it and measures, tests and proves the
-result.
-"""
+"""C code generation: prints a Program as C99, compiles it, and tests and proves the result."""

@@ -24,9 +24,7 @@ MAX_COUNTED_STEPS = 5000
 
 @dataclass(frozen=True)
 class Difference:
-    """The first value that differs: tick, time [s], mode and signal, and the value with its bits
-    in both.
-    """
+    """The first value that differs: tick, time [s], mode, signal, and both values with bits."""
 
     tick: int
     time: float
@@ -123,8 +121,9 @@ def skipped_verdict(name: str, program: Program, reason: str) -> Verdict:
 
 
 def _differing_positions(log: TickLog, engine: bytes, compiled: bytes) -> list[int]:
-    """Return the positions of the values that differ in two records; all NaN are equal (rule
-    17c).
+    """Return the positions of the values that differ in two records.
+
+    All NaN are equal (rule 17c).
     """
     pairs = zip(log.unpack(engine), log.unpack(compiled), strict=True)
     return [
@@ -152,9 +151,7 @@ def _describe_difference(log: TickLog, tick: int, position: int, compiled: bytes
 
 
 def _format_value(log: TickLog, value: float | int, record: bytes, position: int) -> str:
-    """Return a value of a record as text, with its bits in hexadecimal, most significant byte
-    first.
-    """
+    """Return a value of a record as text, with its bits in hexadecimal."""
     bits = log.value_bytes(record, position)[::-1].hex()
     text = (
         shortest_decimal(value, log.program.number_type)

@@ -40,8 +40,7 @@ def _skip_reason(program: Program) -> str:
 
 
 def _add_end_note(verdict: Verdict, program: Program, scenario: Scenario) -> Verdict:
-    """Return the verdict on a continuous instance with a note if it was compared to a part of the
-    horizon.
+    """Return the verdict with a note if only a part of the horizon was compared.
 
     The comparison ends at the first outside event inside a major step.
     """

@@ -95,8 +95,9 @@ def fuzz(
 def _replay_sequence(
     empty_log: TickLog, table: list[WordValues], sequence: bytes, modes: set[int]
 ) -> TickLog:
-    """Return the tick log of a sequence in the interpreter; modes that it reaches are added to
-    `modes`.
+    """Return the tick log of a sequence in the interpreter.
+
+    Modes that it reaches are added to `modes`.
     """
     program, log = empty_log.program, copy(empty_log)
     log.inputs, log.values, engine = [], [], Interpreter(program)

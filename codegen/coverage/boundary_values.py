@@ -56,8 +56,7 @@ class Boundary:
 def generate_boundary_sequences(
     program: Program, sequences: Sequence[Sequence[bytes]], ranges: Mapping[str, Range]
 ) -> Iterator[list[bytes]]:
-    """Yield input sequences that reach a boundary of one of the given sequences, or pass close to
-    it.
+    """Yield input sequences that end at, or close to, a boundary of one of the given sequences.
 
     Each boundary gives 2 * NEIGHBOUR_COUNT sequences that end at its last tick. The records are
     those of a `TickLog`. A sequence is searched up to the first change of its calibration page; the
@@ -80,9 +79,7 @@ def generate_boundary_sequences(
 
 
 def _neighbouring_values(boundary: Boundary, program: Program) -> Iterator[float]:
-    """Yield the test values in steps of `far - near`: NEIGHBOUR_COUNT on each side of a
-    boundary.
-    """
+    """Yield the NEIGHBOUR_COUNT test values on each side, in steps of `far - near`."""
     step, cast = boundary.far - boundary.near, ROUNDING_FUNCTIONS[program.number_type]
     yield from (
         cast(boundary.near + k * step) for k in range(1 - NEIGHBOUR_COUNT, NEIGHBOUR_COUNT + 1)
@@ -90,9 +87,7 @@ def _neighbouring_values(boundary: Boundary, program: Program) -> Iterator[float
 
 
 class _BoundarySearch:
-    """A search for boundaries with the compiled C of a Program, restarted from snapshots of its
-    state.
-    """
+    """A search for boundaries with the compiled C of a Program, restarted from snapshots."""
 
     def __init__(self, program: Program, ranges: Mapping[str, Range]) -> None:
         """Compile the Program. Raises MissingToolError, BuildError."""
@@ -175,9 +170,7 @@ class _BoundarySearch:
         return None
 
     def _run_ticks(self, snapshot: bytes, inputs: Sequence[Values]) -> Modes:
-        """Restore a snapshot, execute one tick for each record of inputs, and return the modes
-        then.
-        """
+        """Restore a snapshot, execute one tick for each input record, and return the modes."""
         self._stepper.restore(snapshot)
         for values in inputs:
             for variable, value in zip(self._inputs, values, strict=False):
@@ -186,8 +179,6 @@ class _BoundarySearch:
         return self._current_modes()
 
     def _current_modes(self) -> Modes:
-        """Return the values of the mode variables, then a truth value for each wait: whether it
-        has begun.
-        """
+        """Return the values of the mode variables, then for each wait whether it has begun."""
         get = self._stepper.get
         return (*(get(name) for name in self._modes), *(get(name) > 0 for name in self._waits))

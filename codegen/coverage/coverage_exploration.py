@@ -43,10 +43,8 @@ HOLD_TICKS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
 """Numbers of ticks of a group: mostly one, up to the length of a typical wait."""
 LARGE_PROGRAM, MAX_LARGE_TICKS = 1000, 1000
 """Number of operations from which on a Program is large, and the maximum number of ticks of an
-entry
-
-then. Longer entries of a large Program take most of the time and raise the coverage no further.
-"""
+entry then. Longer entries of a large Program take most of the time and raise the coverage no
+further."""
 UNBOUNDED_RANGE = (-1e30, 1e30)
 """The range of a number of the page that declares none."""
 SEED_FILE, WORDS_HEADER = "known", "words.h"
@@ -123,8 +121,9 @@ def max_entry_ticks(program: Program) -> int:
 
 
 def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
-    """Write the C of a Program and the main that executes corpus entries; return the C files to
-    compile.
+    """Write the C of a Program and the main that executes corpus entries.
+
+    Return the C files to compile.
     """
     sources = write_harness(
         program, folder, main=MAIN, extra_context={"page": page_scalars(program)}

@@ -24,11 +24,8 @@ from language.ir.program import Program, Variable, unqualified_name
 FUZZER_COMPILER = "clang-19"
 WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
 """Number of words of an input, how many of them are values, and how many of the values are spread
-over
-
-the range of the input. The other words are differences from the last value: 80 of decreasing size,
-and the rest 0.
-"""
+over the range of the input. The other words are differences from the last value: 80 of decreasing
+size, and the rest 0."""
 DEFAULT_INPUT_RANGE = (-1000.0, 1000.0)
 """The range of a real input that declares none."""
 MAIN = HarnessMain("coverage/fuzz_main.c.jinja")
@@ -77,9 +74,7 @@ def run_fuzzer(
 
 
 def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues]:
-    """Return for each input of a tick the value, or the difference, that each byte 0 to 255
-    means.
-    """
+    """Return for each input of a tick the value or difference that each byte 0 to 255 means."""
     return [
         _input_words(v, program, ranges.get(unqualified_name(v.name))) for v in tick_inputs(program)
     ]
@@ -88,9 +83,7 @@ def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues
 def decode_sequence(
     program: Program, table: list[WordValues], sequence: bytes
 ) -> Iterator[WordValues]:
-    """Yield the input values of each tick of a sequence, at most MAX_SEQUENCE_TICKS, as the C
-    reads them.
-    """
+    """Yield the input values of each tick of a sequence, for at most MAX_SEQUENCE_TICKS ticks."""
     yield from decode_inputs(program, table, sequence[: MAX_SEQUENCE_TICKS * len(table)])
 
 
@@ -137,9 +130,7 @@ def _input_words(variable: Variable, program: Program, value_range: Range | None
 
 
 def _run_libfuzzer(app: Path, runs: int, most: int, seed: int) -> FuzzerRun:
-    """Run a fuzzer built by `build_sanitised` and return its sequences, covered edges and
-    findings.
-    """
+    """Run a compiled fuzzer and return its sequences, covered edges and findings."""
     options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={FUZZER_TIMEOUT}"]
     done = run_sanitised(app, [*options, "-len_control=0", "corpus"])
     edges = max(

@@ -71,7 +71,7 @@ T = TypeVar("T", Decision, DecisionSite)
 
 @dataclass(frozen=True)
 class McdcCoverage:
-    """The MC/DC coverage of a C file after `sequences` input sequences with `steps` steps in
+    """The MC/DC coverage of a C file after `sequences` input sequences of `steps` steps in
     total.
     """
 
@@ -104,8 +104,7 @@ class McdcCoverage:
 def add_infeasibility_proofs(
     coverage: McdcCoverage, program: Program, ranges: Mapping[str, Range]
 ) -> McdcCoverage:
-    """Return the coverage with proofs for the conditions of a sampled Program that no input can
-    cover.
+    """Return the coverage with proofs that conditions of a sampled Program are infeasible.
 
     The proven outcomes are stored in `Decision.never`. `ranges` gives the ranges in which variables
     stay between two steps.
@@ -124,9 +123,7 @@ def add_infeasibility_proofs(
 
 
 def _uncovered_conditions(matched: Iterable[tuple[Decision, list[DecisionSite]]]) -> Iterator[int]:
-    """Yield the numbers of the uncovered conditions at all sites that may be those of a
-    decision.
-    """
+    """Yield the numbers of the uncovered conditions at all possible sites of the decisions."""
     for decision, places in matched:
         for place in places:
             if len(place.conditions) == len(decision.shown):
@@ -145,8 +142,7 @@ def _group_by_block(items: Iterable[T]) -> dict[str, list[T]]:
 def _match_sites(
     decisions: Sequence[Decision], sites: Sequence[DecisionSite]
 ) -> Iterator[tuple[Decision, list[DecisionSite]]]:
-    """Yield each decision of a block with the decision sites of the Program that may correspond to
-    it.
+    """Yield each decision of a block with the sites in the Program that may correspond to it.
 
     If both lists have the same texts in the same order, each decision has one site. Otherwise a
     decision has all sites with its text, or none if there are fewer of them than such decisions.
@@ -163,10 +159,10 @@ def _match_sites(
 def _proven_outcomes(
     sites: Sequence[DecisionSite], proven: Mapping[int, bool], decision: Decision
 ) -> tuple[bool | None, ...]:
-    """Return for each condition the outcome that it never has; None without a proof or if it is
-    covered.
+    """Return for each condition the outcome that it never has.
 
-    An outcome counts only if it is proven at all sites of the decision.
+    Returns None without a proof or if it is covered. An outcome counts only if it is proven at all
+    sites of the decision.
     """
     found: list[bool | None] = []
     for position, shown in enumerate(decision.shown):

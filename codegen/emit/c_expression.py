@@ -21,9 +21,7 @@ class CNameMap(Protocol):
         """Return the C text of a variable or constant."""
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return the C text of a number that stands beside a whole-number variable: a mode by
-        its name.
-        """
+        """Return the C text of a number beside a whole-number variable: a mode by its name."""
 
     def is_unsigned(self, name: str) -> bool:
         """Tell whether a variable is an unsigned integer in C."""
@@ -79,10 +77,7 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
 
 
 def format_literal(value: float | int | bool, number: NumberType) -> str:
-    """Return a C literal: `true`, `false`, an integer, or the shortest decimal with the same bits
-    (rule
-
-    C4).
+    """Return a literal: a truth value, an integer, or the shortest exact decimal (rule C4).
 
     A float32 literal ends with F.
     """
@@ -108,9 +103,7 @@ def _match_signedness(left: str, right: str, c_names: CNameMap) -> list[str]:
 
 
 def _emit_operand(expr: Expr, c_names: CNameMap) -> str:
-    """Return the C text of an operand, in parentheses unless it is a name, a call or a literal
-    >= 0.
-    """
+    """Return the C text of an operand, in parentheses unless it is a name, call or literal >= 0."""
     text = emit_expression(expr, c_names)
     simple = isinstance(expr, Ref | Item | Call) or (isinstance(expr, Value) and text[0] != "-")
     return text if simple else f"({text})"

@@ -24,9 +24,7 @@ from language.numerics.function_table import FUNCTIONS_BY_TYPE
 
 @dataclass(frozen=True)
 class FloatFormat:
-    """A binary format of IEEE 754: total bits, bits of the fraction, lowest and highest normal
-    exponent.
-    """
+    """A format of IEEE 754: total bits, fraction bits, lowest and highest normal exponent."""
 
     bits: int
     digits: int

@@ -100,8 +100,7 @@ INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lo
 def emit_c_files(
     program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
 ) -> dict[str, str]:
-    """Return the C files of a Program by name: header, memory map, source, and ha_math if it is
-    used.
+    """Return the C files of a Program by name: header, memory map, source, ha_math if used.
 
     `by_magnitude` is passed to `merge_range_checks`, `fast_path` to `add_fast_path`. Raises
     ValueError for a Program without a block `step`: an input of a continuous automaton varies
@@ -191,9 +190,7 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
 
 
 def _name_context(program: Program) -> dict[str, Any]:
-    """Return the part of the context with names: files, modes, transitions, enumerations,
-    faults.
-    """
+    """Return the context of names: files, modes, transitions, enumerations, faults."""
     return {
         "name": program.name,
         "guard": f"{program.name.upper()}_H",
@@ -246,8 +243,9 @@ def _shared_work_variables(program: Program, local: Mapping[str, Iterable[str]])
 
 
 def _work_type(program: Program, page_layout: PageLayout, scratch: Scratch | None) -> str:
-    """Return the C type of the work variables of a step; it has the name of the module if it is
-    public.
+    """Return the C type of the work variables of a step.
+
+    It has the name of the module if it is public.
     """
     is_seen = page_layout.holds_solved and scratch is not None and scratch.is_in_instance
     return f"{program.name}_Work" if is_seen else "Work"
@@ -362,9 +360,9 @@ def _inline_keyword(name: str, noinline: frozenset[str]) -> str:
 
 
 def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
-    """Return the text between the parentheses of a function, broken into lines of at most
+    """Return the text between the parentheses of a function, broken into lines.
 
-    MAX_LINE_WIDTH characters.
+    A line has at most MAX_LINE_WIDTH characters.
     """
     lines = [""]
     for place, parameter in enumerate(parameters):
@@ -382,9 +380,9 @@ def _redirect_derived(block: str, line: str) -> str:
 
 
 def _order_callees_first(program: Program) -> list[str]:
-    """Return the names of the blocks such that each comes after those that it runs: C needs no
+    """Return the names of the blocks such that each comes after those that it runs.
 
-    prototypes.
+    C then needs no prototypes.
     """
     done: dict[str, None] = {}
 

@@ -30,15 +30,12 @@ UNSIGNED_PREFIXES = ("timer.", "memory.faults", *TRANSITION_PREFIXES)
 """Prefixes of variables beside which a number is written with the suffix U."""
 SOLVED_PREFIX_CONSTANT, SOLVED_PREFIX_ON_PAGE = "solved_", "cal->solved."
 """The prefixes of solved numbers in C: as constants of the file, and as members of the calibration
-
-page.
-"""
+page."""
 
 
 @dataclass(frozen=True)
 class CNames:
-    """The C text of names inside one function: locals by their own name, all others by their
-    structure.
+    """The C text of names inside one function: locals by name, all others as members.
 
     `local` holds the names of the local variables. `solved_prefix` stands before solved numbers.
     """
@@ -53,9 +50,7 @@ class CNames:
         return self.program.number_type
 
     def __call__(self, name: str) -> str:
-        """Return the C text of a variable or constant, for example `self->state.w_em` for
-        `state.w_em`.
-        """
+        """Return the C text of a variable or constant: `self->state.w_em` for `state.w_em`."""
         group, _, rest = name.partition(".")
         member = c_member(name)
         if name in self.local:
@@ -115,8 +110,9 @@ class CNames:
         return transition_constants(self.program)
 
     def _enumeration_values(self, name: str) -> tuple[str, ...]:
-        """Return the enumeration values of a variable or constant; an empty tuple for all
-        others.
+        """Return the enumeration values of a variable or constant.
+
+        Returns an empty tuple for all others.
         """
         return next(
             (values for known, values in _enumeration_lists(self.program) if known == name), ()
@@ -124,8 +120,7 @@ class CNames:
 
 
 def c_member(name: str) -> str:
-    """Return the name of a structure member or local: the name without its group, dots as
-    underscores.
+    """Return the name of a member or local: without its group, with underscores for dots.
 
     In the name of a solved matrix entry two underscores separate row and column:
     `drive_L_w_em__y_w`.
@@ -136,8 +131,9 @@ def c_member(name: str) -> str:
 
 
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
-    """Return the C type of a variable or constant; reals have the type of the number type (rule
-    C10).
+    """Return the C type of a variable or constant.
+
+    Reals have the type of the number type (rule C10).
     """
     if variable.type == "real":
         return C_REAL_TYPE[number]
@@ -203,8 +199,6 @@ def value_constant(program: Program, values: tuple[str, ...], number: int) -> st
 
 
 def _enumeration_lists(program: Program) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the names of all constants and variables with their enumeration values, which may
-    be empty.
-    """
+    """Return all constants and variables with their enumeration values, which may be empty."""
     constants = [(constant.name, constant.values) for constant in program.constants]
     return constants + [(variable.name, variable.values) for variable in program.variables]

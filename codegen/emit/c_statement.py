@@ -164,8 +164,9 @@ class StatementEmitter:
         yield "}"
 
     def _wait_comment(self, timer: str) -> str:
-        """Return the comment that tells when the transition of a timer is due; empty for other
-        counters.
+        """Return the comment that tells when the transition of a timer is due.
+
+        Returns an empty text for other counters.
         """
         return next(
             (_format_due(info) for info in self.program.transitions if info.timer == timer), ""
@@ -174,9 +175,7 @@ class StatementEmitter:
     def _emit_count(
         self, timer: str, condition: Expr, limit: int, key: str, wait_comment: str
     ) -> Iterator[str]:
-        """Yield the lines of a counter: 0 where the condition is false, else counted up to
-        `limit` (rule 4b).
-        """
+        """Yield the lines of a counter: 0 if the condition is false, else one up (rule 4b)."""
         yield from emit_condition(
             "if", emit_expression(negate_condition(condition), self.c_names), key, self.width
         )
@@ -196,8 +195,7 @@ def _format_due(info: TransitionInfo) -> str:
 
 
 def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
-    """Return the condition of a loop body that consists of one branch, and the operations inside
-    it.
+    """Return the condition of a loop body that is one branch, and the operations inside it.
 
     The condition must not depend on `index`. A body of any other form is returned as it is, with
     None. If the condition is false once, it stays false, because nothing else is executed: the loop
@@ -211,8 +209,9 @@ def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
 
 
 def is_nested(choice: Select) -> bool:
-    """Tell whether an arm of a choice is itself a choice; a chain of `if` is then easier to
-    read.
+    """Tell whether an arm of a choice is itself a choice.
+
+    A chain of `if` is then easier to read.
     """
     return isinstance(choice.then, Select) or isinstance(choice.other, Select)
 
@@ -292,10 +291,9 @@ def emit_wrapped_statement(
 
 
 def emit_condition(opening: str, test: str, key: str, width: int) -> Iterator[str]:
-    """Yield the lines of `opening (test) {` with a comment `key`, broken before `&&` or `||` if it
-    is
+    """Yield the lines of `opening (test) {` with a comment `key`.
 
-    longer than `width`.
+    A line longer than `width` is broken before `&&` or `||`.
     """
     line, comment = f"{opening} ({test}) {{", _key_comment(key)
     if len(line) + len(comment) <= width:

@@ -1,6 +1,4 @@
-"""C structures: the members of the structures of a module, with their comments (rules C11 and
-C14).
-"""
+"""C structures: the members of a module's structures with their comments (rules C11 and C14)."""
 
 from __future__ import annotations
 
@@ -161,9 +159,7 @@ def _constant_member(constant: Constant, number: NumberType) -> StructMember:
 
 
 def _group_members(program: Program) -> list[tuple[str, str, list[StructMember]]]:
-    """Return name, comment and members of each nested structure of the instance that is not
-    empty.
-    """
+    """Return name, comment and members of each nonempty structure inside the instance."""
     found = []
     for group, about in STRUCT_GROUPS.items():
         inside = [v for v in program.variables if v.name.startswith(f"{group}.")]

@@ -1,6 +1,4 @@
-"""Function comments: the purpose of each generated C function, from the name of its block (rule
-C21).
-"""
+"""Function comments: the purpose of a C function, from the name of its block (rule C21)."""
 
 from __future__ import annotations
 
@@ -64,10 +62,7 @@ PURPOSES = {
     "whole": "States at the end of the whole step[, in mode {}]: E x + F pull",
 }
 """Comments by the first words of the name of a block. `{}` stands for the rest of the name. A part
-in
-
-brackets is left out if there is no rest.
-"""
+in brackets is left out if there is no rest."""
 OPTIONAL = re.compile(r"\[(.*?)\]")
 """A part of a comment in brackets."""
 

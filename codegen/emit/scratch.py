@@ -36,9 +36,7 @@ class Scratch:
 
     @property
     def is_zeroed(self) -> bool:
-        """Tell whether the whole structure is set to 0 at the start: an initialised variable is
-        an array.
-        """
+        """Tell whether all of it is set to 0 at the start, because an array is initialised."""
         return any(variable.size for variable in self.initialised)
 
     @property

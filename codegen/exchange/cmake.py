@@ -1,6 +1,4 @@
-"""CMake: a project file that builds the C of a Program as a static library with the flags it
-needs.
-"""
+"""CMake: a project file that builds the C of a Program as a static library."""
 
 from __future__ import annotations
 

@@ -42,9 +42,7 @@ BA_DEF_DEF_ "BusType" "CAN";
 BA_ "BusType" "{bus}";
 """
 """A DBC without messages. The tool reads the type of the bus from it, which decides how frames are
-
-written.
-"""
+written."""
 UNNAMED_NODE = "Vector__XXX"
 """The name in a DBC of a node that has none."""
 

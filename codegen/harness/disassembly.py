@@ -103,9 +103,7 @@ def _find_loops(text: str) -> list[tuple[range, int]]:
 def _enclosing_loops(
     folder: Path, addresses: Sequence[str], loops: Mapping[str, list[tuple[range, int]]]
 ) -> dict[str, dict[str, int]]:
-    """Return for each address the C loops around it, through all functions that it is inlined
-    into.
-    """
+    """Return for each address the C loops around it, also those around inlined functions."""
     (folder / "addresses").write_text("\n".join(f"0x{one}" for one in addresses) + "\n")
     text = output_of([ARM_LINES, "-e", IMAGE_FILE, "-i", "-a", "@addresses"], folder)
     loops_by_address: dict[str, dict[str, int]] = {}

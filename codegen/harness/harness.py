@@ -58,9 +58,7 @@ def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
 
 
 def tick_inputs(program: Program) -> tuple[Variable, ...]:
-    """Return the inputs of a tick, including the flags for new values, in the order of the
-    Program.
-    """
+    """Return the inputs of a tick, including the flags for new values, in their order."""
     return tuple(
         variable
         for variable in program.variables
@@ -69,9 +67,7 @@ def tick_inputs(program: Program) -> tuple[Variable, ...]:
 
 
 def tunable_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the real scalar parameters that a calibration page may change, in the order of its
-    members.
-    """
+    """Return the tunable parameters that are real scalars, in the order of the page."""
     program = restrict_to_step(program)
     return tuple(
         constant

@@ -94,9 +94,7 @@ def measure_code(program: Program) -> Metrics:
 
 
 def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
-    """Return the maximum number of instructions of a step, or None and the reason why there is
-    no bound.
-    """
+    """Return the maximum number of instructions of a step, or None and the reason."""
     try:
         return worst_case_instructions(folder, sources, entry), ""
     except Unbounded as error:

@@ -21,9 +21,7 @@ APP = "app"
 
 @dataclass(frozen=True)
 class SanitizerReport:
-    """The error output of a program under sanitizers, and the first error in it, if any
-    (`findings`).
-    """
+    """The error output of a program under sanitizers, and its first error, if any."""
 
     lines: tuple[str, ...]
     findings: tuple[str, ...]

@@ -1,6 +1,4 @@
-"""Stack usage: the stack bound of a function over all call chains that the compiler reports
-(rule C23).
-"""
+"""Stack usage: the stack bound of a function over all its call chains (rule C23)."""
 
 from __future__ import annotations
 
@@ -27,9 +25,7 @@ EDGE = re.compile(r'edge: \{ sourcename: "(?P<caller>[^"]+)" targetname: "(?P<ca
 
 @dataclass(frozen=True)
 class _Calls:
-    """A call graph: frame sizes [bytes], functions with a variable frame size, and callees by
-    function.
-    """
+    """A call graph: frame sizes [bytes], functions with a variable frame size, and callees."""
 
     sizes: Mapping[str, int]
     growing: frozenset[str]
@@ -80,8 +76,7 @@ def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
 
 
 def check_stack(folder: Path, sources: Sequence[str], entry: str) -> ToolVerdict:
-    """Return the verdict on the stack of a step: at most LIMIT bytes, no recursion, fixed frame
-    sizes.
+    """Return the verdict on a stack: at most LIMIT bytes, no recursion, fixed frame sizes.
 
     Raises MissingToolError.
     """
@@ -111,7 +106,5 @@ def _read(text: str) -> _Calls:
 
 
 def _own(name: str) -> str:
-    """Return the name of a function without the file that stands before the name of a static
-    one.
-    """
+    """Return the name of a function without the file before it, which static ones have."""
     return name.rpartition(":")[2]

@@ -38,8 +38,9 @@ def worst_case_instructions(folder: Path, sources: Sequence[str], entry: str) ->
 
 
 def longest_path(functions: Mapping[str, Function], entry: str) -> int:
-    """Return the maximum number of instructions of a function with all its callees. Raises
-    Unbounded.
+    """Return the maximum number of instructions of a function with all its callees.
+
+    Raises Unbounded.
     """
     return _LongestPaths(functions).instructions_of(entry)
 
@@ -122,8 +123,7 @@ class _ControlFlowGraph:
     def _loop_instructions(
         self, nodes: Sequence[str], heads: Set[str], outer_loops: LoopCounts
     ) -> int:
-        """Return the maximum number of instructions of all iterations of a loop and of its last
-        test.
+        """Return the maximum number of instructions of all iterations and of the last test.
 
         If a loop is entered at several nodes (`heads`), each is tried as the begin of an iteration,
         and the path from another head is added once. Raises Unbounded if no C loop tells the number
@@ -146,9 +146,7 @@ class _ControlFlowGraph:
         return min(bounds)
 
     def _loop_counts(self, nodes: Sequence[str], head: str) -> LoopCounts:
-        """Return the C loops that contain more than half of the instructions of a loop, without
-        inner loops.
-        """
+        """Return the C loops that contain more than half of a loop's own instructions."""
         groups = strongly_connected_components(self._successors_within(nodes, head))
         own = [group[0] for group in groups if len(group) == 1]
         met = Counter(loop for node in own for loop in self.loops[node].items())

@@ -107,8 +107,7 @@ def locals_of(
 
 
 def loop_locals(program: Program) -> dict[str, frozenset[str]]:
-    """Return for each block the work variables that are local to its function and assigned in its
-    loops.
+    """Return for each block the local work variables that are assigned in its loops.
 
     Such a variable is assigned before it is read in every block that uses it, and no block that it
     runs uses it too. Arrays, loop indices and the interface of a step are excluded.
@@ -141,11 +140,7 @@ def loop_locals(program: Program) -> dict[str, frozenset[str]]:
 
 
 def _assigned_once(block: Block) -> set[str]:
-    """Return the work variables that are assigned once in a block and read only later in the same
-    list of
-
-    operations.
-    """
+    """Return the work variables assigned once, and read only later in the same list."""
     counts = Counter(op.target for op in walk_ops(block) if isinstance(op, Assign))
     outside = Counter(block_reads(block))
     names: set[str] = set()

@@ -18,7 +18,7 @@ from language.ir.traversal import block_reads, block_writes
 
 
 def remove_dead_stores(program: Program, groups: tuple[str, ...]) -> Program:
-    """Return a Program without assignments to variables in `groups` (prefixes) that nothing reads.
+    """Return a Program without assignments to variables in `groups` that nothing reads.
 
     The pass repeats until no assignment is removed. Sources of outputs count as read. Assignments
     inside branches, switches and loops stay.
@@ -60,8 +60,9 @@ class _OpReads:
 
 
 def _op_reads(op: Op, groups: tuple[str, ...]) -> _OpReads:
-    """Return an operation with its reads; a removable one is an assignment to a variable in
-    `groups`.
+    """Return an operation with its reads.
+
+    A removable one is an assignment to a variable in `groups`.
     """
     target = op.target if isinstance(op, Assign) and op.target.startswith(groups) else ""
     return _OpReads(op, frozenset(block_reads((op,))), target)

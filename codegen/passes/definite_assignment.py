@@ -54,8 +54,7 @@ class _AssignmentAnalysis:
         self.unassigned_reads: set[str] = set()
 
     def analyse_block(self, block: Block, assigned: NameSet) -> NameSet:
-        """Return the names that are assigned after a block, given those that are assigned before
-        it.
+        """Return the names that are assigned after a block, given those assigned before it.
 
         Reads of unassigned shared variables are added to `unassigned_reads`.
         """
@@ -122,17 +121,16 @@ class _AssignmentAnalysis:
 
 
 def _elements(item: Item, size: int, loop_indices: Mapping[str, int]) -> Iterator[str]:
-    """Yield the names of the array elements that a read may access: one if the index is known,
-    else all.
-    """
+    """Yield the array elements that a read may access: one for a known index, else all."""
     place = _index_value(item.index, loop_indices)
     places = range(size) if place is None else (place,)
     yield from (f"{item.name}[{k}]" for k in places)
 
 
 def _index_value(index: Expr, loop_indices: Mapping[str, int]) -> int | None:
-    """Return the value of an index in the current loop iterations; None if it depends on
-    anything else.
+    """Return the value of an index in the current loop iterations.
+
+    Returns None if it depends on anything else.
     """
     match index:
         case Value(value):

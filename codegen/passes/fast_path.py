@@ -51,10 +51,7 @@ from language.programs.model_run import RUN_MODE
 
 FastPathMode = Literal["on", "anew", "off"]
 """Whether fast paths are added. `anew` computes all equations in each step; it is needed where
-states
-
-are set between steps, as in a predictor, so that values of the step before are not valid.
-"""
+states are set between steps, as in a predictor, so that values of the step before are not valid."""
 ENTRIES = ("init", "derive", "step")
 """The blocks that are entry points of a module."""
 FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
@@ -191,9 +188,7 @@ def _are_unconditional(
 
 
 def _is_event_loop(block: Block) -> bool:
-    """Tell whether a block executes a tick from event to event: it sets the time left, then
-    loops.
-    """
+    """Tell whether a block executes a tick from event to event: an assignment, then a loop."""
     match block:
         case (Assign(target), Loop(), *_):
             return target == TIME_LEFT
@@ -249,8 +244,7 @@ def _insert_fast_path(
     paths: Mapping[ModeConfiguration, ExecutionPath],
     changed: Mapping[str, Block],
 ) -> Program:
-    """Return a Program with the blocks of the paths, a block that dispatches to them, and
-    `changed`.
+    """Return a Program with the blocks of the paths, their dispatcher, and `changed` blocks.
 
     `block_name` is the name of the dispatching block. The Program is returned as it is if there are
     no paths, or if one of the new names is taken.
@@ -283,9 +277,7 @@ def _insert_fast_path(
 
 
 def _dispatch_on_modes(titles: Sequence[tuple[ModeNumbers, str]]) -> Block:
-    """Return nested switches over the mode variables that run the block of the active
-    configuration.
-    """
+    """Return nested switches that run the block of the active mode configuration."""
     ((numbers, title), *_) = titles
     if not numbers:
         return (RunBlock(title),)

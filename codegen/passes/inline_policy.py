@@ -21,16 +21,12 @@ MIN_OPERATIONS = 3
 """Number of floating-point operations from which on a call costs little in comparison."""
 ALWAYS_NOINLINE = ("hold", "rows_", "columns_")
 """Prefixes of blocks that are never inlined, in any number type: a covariance does not fit into
-
-registers.
-"""
+registers."""
 
 NOINLINE_BESIDE = frozenset({"latch"})
 """Blocks that are not inlined if one of ALWAYS_NOINLINE exists. The comparison of inputs with their
-
 ranges is computed in software too. Inlined into the step, its saved registers would add to the
-stack below a covariance (decision 0026).
-"""
+stack below a covariance (decision 0026)."""
 
 
 def select_noinline_blocks(program: Program) -> frozenset[str]:
@@ -68,9 +64,7 @@ def _call_sites(block: Block) -> Iterator[str]:
 
 
 def _count_float_operations(program: Program, name: str) -> int:
-    """Return the number of floating-point operations of one block, without the blocks that it
-    runs.
-    """
+    """Return the number of floating-point operations of a block, without those it runs."""
     return sum(
         isinstance(part, Binary) and part.operator in ARITHMETIC and not _is_integer(part)
         for op in walk_ops(program.blocks[name])

@@ -125,10 +125,10 @@ class ExecutionPath:
                     raise NotSpecialisable
 
     def follow_step_end(self) -> None:
-        """Append the equations at the end of a step; transitions run before them if an event
-        occurred.
+        """Append the equations at the end of a step.
 
-        If the equations cannot be specialised, the block is run as it is.
+        Transitions run before them if an event occurred. If the equations cannot be specialised,
+        the block is run as it is.
         """
         event, begin = self._resolve(Ref("work.event")), len(self.ops)
         try:
@@ -222,9 +222,7 @@ class ExecutionPath:
         return _simplify(map_operands(expr, self._fold_constants), self.program)
 
     def _invalidate(self, name: str) -> None:
-        """Forget what is known of a variable, and of variables that equal it: its value changes
-        here.
-        """
+        """Forget what is known of a variable, and of others that equal it: its value changes."""
         self._versions[name] += 1
         self._number_by_name.pop(name, None)
         self._name_by_number = {
@@ -236,19 +234,20 @@ class ExecutionPath:
             del self.known[other]
 
     def _record_name(self, name: str, number: int | None) -> None:
-        """Record that a name holds the value with a number; the first name of a value is used
-        for it.
+        """Record that a name holds the value with a number.
+
+        The first name of a value is used for it.
         """
         self._number_by_name[name] = number
         if number is not None:
             self._name_by_number.setdefault(number, name)
 
     def _value_number(self, value: Expr) -> int | None:
-        """Return the value number of an expression; None if it has none (a choice or an array
-        element).
+        """Return the value number of an expression.
 
-        Equal operations on equal numbers have equal numbers, as in
-        language/passes/common_subexpressions.py. A name has the number of its value.
+        Returns None if it has none (a choice or an array element). Equal operations on equal
+        numbers have equal numbers, as in language/passes/common_subexpressions.py. A name has the
+        number of its value.
         """
         key: Hashable = None
         match value:
@@ -270,17 +269,14 @@ class ExecutionPath:
 
 
 def _writes_only_persistent(block: Block) -> bool:
-    """Tell whether a block only assigns variables that outlive the step and that it does not
-    read.
-    """
+    """Tell whether a block only assigns persistent variables that it does not read."""
     writes = set(block_writes(block))
     is_plain = all(isinstance(op, Assign | FaultBit) for op in block)
     return is_plain and not any(n.startswith(WORK) or n in set(block_reads(block)) for n in writes)
 
 
 def _simplify(expr: Expr, program: Program) -> Expr:
-    """Return an expression folded: choices, `and` and `or` with a known condition, operations on
-    literals.
+    """Return a folded expression: known choices and conditions, operations on literals.
 
     The operands must be simple already.
     """

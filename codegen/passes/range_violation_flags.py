@@ -18,9 +18,7 @@ RANGE_MARK = "memory.left_{}"
 
 
 def ranged_signals(program: Program) -> tuple[str, ...]:
-    """Return the signals with a fault bit for their range, each once, in the order of the
-    operations.
-    """
+    """Return the signals with a fault bit for their range, each once, in program order."""
     ops = (op for block in program.blocks.values() for op in walk_ops(block))
     found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
     return tuple(dict.fromkeys(signal for signal in found if signal))

@@ -1,3 +1,1 @@
-"""Compiled one-step predictors: a model that follows recordings and is corrected by Kalman
-gains.
-"""
+"""Compiled one-step predictors: a model follows recordings, corrected by Kalman gains."""

@@ -1,6 +1,4 @@
-"""Kalman gains of a linear model, sample by sample, in C that is compiled for the size of the
-model.
-"""
+"""Kalman gains of a linear model, sample by sample, in C that is compiled for its size."""
 
 from __future__ import annotations
 
@@ -27,9 +25,7 @@ MAX_SAMPLES = 5000
 """Maximum number of samples; a gain that still changes then is taken as the steady-state gain."""
 STEADY_TOLERANCE = 1e-6
 """Relative change of a gain from sample to sample, in terms of its largest entry, below which it is
-
-steady.
-"""
+steady."""
 FLAGS = (*flags_at_level("Og"), "-shared", "-fPIC", "-w")
 """Compiler flags of the recursion."""
 
@@ -43,8 +39,7 @@ def compute_kalman_gains(
     transient_samples: int,
     max_samples: int = MAX_SAMPLES,
 ) -> tuple[Reals, Reals, Reals] | None:
-    """Return transient gains, the steady-state gain, and the covariance after the last computed
-    sample.
+    """Return transient gains, the steady-state gain, and the covariance after the last sample.
 
     The model is x(k+1) = phi x(k) + w, y = c x + v. `q` (states, states) is the covariance of w,
     `r` (outputs,) holds the variances of v, `initial_covariance` (states, states) is the covariance
@@ -68,9 +63,7 @@ def compute_kalman_gains(
 
 @cache
 def _compile_recursion(states: int, outputs: int) -> Any:
-    """Return the compiled C function of the recursion for a size, from the cache if it was built
-    before.
-    """
+    """Return the C function of the recursion for a size, compiled if it is not in the cache."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         source = Path(name) / "kalman_gains.c"
         source.write_text(

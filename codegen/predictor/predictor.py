@@ -56,9 +56,7 @@ def slice_to_outputs(program: Program) -> Program:
 
 
 def _external_interface(program: Program, step_program: Program) -> tuple[object, ...]:
-    """Return what a caller sets: the tunable parameters, and the inputs that `step_program`
-    retains.
-    """
+    """Return what a caller sets: tunable parameters, and inputs that `step_program` retains."""
     held_inputs = (v.name for v in step_program.variables if v.name.startswith("before."))
     return *tunable_constants(program), *held_inputs
 
@@ -98,10 +96,8 @@ LIBRARY_FLAGS = (
     *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
 )
 """Compiler flags of a predictor. All code is in one file, so that it can be inlined. -O1 gives the
-
 same speed as -O2 and compiles 10 % faster. No calibration tool writes to the page of a predictor,
-so `volatile` is removed: a step then takes 70 % of the time.
-"""
+so `volatile` is removed: a step then takes 70 % of the time."""
 
 STEADY_GAIN_DIMENSIONS = 3
 """Number of dimensions of steady-state gains that all points share: (modes, states, outputs)."""
@@ -252,8 +248,7 @@ class Predictor:
         substeps: int,
         limits: Reals,
     ) -> StackedPrediction:
-        """Return the predictions of several recordings, each with its row of `pages` (recordings,
-        tunables).
+        """Return the predictions of several recordings, each with its own parameters.
 
         Innovations beyond `limits` (outputs,) count linearly in the sums of squares, as in
         `sum_squares`. The other arguments are those of `predict`.
@@ -302,8 +297,7 @@ class Predictor:
     def sum_squares(
         self, innovations: Reals, recordings: StackedRecordings, limits: Reals
     ) -> tuple[Reals, Reals]:
-        """Return the sums of squared innovations and the numbers of finite ones, (recordings,
-        outputs) each.
+        """Return sums of squared innovations, and their numbers, (recordings, outputs) each.
 
         `innovations` has the shape (samples, outputs). An innovation e beyond its limit L in
         `limits` (outputs,) counts as L (2 |e| - L) (Huber 1964). Samples of the burn-in and NaN are

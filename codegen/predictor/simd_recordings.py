@@ -54,11 +54,10 @@ VECTOR_TYPE: Mapping[LaneKind, str] = {"real": "Reals", "truth": "Truths"}
 def simd_recordings_context(
     program: Program, states: tuple[str, ...], outputs: tuple[str, ...]
 ) -> Any:
-    """Return the context of the template of vectorised recordings; None if no step can be
-    vectorised.
+    """Return the context of the template of vectorised recordings.
 
-    `states` are the names of the states, `outputs` those of the compared outputs. Only float64
-    Programs are vectorised.
+    Returns None if no step can be vectorised. `states` are the names of the states, `outputs` those
+    of the compared outputs. Only float64 Programs are vectorised.
     """
     if program.number_type != "float64":
         return None
@@ -90,8 +89,7 @@ def simd_recordings_context(
 
 
 def _delay_record_context(program: Program) -> dict[str, Any] | None:
-    """Return the calls by which one lane records delayed values, and then executes a step with
-    events.
+    """Return the calls by which a lane records delayed values and executes a scalar step.
 
     Returns None if the work variables of a step are not in the instance.
     """
@@ -112,8 +110,7 @@ def _template_context(
     state_names: tuple[str, ...],
     outputs: tuple[str, ...],
 ) -> dict[str, Any]:
-    """Return the template context of the vectorised steps: members of the lanes, functions and
-    steps.
+    """Return the template context of vectorised steps: members, functions and steps.
 
     Raises NotVectorisable if a compared output is not a real that outlives the step.
     """
@@ -214,9 +211,7 @@ class _LaneStep:
 
     @property
     def commits(self) -> list[tuple[str, str, str]]:
-        """The members that are written after an event-free step: member, value, and macro that
-        selects it.
-        """
+        """The members written after an event-free step: member, value, macro that selects it."""
         return [(flatten_name(name), *end.split(" ")) for name, end in self.ends.items()]  # type: ignore[misc]
 
 
@@ -236,9 +231,7 @@ def _merge_steps(steps: list[_LaneStep]) -> list[_LaneStep]:
 
 
 def _is_mergeable(first: _LaneStep, second: _LaneStep) -> bool:
-    """Tell whether two steps differ in truth values only, as do the guards at both ends of a
-    backlash.
-    """
+    """Tell whether two steps differ in truth values only, as at both ends of a backlash."""
     reals = [[value for value in step.values if value[1] == "real"] for step in (first, second)]
     names = [[name for name, _, _ in step.values] for step in (first, second)]
     results = [(step.quiet, step.ends) for step in (first, second)]
@@ -285,9 +278,7 @@ def _lane_steps(emitter: VectorEmitter, configuration: ModeConfiguration) -> Ite
 
 
 def _integers_as_reals(expr: Expr) -> Expr:
-    """Return an expression in which conversions of whole numbers to reals are names with
-    REAL_PREFIX.
-    """
+    """Return an expression with names with REAL_PREFIX for conversions of whole numbers."""
     match expr:
         case Call("real", (Ref(name),)):
             return Ref(REAL_PREFIX + name)

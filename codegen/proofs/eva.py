@@ -33,10 +33,7 @@ ANALYSIS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
 """Options of the value analysis."""
 MERGED = ("-eva-slevel-function", "main:0")
 """Options by which steps are not followed one by one: all states are merged, and counters begin
-with
-
-any value.
-"""
+with any value."""
 ALARM = re.compile(
     r"\[eva:alarm\] (?P<file>[^:]+):(?P<line>\d+): Warning: *(?P<what>[^\n]*)\n? *(?P<more>[^\n]*)"
 )
@@ -46,10 +43,9 @@ REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
 
 
 def check_values(program: Program, folder: Path) -> ToolVerdict:
-    """Run the value analysis on the C of a Program and return its verdict; files are written to
-    `folder`.
+    """Run the value analysis on the C of a Program and return its verdict.
 
-    Raises MissingToolError, BuildError.
+    Files are written to `folder`. Raises MissingToolError, BuildError.
     """
     files = {**emit_c_files(program, by_magnitude=False), "main.c": _main(program)}
     for name, text in files.items():
@@ -89,8 +85,7 @@ def _turns(program: Program) -> int:
 
 
 def counter_limits(program: Program) -> dict[str, int]:
-    """Return the largest value of each counter that is retained between steps: timers and array
-    indices.
+    """Return the largest value of each retained counter: timers and array indices.
 
     With these bounds a counter may begin with any value, and no steps need to be followed until it
     is full. A Program that runs no model has none.

@@ -1,6 +1,4 @@
-"""Compiler warnings: compiles the C of a Program with all warnings of gcc and clang enabled
-(rule C24).
-"""
+"""Compiler warnings: compiles generated C with all warnings of gcc and clang (rule C24)."""
 
 from __future__ import annotations
 

@@ -85,8 +85,9 @@ class CompiledStepper:
             self.run(entry)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant by name (`group.name`); all elements of an
-        array.
+        """Return the value of a variable or constant by name (`group.name`).
+
+        All elements of an array.
         """
         value = self._values.get(name)
         return self._arrays_and_constants[name] if value is None else value.value
@@ -160,9 +161,7 @@ def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedSte
 
 
 def _emit_files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, str]]:
-    """Return the C files of a Program, the numbers of its blocks, and the C types of its
-    variables.
-    """
+    """Return the C files of a Program, the numbers of blocks, and the C types of variables."""
     context = module_context(program)
     local = locals_of(program)
     usage_by_block, c_names = block_usages(program, local), CNames(program)

@@ -103,8 +103,9 @@ def _row_slots(assembly: SimulationAssembly, name: str, program: Program) -> lis
 
 
 def _invariant_contexts(program: Program, c_names: CNames, number: int) -> list[dict[str, Any]]:
-    """Return the contexts of invariants; their event numbers follow those of transitions and
-    ranges.
+    """Return the contexts of invariants.
+
+    Their event numbers follow those of transitions and ranges.
     """
     first = number + len(program.transitions) + len(range_event_variables(program))
     return [
@@ -146,9 +147,7 @@ def _default_assignments(program: Program) -> list[str]:
 
 
 def _range_contexts(program: Program, number: int) -> list[dict[str, object]]:
-    """Return the contexts of states and discrete variables whose range is monitored in a
-    simulation.
-    """
+    """Return the contexts of variables whose range is monitored in a simulation."""
     contexts = []
     for k, variable in enumerate(range_event_variables(program)):
         assert variable.range is not None

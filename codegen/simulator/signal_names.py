@@ -65,9 +65,7 @@ class SignalNameMap:
 
 
 def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMap) -> str:
-    """Return the C text of the formula of a connection, a block of `assembly.wires`, as a
-    double.
-    """
+    """Return the C text of a formula, a block of `assembly.wires`, as a double."""
     (op,) = assembly.wires.blocks[block]
     assert isinstance(op, Assign)
     return f"(double)({emit_expression(op.value, c_names)})"
@@ -93,8 +91,9 @@ class TimeNameMap:
 
 
 def column_positions(assembly: SimulationAssembly) -> list[int]:
-    """Return the position of each recorded column in a row; columns with a formula follow the
-    signals.
+    """Return the position of each recorded column in a row.
+
+    Columns with a formula follow the signals.
     """
     positions, formulas = [], len(assembly.row_signals)
     for column in assembly.columns:

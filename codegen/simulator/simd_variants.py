@@ -70,15 +70,14 @@ class VectorEmitter:
     """C names and kinds of local values, which replace names of the Program."""
 
     def emit_block(self, name: str, ops: Block) -> None:
-        """Print a block into `blocks`, and first those that it runs, unless it is printed
-        already.
-        """
+        """Print a block and those that it runs into `blocks`, unless it is there already."""
         if name not in self.blocks:
             self.blocks[name] = [f"    {line}" for op in ops for line in self._emit_op(op)]
 
     def _emit_op(self, op: Op) -> Iterator[str]:
-        """Yield the lines of an assignment or a call of a block. Raises NotVectorisable for
-        others.
+        """Yield the lines of an assignment or a call of a block.
+
+        Raises NotVectorisable for others.
         """
         match op:
             case Assign(target, value, _) if self.kind_of(Ref(target)) == self.kind_of(value):
@@ -117,8 +116,9 @@ class VectorEmitter:
         raise NotVectorisable
 
     def emit_expression(self, expr: Expr) -> str:
-        """Return the C text of an expression over vectors. Raises NotVectorisable if there is
-        none.
+        """Return the C text of an expression over vectors.
+
+        Raises NotVectorisable if there is none.
         """
         match expr:
             case Value(value) if isinstance(value, bool):
@@ -148,9 +148,7 @@ class VectorEmitter:
         raise NotVectorisable
 
     def _emit_comparison(self, operator: str, left: Expr, right: Expr) -> str:
-        """Return the C text of a comparison of two reals, or of `==` and `!=` of two truth
-        values.
-        """
+        """Return the C text of a comparison of two reals, or `==` or `!=` of two truth values."""
         kinds = self.kind_of(left), self.kind_of(right)
         if kinds == ("real", "real"):
             return (
@@ -264,9 +262,7 @@ class _BatchBuilder:
             raise NotVectorisable
 
     def _mode_blocks(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield the number of each mode and the block that the switch in block `name` runs for
-        it.
-        """
+        """Yield the number of each mode and the block that a switch runs for it."""
         (chosen,) = self.program.blocks[name]
         if not isinstance(chosen, Switch) or chosen.selector != MODE_VARIABLE:
             raise NotVectorisable
@@ -276,8 +272,7 @@ class _BatchBuilder:
             yield number, run.block
 
     def _mode_context(self, number: int, name: str) -> dict[str, Any]:
-        """Return the context of a step in a mode: the block up to the event branch, and the states
-        after it.
+        """Return the context of a step in a mode: the block up to the event branch, new states.
 
         Raises NotVectorisable if anything but assignments of states follows the branch.
         """

@@ -122,8 +122,7 @@ class SimulatorLibrary:
         self._run.restype = None
 
     def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
-        """Return a function that runs the variants from a first index up to, but not including, a
-        second.
+        """Return a function that runs the variants from a first index up to a last one, exclusive.
 
         `plan` is a plan of the engine (engine/batch/run_plan.py). `variants` gives the members of
         the C structure `Variants`: whole numbers, contiguous arrays, or lists of arrays. Results
@@ -258,8 +257,7 @@ def build_library(
 
 
 def _struct_member(value: Any, keep_alive: list[Any]) -> Any:
-    """Return the value of a member of a C structure: a number, an address, or an array of
-    addresses.
+    """Return a member of a C structure: a number, an address, or an array of addresses.
 
     Objects whose memory it refers to are appended to `keep_alive`.
     """

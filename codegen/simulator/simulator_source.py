@@ -148,9 +148,7 @@ def _formula_columns(
 
 
 def _capture_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
-    """Return, for each sensor with a delay, the index of its capture among the actions, and its
-    call.
-    """
+    """Return index and call of the capture action of each sensor with a delay."""
     return [
         (
             assembly.instant_actions.index(f"capture {n}"),
@@ -164,8 +162,9 @@ def _capture_calls(assembly: SimulationAssembly) -> list[tuple[int, str]]:
 def _slot_context(
     assembly: SimulationAssembly, signal: str, signal_names: SignalNameMap
 ) -> dict[str, object]:
-    """Return the context of a slot of a row; an input with a trajectory is evaluated between
-    instants.
+    """Return the context of a slot of a row.
+
+    An input with a trajectory is evaluated between instants.
     """
     courses = [course.name for course in assembly.input_trajectories]
     value = signal_names.emit_signal(signal)
@@ -175,9 +174,7 @@ def _slot_context(
 
 
 def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> dict[str, object]:
-    """Return the context of an input trajectory: its delay as a sum of two doubles, and its
-    formulas.
-    """
+    """Return the context of an input trajectory: its delay as two doubles, its formulas."""
     high = float(course.delay)
     return {
         "delay": course.delay,
@@ -257,9 +254,7 @@ def _feed_context(
 
 
 def _sensor_context(sensor: Sensor, signal_names: SignalNameMap) -> dict[str, object]:
-    """Return the context of a sensor: source, lag, noise, resolution and length of the delay
-    buffer.
-    """
+    """Return the context of a sensor: source, lag, noise, resolution, delay buffer."""
     name, lag = INSTANCE_NAME.format(sensor.name), float(sensor.lag)
     look = f"lag_look(&me->lag, {lag!r}, now, measured)" if sensor.lag else "measured"
     room = math.ceil(sensor.delay / sensor.period) + 2 if sensor.period and sensor.delay else 0

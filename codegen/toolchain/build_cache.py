@@ -22,31 +22,22 @@ KEY_LENGTH = 64
 """Number of characters of a key."""
 MAX_PROGRAMS = 200
 """Number of programs that are always kept (100 kB each). Of more, those not used for a day are
-
-removed, the oldest first.
-"""
+removed, the oldest first."""
 PROGRAM_SUFFIXES = ("", ".so")
 """Suffixes of programs. Other entries with a key, such as thresholds of a bootstrap, are small and
-are
-
-never removed.
-"""
+are never removed."""
 DAY = 86400.0
 """A day [s]."""
 HOUR = 3600.0
 """An hour [s]."""
 CLEANUP_STAMP = "tidied"
 """A file whose modification time is that of the last clean-up. A clean-up lists thousands of files,
-
-which takes as long as the compilation of a small program, so it is not done for each program.
-"""
+which takes as long as the compilation of a small program, so it is not done for each program."""
 log = logging.getLogger("modewright.cache")
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache: $MODEWRIGHT_CACHE, else `modewright` in the user's cache
-    folder.
-    """
+    """Return the folder of the cache: $MODEWRIGHT_CACHE, else one in the user's cache folder."""
     if given := os.environ.get(CACHE_VARIABLE):
         return Path(given)
     base = os.environ.get("XDG_CACHE_HOME", "")
@@ -75,17 +66,16 @@ def cache_fault(folder: Path) -> str:
 
 
 def cache_subfolder(subfolder: str) -> Path | None:
-    """Return a folder inside the cache for other contents than programs; None if it cannot be
-    used.
+    """Return a folder inside the cache for other contents than programs.
+
+    Returns None if it cannot be used.
     """
     folder, fault = _locate_folder(subfolder)
     return None if fault else folder
 
 
 def _locate_folder(subfolder: str) -> tuple[Path, str]:
-    """Return the cache, or a `subfolder` of it, with the reason why it must not be used, else
-    "".
-    """
+    """Return the cache, or a `subfolder` of it, and why it must not be used, else ""."""
     try:
         folder = cache_folder()
         fault = cache_fault(folder)
@@ -149,9 +139,7 @@ def get_or_build(
 
 
 def _is_valid(target: Path) -> bool:
-    """Tell whether a cached program belongs to the user, is executable, and has the stored
-    digest.
-    """
+    """Tell whether a cached program belongs to the user, is executable and is intact."""
     try:
         status = target.lstat()
         expected_digest = _digest_file(target).read_text()

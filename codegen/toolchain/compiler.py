@@ -1,6 +1,4 @@
-"""Compiler: compiles generated C with the flags under which its bits are defined (rules C3 and
-C24).
-"""
+"""Compiler: compiles generated C with the flags that define its bits (rules C3 and C24)."""
 
 from __future__ import annotations
 
@@ -88,8 +86,7 @@ def compile_program(
     flags: Sequence[str] = FLAGS,
     compiler_name: str | None = None,
 ) -> None:
-    """Compile sources with all warnings enabled into an executable or a library, according to
-    `flags`.
+    """Compile sources with all warnings into an executable or a library, according to `flags`.
 
     Raises MissingToolError, BuildError.
     """
@@ -99,8 +96,9 @@ def compile_program(
 
 
 def run_compiler(command: Sequence[str], target: Path) -> None:
-    """Run a compiler command with `-o target`. Raises BuildError with its output from the first
-    error on.
+    """Run a compiler command with `-o target`.
+
+    Raises BuildError with its output from the first error on.
     """
     try:
         done = subprocess.run(

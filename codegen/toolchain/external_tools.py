@@ -35,8 +35,9 @@ DEBIAN_PACKAGES: Mapping[str, str] = {
 
 
 def require_tool(tool: str) -> str:
-    """Return the name of a tool if it is installed. Raises MissingToolError with its package
-    otherwise.
+    """Return the name of a tool if it is installed.
+
+    Raises MissingToolError with its package otherwise.
     """
     if shutil.which(tool) is None:
         package = DEBIAN_PACKAGES.get(tool, tool)

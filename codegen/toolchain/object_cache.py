@@ -14,10 +14,7 @@ from codegen.toolchain.compiler import run_compiler
 
 SHARED_SOURCES = re.compile(r"(ha_mathf?|harness/\w+)\.c$")
 """Sources that do not depend on a Program. A source in `harness` may read all files beside it;
-ha_math
-
-reads its own header only.
-"""
+ha_math reads its own header only."""
 
 
 def is_shared(source: Path) -> bool:

@@ -29,9 +29,7 @@ class ToolVerdict:
 
 
 def tool_version(tool: str, folder: Path) -> str:
-    """Return the version of a tool: the first word of its output that begins with a digit, else
-    "".
-    """
+    """Return the first word of a tool's version text that begins with a digit, else ""."""
     words = run_tool(
         [tool, "--version" if tool != "frama-c" else "-version"], folder
     ).stdout.split()

@@ -1,6 +1,4 @@
-"""Conversions (A2L COMPU_METHOD): how a tool displays a raw number of the C: unit, factor or
-names.
-"""
+"""Conversions (A2L COMPU_METHOD): unit, factor or names by which a tool displays a number."""
 
 from __future__ import annotations
 
@@ -51,9 +49,7 @@ def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
 
 
 def _enumerated_variables(program: Program) -> dict[str, Conversion]:
-    """Return the conversions of the variables that hold numbers of modes and transitions, by
-    name.
-    """
+    """Return the conversions of variables with numbers of modes and transitions, by name."""
     conversions = {
         variable: Conversion(names=tuple((m.number, m.name) for m in program.modes_of(region)))
         for region, variable in program.mode_variables().items()

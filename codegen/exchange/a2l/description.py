@@ -175,9 +175,7 @@ def _fault_measurements(program: Program) -> list[Measurement]:
 
 
 def _characteristic(constant: Constant, program: Program, c_names: CNames) -> Characteristic:
-    """Return the characteristic of a tunable parameter or solved number, with the axes of a
-    table.
-    """
+    """Return the characteristic of a tunable parameter or solved number, with its axes."""
     path = POINTER_PREFIX.sub("", c_names(constant.name))
     kind = c_type(constant, program.number_type)
     table = constant.name.partition(".")[2]

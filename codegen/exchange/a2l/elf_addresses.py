@@ -1,6 +1,4 @@
-"""ELF addresses: the locations of a module's structures in a linked program, from its DWARF
-data.
-"""
+"""ELF addresses: the locations of a module's structures in a linked program, from DWARF."""
 
 from __future__ import annotations
 
@@ -80,8 +78,7 @@ class Image:
 
 
 def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ...] = ()) -> Image:
-    """Read a linked program: the locations of structures of the given C types, and texts at
-    symbols.
+    """Read a linked program: locations of structures of the given C types, texts at symbols.
 
     Raises ImageError; MissingToolError if pyelftools is missing.
     """
@@ -161,9 +158,7 @@ def _nested_structures(
 
 
 def _members(structure: DIE, above: str, start: int) -> Iterator[tuple[str, int, int]]:
-    """Yield path, offset and size [bytes] of each member of a structure that is not a structure
-    itself.
-    """
+    """Yield path, offset and size [bytes] of each member at any depth that is no structure."""
     for member in _struct_fields(structure):
         path, place = f"{above}{_name_of(member)}", start + _offset_of(member)
         kind = _strip_qualifiers(_type_of(member))
@@ -222,9 +217,7 @@ def _type_of(die: DIE) -> DIE | None:
 
 
 def _declaration_of(die: DIE) -> DIE:
-    """Return the declaration that a definition without a type refers to, else the definition
-    itself.
-    """
+    """Return the declaration that a definition without a type refers to, else `die` itself."""
     for name in ("DW_AT_specification", "DW_AT_abstract_origin"):
         if name in die.attributes and "DW_AT_type" not in die.attributes:
             return die.get_DIE_from_attribute(name)
@@ -244,8 +237,9 @@ def _offset_of(member: DIE) -> int:
 
 
 def _address_of(die: DIE, elf: ELFFile) -> int | None:
-    """Return the address of a variable; None if it has no fixed address, or if `die` is no
-    variable.
+    """Return the address of a variable.
+
+    Returns None if it has no fixed address, or if `die` is no variable.
     """
     at = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
     if (

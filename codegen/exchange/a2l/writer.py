@@ -141,9 +141,7 @@ def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
 
 
 def sanitise_string(text: str) -> str:
-    """Return a text as one line of ASCII without backslashes and double quotes, for a string in
-    A2L.
-    """
+    """Return a text as one line of ASCII without backslashes and double quotes."""
     plain = text.encode("ascii", "replace").decode()
     return re.sub(r"\s+", " ", plain.replace("\\", "/").replace('"', "'")).strip()
 
@@ -154,9 +152,7 @@ def _common_context(
     program: Program,
     location: ModuleLocation | None,
 ) -> dict[str, Any]:
-    """Return the context that measurements and characteristics share: name, type, limits,
-    address.
-    """
+    """Return the context of any item: name, comment, type, conversion, limits, address."""
     place = location.structure_of(item) if location else None
     page = f"{program.name}_default_cal.{item.path}" if isinstance(item, Characteristic) else ""
     factor = item.conversion.factor
@@ -294,9 +290,7 @@ def _bit_mask(measurement: Measurement) -> str | None:
 
 
 def _format_number(value: float, kind: str, number: NumberType) -> str:
-    """Return a limit as text: a real as its shortest decimal, any other value without a
-    fraction.
-    """
+    """Return a limit as text: a real as its shortest decimal, others without a fraction."""
     is_real = kind in ("double", "float") or value != int(value)
     return shortest_decimal(float(value), number) if is_real else str(int(value))
 

@@ -21,9 +21,7 @@ STAMP_PREFIX = "solved.stamp_"
 
 
 def page_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the constants of the page in the order of its members: tunables, then solved
-    numbers.
-    """
+    """Return the constants of the page in its order: tunables, then solved numbers."""
     constants = restrict_to_step(program).constants
     return tuple(
         constant

@@ -80,9 +80,7 @@ def _format_instance(characteristic: FileCharacteristic) -> Iterator[str]:
 
 
 def _format_values(characteristic: FileCharacteristic) -> Iterator[str]:
-    """Yield the lines of the values: cells in order, or one group VG for each point of the
-    second axis.
-    """
+    """Yield the lines of the values; those of a map in one group VG for each second point."""
     tag = "VT" if characteristic.is_text else "V"
     if len(characteristic.axes) < 2:
         yield from (f"      {_format_cell(cell, tag)}" for cell in characteristic.values)

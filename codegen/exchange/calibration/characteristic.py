@@ -1,6 +1,4 @@
-"""Characteristics of calibration files: names, values, units and axes as texts with their
-positions.
-"""
+"""Characteristics of calibration files: names, values, units and axes as positioned texts."""
 
 from __future__ import annotations
 

@@ -88,8 +88,9 @@ def read_csv(source: Source, text: str, problems: Problems, name_filter: NameFil
 
 
 def _read_rows(context: _ReadContext, text: str) -> Iterator[Row]:
-    """Yield the cells of each accepted line by column; the first line holds the names of the
-    columns.
+    """Yield the cells of each accepted line by column.
+
+    The first line holds the names of the columns.
     """
     first = context.source.lines[0]
     separator = max(SEPARATORS, key=first.count)
@@ -151,8 +152,9 @@ def _parse_row(
 
 
 def _cell_span(span: Span, line: str, text: str) -> Span:
-    """Return the position of the first occurrence of a text in a line; the begin if it is
-    absent.
+    """Return the position of the first occurrence of a text in a line.
+
+    The begin if it is absent.
     """
     start = max(line.find(text), 0) if text else 0
     return span.subspan(start, len(text))
@@ -199,9 +201,7 @@ def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
 
 
 def _is_grid(rows: Sequence[Row], axes: Sequence[FileAxis]) -> bool:
-    """Tell whether the points of the rows are the full grid of the axes, with the last axis
-    fastest.
-    """
+    """Tell whether the rows are the full grid of the axes, with the last axis fastest."""
     if math.prod(len(axis.points) for axis in axes) != len(rows):
         return False
     grid: list[tuple[str, ...]] = [()]

@@ -18,8 +18,9 @@ VALUES_PER_LINE = 6
 
 
 def format_dcm(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as a DCM file; `title` is the function of all characteristics, `heading` a
-    comment.
+    """Return a page as a DCM file.
+
+    `title` is the function of all characteristics, `heading` a comment.
     """
     lines = [f"* {line}" for line in heading]
     lines += ["", "KONSERVIERUNG_FORMAT 2.0", "", "FUNKTIONEN"]
@@ -72,7 +73,8 @@ def _format_lines(word: str, texts: Sequence[str]) -> Iterator[str]:
 
 
 def _quote(text: str) -> str:
-    """Return a text in double quotes, as one line of ASCII; double quotes inside become single
-    ones.
+    """Return a text in double quotes, as one line of ASCII.
+
+    Double quotes inside become single ones.
     """
     return '"' + sanitise_comment(text).replace('"', "'") + '"'

@@ -50,9 +50,7 @@ Lines = Iterator[Words]
 
 @dataclass(frozen=True)
 class _ReadContext:
-    """The source of a file, its problems, and the unknown keywords that were reported, each
-    once.
-    """
+    """The source of a file, its problems, and the unknown keywords already reported."""
 
     source: Source
     problems: Problems
@@ -219,9 +217,7 @@ def _target_list(block: DcmBlock, word: str) -> list[Cell] | None:
 
 
 def _warn_unknown_word(word: Cell, block: DcmBlock, context: _ReadContext) -> None:
-    """Warn of an unknown keyword at its first occurrence, for at most MAX_PROBLEMS keywords of a
-    file.
-    """
+    """Warn of the first occurrence of an unknown keyword, for at most MAX_PROBLEMS of them."""
     if word.text in context.reported_words or len(context.reported_words) >= MAX_PROBLEMS:
         return
     context.reported_words.add(word.text)

@@ -67,8 +67,9 @@ FORMATS: Mapping[str, Format] = {
 
 
 def format_name(path: Path, explicit_format: str | None = None) -> str | None:
-    """Return the name of the explicit format, else of the extension of a file; None if it is
-    unknown.
+    """Return the name of the explicit format, else of the extension of a file.
+
+    Returns None if it is unknown.
     """
     name = explicit_format or path.suffix.lower().removeprefix(".")
     return name if name in FORMATS else None

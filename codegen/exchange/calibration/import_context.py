@@ -1,6 +1,4 @@
-"""Import context: converts values of a file to those of a parameter, and collects remarks on
-them.
-"""
+"""Import context: converts values of a file to those of a parameter, with remarks."""
 
 from __future__ import annotations
 
@@ -86,8 +84,7 @@ def resolve_unit(
     cell: Cell | None,
     context: ImportContext,
 ) -> Unit | None:
-    """Return the unit of values: that of `cell`, or the SI unit of `declared_unit` if there is
-    none.
+    """Return the unit of values: that of `cell`, else the SI unit of `declared_unit`.
 
     A missing unit adds a remark unless the values are dimensionless. Returns None with a problem
     reported if the unit is unknown or incompatible.

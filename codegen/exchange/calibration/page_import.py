@@ -124,10 +124,9 @@ def _match_names(
 def _read_solved(
     characteristic: FileCharacteristic, constant: Constant, context: ImportContext
 ) -> dict[str, float]:
-    """Return a solved number by the name of its constant; an empty dictionary with a problem
-    reported if
+    """Return a solved number by the name of its constant.
 
-    it is invalid.
+    Returns an empty dictionary with a problem reported if it is invalid.
     """
     cell = _require_single(characteristic, context.problems)
     number = parse_cell_number(cell, context.problems) if cell else None
@@ -164,8 +163,9 @@ def _read_value(
 
 
 def _require_single(characteristic: FileCharacteristic, problems: Problems) -> Cell | None:
-    """Return the only value of a characteristic without axes; None with a problem reported
-    otherwise.
+    """Return the only value of a characteristic without axes.
+
+    Returns None with a problem reported otherwise.
     """
     if len(characteristic.values) == 1 and not characteristic.axes:
         return characteristic.values[0]

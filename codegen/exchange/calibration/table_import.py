@@ -1,6 +1,4 @@
-"""Table import: the values of a table in a calibration file whose axis points are those of the
-spec.
-"""
+"""Table import: the values of a table in a calibration file, if its points are the spec's."""
 
 from __future__ import annotations
 

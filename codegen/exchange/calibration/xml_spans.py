@@ -18,9 +18,7 @@ MAX_DEPTH = 64
 
 @dataclass(frozen=True)
 class Element:
-    """An XML element: tag without namespace prefix, position, children, and pieces of its own
-    text.
-    """
+    """An XML element: tag without prefix, position, children, and pieces of its text."""
 
     tag: str
     span: Span

@@ -25,17 +25,12 @@ from language.ir.program import Program
 
 SHARED_LIBRARY_FLAGS = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
 """Flags of a shared library that exports only the functions of the standard. It has no symbols, so
-its
-
-bytes do not contain names of folders.
-"""
+its bytes do not contain names of folders."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform in FMI: the name of its folder in each version, and the suffix of its
-    libraries.
-    """
+    """A platform in FMI: its folder by version, and the suffix of its libraries."""
 
     folders: Mapping[int, str]
     suffix: str

@@ -44,9 +44,7 @@ def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
 
 
 def emit_wrapper(program: Program, version: Version) -> dict[str, str]:
-    """Return the C file that implements the functions of the standard with those of a Program,
-    by name.
-    """
+    """Return the C file that implements the functions of FMI for a Program, by its name."""
     context = fmu_context(program, version)
     return {f"{program.name}_fmu.c": render(f"fmi/fmi_{version}.c.jinja", context)}
 

@@ -1,6 +1,4 @@
-"""FMU interface: the variables and enumeration types of a Program's FMU, in the order of
-references.
-"""
+"""FMU interface: the variables and enumeration types of a Program's FMU."""
 
 from __future__ import annotations
 
@@ -42,8 +40,9 @@ PREFIX = "type."
 
 @dataclass(frozen=True)
 class Enumeration:
-    """An enumeration type: its name, and pairs of item name and number; numbers may begin at any
-    value.
+    """An enumeration type: its name, and pairs of item name and number.
+
+    Numbers may begin at any value.
     """
 
     name: str
@@ -51,9 +50,7 @@ class Enumeration:
 
 
 def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
-    """Return the enumeration types of a Program: modes, modes of regions, run modes, then value
-    lists.
-    """
+    """Return the enumeration types of a Program: modes, region modes, run modes, value lists."""
     types = [_mode_enumeration("mode", program.modes)]
     types += [_mode_enumeration(f"region.{info.name}", info.modes) for info in program.regions]
     if program.run_modes:
@@ -66,8 +63,9 @@ def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
 
 
 def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) -> str:
-    """Return the type name of a variable or constant with enumeration `values`; empty if it has
-    no type.
+    """Return the type name of a variable or constant with enumeration `values`.
+
+    Returns an empty text if it has no type.
     """
     if name == MODE_VARIABLE:
         return f"{PREFIX}mode"
@@ -105,8 +103,7 @@ FAULTS = "memory.faults"
 
 
 def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
-    """Return the variables of an FMU in their order: time, inputs, parameters, outputs, locals,
-    faults.
+    """Return the variables of an FMU: time, inputs, parameters, outputs, locals, faults.
 
     Names are those of the spec. A name that occurs again gets its causality as a prefix.
     """

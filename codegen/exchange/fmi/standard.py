@@ -1,6 +1,4 @@
-"""FMI standard: the functions that every FMU must export, read from the headers, and the
-rejected ones.
-"""
+"""FMI standard: the functions of the headers that an FMU exports but does not support."""
 
 from __future__ import annotations
 

@@ -23,8 +23,9 @@ class UnitDefinition:
 
 
 def unit_name(text: str) -> str:
-    """Return the display name of a unit of a Program; empty for a pure number and for an invalid
-    unit.
+    """Return the display name of a unit of a Program.
+
+    Returns an empty text for a pure number and for an invalid unit.
     """
     return display_unit(text) if text and _is_unit(text) else ""
 

@@ -24,9 +24,7 @@ class Unsaid(Exception):
 
 @dataclass(frozen=True)
 class Speech:
-    """A printer of expressions, given the type of reals and the names of truth values
-    (`truths`).
-    """
+    """A printer of expressions, given the number type and the names of truth values."""
 
     number: NumberType
     truths: Collection[str]

@@ -53,9 +53,7 @@ STEP = "*work"
 
 
 def called_by(program: Program, blocks: Iterable[str]) -> list[str]:
-    """Return the sorted names of the blocks that some blocks run, directly or indirectly,
-    without these.
-    """
+    """Return the sorted blocks that some blocks run, directly or indirectly, without these."""
     given = tuple(blocks)
     inside = {name for block in given for name in reachable_blocks(block, program.blocks)}
     return sorted(inside - set(given))
@@ -77,9 +75,7 @@ def places_of(program: Program, block: str) -> list[str]:
 
 
 def add_effect_contracts(program: Program, text: str, called: Iterable[str]) -> str:
-    """Return the C of a Program with an `assigns` contract before each function named in
-    `called`.
-    """
+    """Return the C of a Program with an `assigns` contract before each function in `called`."""
     inside = is_inside(text)
     for name in called:
         function, places = function_of(text, name), places_of(program, name)
@@ -91,9 +87,7 @@ def add_effect_contracts(program: Program, text: str, called: Iterable[str]) -> 
 
 
 def seen_of(function: Function, places: Iterable[str]) -> list[str]:
-    """Return the locations that a caller can observe: the work variables only if they are a
-    parameter.
-    """
+    """Return the locations that a caller sees: work variables only if they are a parameter."""
     has_step = re.search(r"\bwork\b", function.parameters) is not None
     return [place for place in places if place != STEP or has_step]
 

@@ -43,11 +43,7 @@ class Commit:
         yield from self._counted()
 
     def takeable(self) -> Iterator[str]:
-        """Yield that the configuration is valid and that the selected transitions leave active
-        modes, each
-
-        once.
-        """
+        """Yield that the selected transitions leave active modes, each once."""
         words = self.words
         yield from words.valid(words.now)
         yield from Hearing(words).consistent(words.now)
@@ -61,8 +57,9 @@ class Commit:
             yield any_of(taken)
 
     def grown(self) -> Iterator[str]:
-        """Yield that indices of the log and of the event queue are valid; the queue gets no
-        shorter.
+        """Yield that indices of the log and of the event queue are valid.
+
+        The queue gets no shorter.
         """
         words = self.words
         yield from self._counted()

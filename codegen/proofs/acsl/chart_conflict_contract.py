@@ -19,8 +19,9 @@ from language.model.statechart import ChartNode
 
 @dataclass(frozen=True)
 class Hearing:
-    """The contract of `hear`. Requests and modes do not change, so all clauses refer to the
-    final state.
+    """The contract of `hear`.
+
+    Requests and modes do not change, so all clauses refer to the final state.
     """
 
     words: Configuration

@@ -61,10 +61,7 @@ SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
 STEP, JUMP = "micro_step", "jump"
 MODEL = ("-wp-model", "Typed+real")
 """Options of WP: reals have no rounding, which suffices because guards only compare them. Accesses
-and
-
-overflows are checked by the value analysis (eva.py).
-"""
+and overflows are checked by the value analysis (eva.py)."""
 OF_PARTS = (*MODEL, "-wp-split")
 OF_CHART = MODEL
 """Options for functions that run others one after the other."""
@@ -73,8 +70,9 @@ OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
 def write_chart_contracts(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
-    """Write the C with its contracts into a folder; return the names of the functions that have
-    one.
+    """Write the C with its contracts into a folder.
+
+    Return the names of the functions that have one.
     """
     name = made.made.name
     text, names = made.annotated(files[f"{name}.c"])
@@ -118,9 +116,7 @@ class ChartContract:
 
     @property
     def unsaid(self) -> tuple[str, ...]:
-        """The functions that have only a lemma, because their contract has no translation to
-        ACSL.
-        """
+        """The functions with a lemma only: their contract has no translation to ACSL."""
         places = [(name, name) for name in self.functions]
         places += [(SELECT, part) for part in self._selected]
         return tuple(part for block, part in places if self._said(block, part) is None)
@@ -145,8 +141,7 @@ class ChartContract:
         return [function] if function.name == JUMP else outline_choices(function)
 
     def with_apart(self, text: str) -> str:
-        """Return a header in which arrays of whole numbers have the element type int64_t or
-        uint64_t.
+        """Return a header in which arrays of whole numbers have 64-bit elements.
 
         A store into an array then cannot alias a variable, and every number fits.
         """

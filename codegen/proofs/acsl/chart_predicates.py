@@ -26,8 +26,9 @@ from language.model.statechart import ChartNode
 
 @dataclass(frozen=True)
 class Configuration:
-    """The predicates of a chart's contracts; `made` is the Program after the passes of the C
-    generator.
+    """The predicates of a chart's contracts.
+
+    `made` is the Program after the passes of the C generator.
     """
 
     charting: ChartContext
@@ -55,8 +56,9 @@ class Configuration:
         return name in self._known
 
     def now(self, name: str) -> str:
-        """Return the value of a variable at the end of a function. Raises Unsaid if it is not in
-        C.
+        """Return the value of a variable at the end of a function.
+
+        Raises Unsaid if it is not in C.
         """
         array, _, index = name.partition(" ")
         if array not in self._known:
@@ -67,8 +69,9 @@ class Configuration:
         return f"({text} != 0)" if name in self.speech.truths else text
 
     def before(self, name: str) -> str:
-        """Return the value of a variable at the start of a function. Raises Unsaid if it is not
-        in C.
+        """Return the value of a variable at the start of a function.
+
+        Raises Unsaid if it is not in C.
         """
         array, _, index = name.partition(" ")
         said = f"{self.place(array)}[{self.place(index)}]" if index else self.now(name)
@@ -110,9 +113,7 @@ class Configuration:
             yield from self.valid_in(region, at)
 
     def valid_in(self, region: ChartNode, at: Look) -> Iterator[str]:
-        """Yield the predicates of a valid region: its mode, its histories, the limits of its
-        counters.
-        """
+        """Yield the predicates of a valid region: its mode, histories and counter limits."""
         chart, automaton = self.charting.chart, self.charting.automaton
         inside = self.is_in(region.region, self._numbers(region), at)
         inactive = automaton.region(region.region).inactive

@@ -49,6 +49,7 @@ class Choice:
 
     def of_region(self, region: ChartNode) -> Iterator[str]:
         """Yield the postconditions for a region: its request and the counters of its modes.
+
         Raises Unsaid.
         """
         words = self.words

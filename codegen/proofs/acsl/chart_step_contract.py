@@ -81,9 +81,7 @@ class Step:
             yield f"({taken} ==> {entered})"
 
     def places(self) -> Iterator[str]:
-        """Yield the bounds of the indices of the log and of the queue, and of the number of
-        micro-steps.
-        """
+        """Yield the bounds of log and queue indices, and of the number of micro-steps."""
         words, charting = self.words, self.words.charting
         if charting.has_several_micro_steps:
             steps, most = words.now(STEP_COUNT.name), charting.chart.micro_steps

@@ -53,9 +53,7 @@ from language.programs.name_bindings import chart_context_of
 
 PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
 """Options of the two runs of WP for a mode: postconditions are proven path by path, all other goals
-
-are not.
-"""
+are not."""
 OF_CALLED = MODEL
 """Options for functions that transitions run: reals have no rounding."""
 OF_CALLING = (*MODEL, "-wp-split")
@@ -108,11 +106,10 @@ def wholes_of(automaton: Automaton) -> Wholes:
 def write_contracts(
     program: Program, files: Mapping[str, str], folder: Path, wholes: Wholes = NOTHING_KEPT
 ) -> list[Asking]:
-    """Write the C with its contracts into a folder; return the functions to prove with their
-    options.
+    """Write the C with its contracts into a folder.
 
-    These are modes with their parts, and the functions that they run. `wholes` gives the ranges of
-    whole numbers that are preserved.
+    Return the functions to prove with their options. These are modes with their parts, and the
+    functions that they run. `wholes` gives the ranges of whole numbers that are preserved.
     """
     made, file = run_c_passes(program, by_magnitude=False), f"{program.name}.c"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]

@@ -1,5 +1,4 @@
-"""Symbolic summary: the value of each variable after a block of a Program, as clauses of a
-contract.
+"""Symbolic summary: the values of variables after a block, as clauses of a contract.
 
 The clauses are lemmas between the C and its contract: they are proven of a function and assumed
 where it is called. A value without a translation to ACSL is unconstrained.
@@ -35,8 +34,9 @@ Values: TypeAlias = dict[str, Found]
 
 @dataclass(frozen=True)
 class Summary:
-    """The effects of blocks; `before` gives the text of an initial value, `now` of a final
-    value.
+    """The effects of blocks.
+
+    `before` gives the text of an initial value, `now` of a final value.
     """
 
     blocks: Mapping[str, Block]
@@ -45,9 +45,7 @@ class Summary:
     now: Look
 
     def ensured(self, block: Block, silent: frozenset[str]) -> Iterator[str]:
-        """Yield the postconditions of a block for all variables that it writes, except those in
-        `silent`.
-        """
+        """Yield the postconditions of a block for all variables it writes, except `silent`."""
         values: Values = {}
         self._block(block, values)
         for name, found in sorted(values.items()):

@@ -35,9 +35,7 @@ Literal = tuple[str, int]
 
 @dataclass(frozen=True)
 class Within:
-    """A variable is within limits, under the condition that other variables have the values in
-    `where`.
-    """
+    """A variable is within limits if other variables have the values in `where`."""
 
     cut: Cutpoint
     name: str
@@ -210,9 +208,7 @@ def _timers(program: Program) -> Iterator[tuple[str, int]]:
 
 
 def ends_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, int]]:
-    """Yield counters of a loop with the numbers, at most LARGEST_LIMIT, that they are compared
-    with.
-    """
+    """Yield loop counters with the numbers, up to LARGEST_LIMIT, they are compared with."""
     counters = set(counters_of(program, cut))
     for expr in _expressions(program, cut):
         match expr:

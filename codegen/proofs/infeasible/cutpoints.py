@@ -1,5 +1,4 @@
-"""Cutpoints: places that cut the paths of a Program into finite pieces, and the variables known
-there.
+"""Cutpoints: places that cut the paths of a Program, and the variables known there.
 
 A step is cut at its begin and end, and at the start of each iteration of a loop that every step
 executes. The paths between two cutpoints have no cycle.
@@ -25,8 +24,9 @@ MOST_ITEMS = 8
 
 @dataclass(frozen=True, eq=False)
 class Cutpoint:
-    """A cutpoint with the variables that are known there; `loop` is None for that between two
-    steps.
+    """A cutpoint with the variables that are known there.
+
+    `loop` is None for that between two steps.
     """
 
     name: str
@@ -44,8 +44,9 @@ class CutpointState:
 
 @dataclass(frozen=True)
 class ExecutionPath:
-    """A path between two cutpoints; `begin` is None for the first step. `given` are its
-    conditions.
+    """A path between two cutpoints.
+
+    `begin` is None for the first step. `given` are its conditions.
     """
 
     begin: CutpointState | None
@@ -70,9 +71,7 @@ def step_cut(program: Program) -> Cutpoint:
 
 
 def loop_cut(program: Program, loop: Loop, number: int) -> Cutpoint:
-    """Return the cutpoint at the start of a loop iteration, at which all variables that are read
-    are known.
-    """
+    """Return the cutpoint at the start of a loop iteration, with all variables that are read."""
     read = {name for block in program.blocks.values() for name in block_reads(block)}
     fixed = {c.name for c in program.constants if c.kind == "fixed" or c.items}
     things = {v.name for v in (*program.variables, *program.inputs) if not v.size}
@@ -82,9 +81,7 @@ def loop_cut(program: Program, loop: Loop, number: int) -> Cutpoint:
 
 
 def items_of(program: Program) -> dict[str, tuple[str, ...]]:
-    """Return the names of the elements of small whole-number arrays that are written within a
-    step.
-    """
+    """Return the element names of small whole-number arrays that are set anew in each step."""
     small = (v for v in program.variables if v.type == "whole" and 0 < v.size <= MOST_ITEMS)
     passing = (v for v in small if v.name.partition(".")[0] in PASSING)
     return {v.name: tuple(f"{v.name}[{k}]" for k in range(v.size)) for v in passing}

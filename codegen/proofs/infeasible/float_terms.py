@@ -85,8 +85,9 @@ class Terms:
         return self.z3.If(test, then, other)
 
     def within(self, value: Any, limits: Limits) -> Any:
-        """Return the predicate that a value is within limits; equal arguments give the same
-        term.
+        """Return the predicate that a value is within limits.
+
+        Equal arguments give the same term.
         """
         key = (*(part.get_id() for part in _parts(value)), limits)
         if key not in self.limited:

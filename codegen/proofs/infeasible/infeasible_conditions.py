@@ -1,5 +1,4 @@
-"""Infeasible conditions: proofs that no input makes a condition of a sampled Program true, or
-false.
+"""Infeasible conditions: proofs that no input gives a condition of a sampled Program an outcome.
 
 A step is executed symbolically from cutpoint to cutpoint (`cutpoints.py`, `symbolic_execution.py`,
 `float_terms.py`). It begins with any values that the invariants allow (`candidate_invariants.py`,
@@ -40,9 +39,7 @@ class DecisionSite:
 
 
 def unshare_expressions(program: Program) -> Program:
-    """Return a Program in which each expression is a separate object: conditions are told apart
-    by `id`.
-    """
+    """Return a Program in which each expression is a separate object with its own `id`."""
     return replace(program, blocks={name: _own(block) for name, block in program.blocks.items()})
 
 
@@ -55,9 +52,7 @@ def _own(thing: Any) -> Any:
 
 
 def decision_sites(program: Program) -> Iterator[DecisionSite]:
-    """Yield the decisions of a Program after the passes of the C generator that exist in C
-    unchanged.
-    """
+    """Yield the decisions of a Program, after the C passes, that exist in C unchanged."""
     local = locals_of(program)
     for name, block in program.blocks.items():
         place = CNames(program, local[name], SOLVED_PREFIX_ON_PAGE)

@@ -74,9 +74,7 @@ def counted(program: Program, cut: Cutpoint) -> Iterator[Fact]:
 def lasting(
     program: Program, cut: Cutpoint, first: Mapping[str, int], cuts: Iterable[Cutpoint]
 ) -> Iterator[Fact]:
-    """Yield candidates that relate the time in a mode to the counter of a mode in another
-    region.
-    """
+    """Yield candidates that relate the time in a mode to a counter in another region."""
     going = going_values(program, first)
     followed = [(m, ops) for one in cuts if one.loop for m, ops in _followed(program, one)]
     for mode, ops in followed:
@@ -122,9 +120,7 @@ def commanded(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iter
 def said(
     program: Program, cut: Cutpoint, where: tuple[Literal, ...], kind: type = object
 ) -> Iterator[Fact]:
-    """Yield candidates on comparisons of variables that a loop does not change, of numbers of a
-    kind.
-    """
+    """Yield candidates on comparisons, with numbers of a kind, of variables a loop keeps."""
     for name, relation, number in asked_of(program, cut):
         if isinstance(number, kind):
             yield from (Same(cut, name, relation, number, t, where) for t in (True, False))

@@ -25,9 +25,7 @@ Numbers = Mapping[str, frozenset[int]]
 
 
 def queue_candidates(program: Program, cut: Cutpoint, first: Mapping[str, int]) -> Iterator[Fact]:
-    """Yield candidates on the elements of small arrays, and on variables that are read from
-    them.
-    """
+    """Yield candidates on the elements of small arrays and on values read from them."""
     arrays, ops = items_of(program), all_of(program, _every(program))
     stored = {name: _stored(ops, name) for name in arrays}
     truths = truths_of(program, first)

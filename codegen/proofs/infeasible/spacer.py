@@ -1,5 +1,4 @@
-"""Reachability: queries to z3's Spacer whether a condition can have an outcome in any number of
-steps.
+"""Reachability: queries to z3's Spacer whether a condition can have an outcome in any step.
 
 Paths between cutpoints are Horn clauses of predicates over the values at cutpoints. Spacer searches
 for these predicates from the query (Komuravelli, Gurfinkel and Chaki 2014).

@@ -1,5 +1,4 @@
-"""Symbolic execution: the paths of a sampled Program between cutpoints over symbolic values, for
-z3.
+"""Symbolic execution: the paths of a sampled Program between cutpoints as terms of z3.
 
 The effects of loops inside branches, and results of operations (`float_terms.py`), are
 over-approximated. An outcome that is impossible in this model is therefore impossible in the
@@ -52,8 +51,7 @@ KINDS = ("real", "whole")
 
 
 class SymbolicProgram:
-    """The symbolic paths of a Program: `ways` between cutpoints, and `visits` by `id` of a
-    condition.
+    """The symbolic paths of a Program between cutpoints, and the visits of its conditions.
 
     Each of the `cuts` has the numbers and truth values with which its loop begins. `said` memoises
     the terms of facts at a cutpoint.
