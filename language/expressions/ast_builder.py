@@ -1,4 +1,4 @@
-"""Build: the tree of an expression from its shape and its tokens, each part with its place."""
+"""AST builder: the syntax tree of an expression from its shape and its tokens, with spans."""
 
 from __future__ import annotations
 
@@ -24,19 +24,24 @@ from language.expressions.token_shape import ParsedShape, ParseShape
 from language.text.diagnostic import Problems, Span, SpecError
 
 MAX_POWER = 8
+"""Largest size of the exponent in `x^n`."""
 
 
 def build_trees(parsed: ParsedShape, span: Span) -> tuple[SyntaxTree, ...]:
-    """Return the tree of an expression, or both sides of a balance; `span` is that of the text.
+    """Return the tree of an expression, or the trees of both sides of a balance.
 
-    Raises SpecError for a number, a unit or a power that is none.
+    `span` is the span of the whole text. Raises SpecError for a number, a unit or an exponent that
+    is not valid.
     """
     builder = _AstBuilder(parsed, span)
     return tuple(builder.build_part(part) for part in parsed.shape[1])
 
 
 class _AstBuilder:
-    """From shapes to trees; a part is a tree, or the number of a token."""
+    """Builder of trees from a shape.
+
+    A part of a shape is another shape or the number of a token.
+    """
 
     def __init__(self, parsed: ParsedShape, span: Span) -> None:
         self.texts = parsed.texts
@@ -44,27 +49,35 @@ class _AstBuilder:
         self.span = span
 
     def build_part(self, shape: ParseShape | int) -> Any:
+        """Return the tree of a shape, built from its parts.
+
+        The number of a token is returned unchanged.
+        """
         if isinstance(shape, int):
             return shape
         return BUILDERS[shape[0]](self, [self.build_part(part) for part in shape[1]])
 
     def token_span(self, token: int) -> Span:
-        """Return the place of a token."""
+        """Return the span of a token."""
         return self.text_span(self.starts[token], len(self.texts[token]))
 
     def text_span(self, start: int, width: int) -> Span:
-        """Return the place of a part of the text, which has at least one character."""
+        """Return the span of a part of the text; an atomic span is returned whole."""
         span = self.span
         return span if span.is_atomic else Span(span.source, span.line, span.column + start, width)
 
     def joined_span(self, first: Any, last: Any) -> Span:
-        """Return the place from one part to another."""
+        """Return the span from the start of one part to the end of another.
+
+        A part is a tree or a token.
+        """
         start = self.token_span(first) if isinstance(first, int) else first.span
         end = self.token_span(last) if isinstance(last, int) else last.span
         return Span(start.source, start.line, start.column, end.column + end.width - start.column)
 
 
 def _build_name(builder: _AstBuilder, parts: list[int]) -> SyntaxTree:
+    """Return the name of a dotted path; blanks around the dots are removed."""
     first, last = parts[0], parts[-1]
     path = builder.texts[first] if first == last else ".".join(builder.texts[k] for k in parts)
     start, end = builder.starts[first], builder.starts[last] + len(builder.texts[last])
@@ -72,11 +85,13 @@ def _build_name(builder: _AstBuilder, parts: list[int]) -> SyntaxTree:
 
 
 def _build_call(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the call of a function; its span ends with the closing parenthesis."""
     name, *arguments, close = parts
     return FunctionCall(name.path, tuple(arguments), builder.joined_span(name, close))
 
 
 def _build_negation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the negation of an operand; `-5 degC` becomes the literal of that temperature."""
     minus, operand = parts
     if isinstance(operand, NumberLiteral) and operand.unit.offset:
         below = 2 * operand.unit.offset - operand.value
@@ -85,6 +100,7 @@ def _build_negation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
 
 
 def _build_power(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the power. Raises SpecError if the exponent is above MAX_POWER in size."""
     base, token = parts
     exponent = int(builder.texts[token])
     if abs(exponent) > MAX_POWER:
@@ -96,16 +112,19 @@ def _build_power(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
 
 
 def _build_arithmetic(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the sum, difference, product or quotient of two trees."""
     left, operator, right = parts
     return Arithmetic(builder.texts[operator], left, right, builder.joined_span(left, right))
 
 
 def _build_relation(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the relation of two trees."""
     left, operator, right = parts
     return Relation(builder.texts[operator], left, right, builder.joined_span(left, right))
 
 
 def _build_conditional(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
+    """Return the conditional expression; its span starts at the condition."""
     condition, then, other = parts
     return Conditional(condition, then, other, builder.joined_span(condition, other))
 
@@ -130,4 +149,4 @@ BUILDERS: Mapping[str, Callable[[_AstBuilder, list[Any]], SyntaxTree]] = {
     "and_": lambda build, parts: Logic("and", parts[0], parts[1], build.joined_span(*parts)),
     "select": _build_conditional,
 }
-"""What each rule of the grammar makes of its parts."""
+"""Builder function of each rule of the grammar."""

@@ -1,4 +1,4 @@
-"""Balance: the coefficient of the one der(x) on the left side of `coefficient * der(x) = ...`."""
+"""Balance form: the coefficient of der(x) on the left side of `coefficient * der(x) = ...`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from language.text.diagnostic import Problems, SpecError
 
 
 def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | None:
-    """Return the factor of der(state) on the left side of a balance, None where it is 1."""
+    """Return the factor of der(state) on the left side of a balance; None if there is no factor.
+
+    A left side of another form, or with a further der, gives a SpecError, which is returned, not
+    raised.
+    """
     if isinstance(left, FunctionCall) and left.function == "der":
         return None if _is_derivative(left, state) else _balance_error(left, state)
     if isinstance(left, Arithmetic) and left.operator == "*":
@@ -19,6 +23,7 @@ def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | Non
 
 
 def _is_derivative(tree: FunctionCall, state: str) -> bool:
+    """Return whether a call is `der(state)`."""
     match tree:
         case FunctionCall("der", (Name(path, _),), _):
             return path == state
@@ -27,10 +32,12 @@ def _is_derivative(tree: FunctionCall, state: str) -> bool:
 
 
 def _has_derivative(tree: SyntaxTree) -> bool:
+    """Return whether an expression contains a call of der."""
     return any(isinstance(part, FunctionCall) and part.function == "der" for part in walk(tree))
 
 
 def _balance_error(left: SyntaxTree, state: str) -> SpecError:
+    """Return the error for a left side of another form."""
     problems = Problems()
     label = f"the left side is `coefficient * der({state})` with der once"
     problems.error("balance", left.span, label)

@@ -1,4 +1,4 @@
-"""Literal: an expression made of numbers with units only, exactly."""
+"""Constant literals: the exact value of an expression that consists of numbers with units only."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from language.text.diagnostic import Problems, SpecError
 
 
 def evaluate_literal(tree: SyntaxTree) -> tuple[Fraction, Dimension]:
-    """Return an expression of literals exactly, with its dimension. Raises SpecError."""
+    """Return the exact value in SI and the dimension of an expression of literals.
+
+    The operations are `+ - * /` and unary minus. Raises SpecError for another part, for a division
+    by zero and for a sum of different dimensions.
+    """
     problems = Problems()
     match tree:
         case NumberLiteral(value, unit, _):

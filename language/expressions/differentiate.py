@@ -1,7 +1,7 @@
-"""Derivative: of an expression with respect to a name, as an expression; exact, no differences.
+"""Differentiation: the exact derivative of an expression with respect to a name, as an expression.
 
-Where an expression has branches (`if`, `abs`, `min`, `max`, `clip`, `sign`, `floor`) the one taken
-at a point is differentiated. Where a branch ends exactly at the point there is no derivative.
+Where an expression has branches (`if`, `abs`, `min`, `max`, `clip`, `sign`, `floor`), the branch
+taken at a point is differentiated. If a branch ends exactly at the point, there is no derivative.
 Rules: Griewank and Walther, Evaluating Derivatives (2nd ed. 2008), table 2.3.
 """
 
@@ -37,13 +37,20 @@ from language.expressions.syntax_tree import (
 from language.text.diagnostic import Problems, Span, SpecError
 
 PointValue = Callable[[SyntaxTree], float | bool]
-"""The value of an expression at the point. Raises SpecError where it has none there."""
+"""A function that gives the value of an expression at the point.
+
+It raises SpecError if the expression has no value there.
+"""
 
 STRICT_RELATIONS = {"<": "<", "<=": "<", ">": ">", ">=": ">"}
+"""The strict relation that equals each relation if both sides differ."""
 
 
 def differentiate(tree: SyntaxTree, name: str, value_at: PointValue) -> SyntaxTree:
-    """Return d tree / d name, simplified. Raises SpecError where there is none at the point."""
+    """Return d tree / d name, simplified; 0 if the name does not occur.
+
+    `value_at` selects the branches. Raises SpecError if there is no derivative at the point.
+    """
     if all(read.path != name for read in names(tree)):
         return make_number(0, tree.span)
     match tree:
@@ -79,7 +86,10 @@ def differentiate(tree: SyntaxTree, name: str, value_at: PointValue) -> SyntaxTr
 
 
 def select_branch(tree: SyntaxTree, value_at: PointValue) -> SyntaxTree:
-    """Return the branch that an expression takes at the point. Raises SpecError on its corner."""
+    """Return the branch that an expression takes at the point. Raises SpecError at a corner.
+
+    `sign` and `floor` become a number. An expression without branches raises SpecError, too.
+    """
     match tree:
         case Conditional(condition, then, other, _):
             return then if decide_condition(condition, value_at) else other
@@ -112,7 +122,10 @@ def select_branch(tree: SyntaxTree, value_at: PointValue) -> SyntaxTree:
 
 
 def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
-    """Return a condition at the point. Raises SpecError where it changes exactly there."""
+    """Return the truth of a condition at the point.
+
+    Raises SpecError if both sides of an order relation in it are equal at the point.
+    """
     match condition:
         case BoolLiteral(value, _):
             return value
@@ -133,7 +146,7 @@ def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
 
 
 def derivative_error(span: Span, label: str, help: str = "") -> SpecError:
-    """Return the error of an expression that cannot be differentiated at the point."""
+    """Return the error of an expression that has no derivative at the point; it is not raised."""
     problems = Problems()
     problems.error("derivative", span, label, help)
     return SpecError(problems.reported)
@@ -142,6 +155,7 @@ def derivative_error(span: Span, label: str, help: str = "") -> SpecError:
 def _differentiate_arithmetic(
     operator: str, left: SyntaxTree, right: SyntaxTree, name: str, value_at: PointValue
 ) -> SyntaxTree:
+    """Return the derivative of a sum, difference, product or quotient."""
     a, b = differentiate(left, name, value_at), differentiate(right, name, value_at)
     match operator:
         case "+":
@@ -155,6 +169,10 @@ def _differentiate_arithmetic(
 
 
 def _is_less(tree: FunctionCall, left: SyntaxTree, right: SyntaxTree, value_at: PointValue) -> bool:
+    """Return whether left < right at the point.
+
+    Raises SpecError at the span of `tree` if they are equal.
+    """
     a, b = float(value_at(left)), float(value_at(right))
     if a == b:
         label = f"`{tree.function}` has its corner exactly at the point: no derivative there"
@@ -163,18 +181,22 @@ def _is_less(tree: FunctionCall, left: SyntaxTree, right: SyntaxTree, value_at: 
 
 
 def _call(function: str, argument: SyntaxTree) -> SyntaxTree:
+    """Return the call of a function with one argument."""
     return FunctionCall(function, (argument,), argument.span)
 
 
 def _exp_derivative(u: SyntaxTree) -> SyntaxTree:
+    """Return the derivative of exp at u."""
     return _call("exp", u)
 
 
 def _sqrt_derivative(u: SyntaxTree) -> SyntaxTree:
+    """Return the derivative of sqrt at u, 1/2 / sqrt(u)."""
     return divide(make_number(Fraction(1, 2), u.span), _call("sqrt", u))
 
 
 def _tanh_derivative(u: SyntaxTree) -> SyntaxTree:
+    """Return the derivative of tanh at u, 1 - tanh(u)^2."""
     return subtract(make_number(1, u.span), raise_to_power(_call("tanh", u), 2))
 
 
@@ -187,5 +209,6 @@ OUTER_DERIVATIVES: Mapping[str, Callable[[SyntaxTree], SyntaxTree]] = {
     "sqrt": _sqrt_derivative,
     "tan": lambda u: add(make_number(1, u.span), raise_to_power(_call("tan", u), 2)),
 }
-"""Derivative of each smooth function of one argument."""
+"""Derivative of each smooth function of one argument, as a function of the argument's tree."""
 SMOOTH_FUNCTIONS = {*OUTER_DERIVATIVES, "atan2", "pow"}
+"""Functions that have a derivative without a selection of branches."""

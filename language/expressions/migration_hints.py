@@ -1,4 +1,4 @@
-"""Aliases: words of other tools for statecharts, and what they are here."""
+"""Migration hints: keys and functions of other statechart tools, and their form here."""
 
 from __future__ import annotations
 
@@ -31,20 +31,25 @@ KEY_ALIASES: Mapping[str, tuple[str, ...]] = {
     "states": ("modes",),
     "default": ("initial",),
 }
-"""Keys, each with what it may mean: the first that has a place counts."""
+"""Keys of other tools with the keys they may correspond to.
+
+The first one allowed at the place counts.
+"""
 ROOT_KEYS = ("discrete", "inputs", "outputs", "parameters", "events", "tables", "period")
 DISCRETE_HINT = (
-    "what is kept is declared once, at the root: `discrete: {k: {type: int, initial: 0}}`"
+    "declare a retained variable once, at the root: `discrete: {k: {type: int, initial: 0}}`"
 )
-MODE_TYPE_HINT = "a mode has no type: `modes` inside take turns, `regions` run side by side; "
-MODE_TYPE_HINT += "in place of a junction each transition has the whole guard"
+MODE_TYPE_HINT = (
+    "a mode has no type: one of its `modes` is active, its `regions` are active in parallel; "
+)
+MODE_TYPE_HINT += "instead of a junction, write the whole guard on each transition"
 KEY_HINTS: Mapping[str, str] = {
-    **dict.fromkeys(ROOT_KEYS, "it stands at the root of the automaton, for all modes"),
+    **dict.fromkeys(ROOT_KEYS, "write it at the root of the automaton, for all modes"),
     **dict.fromkeys(("data", "local", "locals", "variables", "vars"), DISCRETE_HINT),
     **dict.fromkeys(("type", "decomposition", "junction", "junctions"), MODE_TYPE_HINT),
-    "on": "a transition hears an event: `transitions: {x: {event: x, to: []}}`",
+    "on": "name the event on a transition: `transitions: {x: {event: x, to: []}}`",
 }
-"""Keys that people write in a mode, and what is written here."""
+"""Keys that users write inside a mode, each with the help text for it."""
 ASSIGNMENT_PATTERN = re.compile(r"([A-Za-z]\w*)\s*=\s*([^=;,]+)")
 INCREMENT_PATTERN = re.compile(r"([A-Za-z]\w*)?\s*(\+\+|--|[-+*/]=)")
 EVENT_WITH_GUARD_PATTERN = re.compile(r"(\w+)\s*\[(.*)\]")
@@ -52,10 +57,10 @@ FUNCTION_HINTS: Mapping[str, str] = {
     "duration": "write `wait: 5 s` on the transition: how long its guard has to hold",
     "elapsed": "`after(5 s)` is a condition: 5 s since the mode was entered",
     "temporalCount": "`after(5 s)` is a condition: 5 s since the mode was entered",
-    "before": "`not after(5 s)` is what holds before",
-    "hasChanged": "`changed(x)`: what is inside is another value than a tick before",
-    "crossing": "`rising(g)` or `falling(g)`: where a condition turns",
-    "edge": "`rising(g)` or `falling(g)`: where a condition turns",
+    "before": "`not after(5 s)` is true until 5 s since the mode was entered",
+    "hasChanged": "`changed(x)` is true if x differs from its value at the tick before",
+    "crossing": "`rising(g)` or `falling(g)`: where a condition becomes true or false",
+    "edge": "`rising(g)` or `falling(g)`: where a condition becomes true or false",
     "ln": "`log(x)` is the natural logarithm",
     "log10": "`log(x) / log(10)`",
     "log2": "`log(x) / log(2)`",
@@ -63,53 +68,64 @@ FUNCTION_HINTS: Mapping[str, str] = {
     "atan": "`atan2(y, x)`: of a number x it is `atan2(x, 1)`",
     "send": "events are raised by a transition: `raise: name`",
 }
-"""Functions, each with what is written here."""
+"""Functions of other tools, each with the help text for it."""
 
 
 def key_alias_hint(word: str, known_keys: Collection[str]) -> str:
-    """Return "did you mean `x`?" for a key of another tool, or an empty text."""
-    found = next((key for key in KEY_ALIASES.get(word, ()) if key in known_keys), "")
-    return f"did you mean `{found}`?" if found else ""
+    """Return "did you mean `x`?" for a key of another tool.
+
+    The text is empty if no known key corresponds to the word.
+    """
+    alias = next((key for key in KEY_ALIASES.get(word, ()) if key in known_keys), "")
+    return f"did you mean `{alias}`?" if alias else ""
 
 
 def key_hint(key: str, what: str) -> str:
-    """Return what is written in place of a key of a mode, an empty text where nothing is known."""
+    """Return the help text for a key that is not allowed at `what`, the key path.
+
+    The text is empty if no help is known.
+    """
     event_key = re.fullmatch(r"on[ _](\w+)", key)
     if event_key:
         name = event_key.group(1)
-        return f"a transition hears an event: `transitions: {{{name}: {{event: {name}, to: []}}}}`"
+        return (
+            f"name the event on a transition: `transitions: {{{name}: {{event: {name}, to: []}}}}`"
+        )
     if key == "priority" and re.fullmatch(r"regions\.\w+", what):
         return "regions at the root are never left: those inside a mode have a priority"
     return KEY_HINTS.get(key, "") if re.match(r"(.*\.)?(modes|regions)\.", what) else ""
 
 
 def mapping_hint(node: YamlNode, what: str) -> str:
-    """Return how what is written as a text or list is written as a mapping, if that is known."""
+    """Return the help text for a text or list where a mapping is needed; empty if none is known.
+
+    Assignments like `k = 1` in the text are shown as a mapping.
+    """
     if what.endswith("transitions"):
         return "each has a name: `transitions: {fault: {to: fault, when: ...}}`"
     if re.search(r"transitions\.\w+$", what):
         return "like `{event: go, when: a, reset: {k: 1}}`"
     items = node.nodes if isinstance(node, SequenceNode) else (node,)
     text = ";".join(item.text for item in items if isinstance(item, ScalarNode))
-    found = ASSIGNMENT_PATTERN.findall(text)
-    parts = ", ".join(f"{name}: {value.strip()}" for name, value in found)
+    assignments = ASSIGNMENT_PATTERN.findall(text)
+    parts = ", ".join(f"{name}: {value.strip()}" for name, value in assignments)
     return f"it is written `{{{parts}}}`" if parts else ""
 
 
 def increment_hint(text: str) -> str:
-    """Return what is written in place of `k++` and `k += 2`, an empty text for other texts."""
+    """Return the help text for `k++` or `k += 2`; empty for another text."""
     match = INCREMENT_PATTERN.search(text)
     if not match:
         return ""
     name, sign = match.group(1), match.group(2)
     rest = text[match.end() :].strip() or "1"
     written = f": `{name}: {name} {sign[0]} {rest}`" if name else ", like `k: k + 1`"
-    return f"the new value is written whole{written}"
+    return f"write the whole new value{written}"
 
 
 def event_guard_hint(text: str, events: Collection[str]) -> str:
-    """Return what is written in place of the event `go [a]`, an empty text for other texts."""
+    """Return the help text for an event written as `go [a]`; empty for another text."""
     match = EVENT_WITH_GUARD_PATTERN.fullmatch(text)
     if not match or match.group(1) not in events:
         return ""
-    return f"a guard stands beside it: `event: {match.group(1)}, when: {match.group(2)}`"
+    return f"write the guard as a key of its own: `event: {match.group(1)}, when: {match.group(2)}`"

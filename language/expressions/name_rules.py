@@ -1,4 +1,4 @@
-"""Names: what is a name, and which names cannot stand beside each other."""
+"""Name rules: the form of names, and names that are reserved or collide with others (rule C9)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ C_MACRO_PATTERN = re.compile(
 """Macros of the headers that generated code includes."""
 
 FILE_WORDS = frozenset({"main", "ha_math", "float", "math", "stdint", "stdbool", "string"})
-"""Names of files beside which an automaton's own files would stand."""
+"""File names that the files of an automaton would collide with."""
 
 DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
-"""File names that Windows keeps for devices, whatever their ending."""
+"""File names that Windows reserves for devices, with any suffix."""
 
 
 @cache
 def reserved_words() -> Mapping[str, frozenset[str]]:
-    """Return the words by language: GRAMMAR, YAML, C, C++, A2L, GENERATED."""
+    """Return the reserved words by section: GRAMMAR, YAML, C, C++, A2L, GENERATED."""
     text = resources.files("language.expressions").joinpath("reserved.txt").read_text("utf-8")
     sections: dict[str, frozenset[str]] = {}
     for section in text.split("\n[")[1:]:
@@ -40,7 +40,10 @@ COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has on
 
 
 def check_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a name that is not one: docs/language.md, "Names, numbers, units"."""
+    """Report a name of a wrong form or a reserved name.
+
+    The rules are in docs/language.md, "Names, numbers, units".
+    """
     words = reserved_words()
     another = f"another name, like `{name}_1`"
     if not NAME_PATTERN.fullmatch(name):
@@ -64,13 +67,16 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
 
 
 def check_region_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a name of a region or instance: in C it is a part of names, or a member."""
+    """Report a wrong name of a region or an instance.
+
+    `main` is allowed, because in C the name is only a part of a longer name, or a member.
+    """
     if name != "main":
         check_name(name, span, problems)
 
 
 def check_file_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a name of an automaton that cannot be the name of its files."""
+    """Report a wrong name of an automaton, also one that cannot be the name of its files."""
     check_name(name, span, problems)
     if name.lower() in FILE_WORDS or DEVICE_NAME_PATTERN.fullmatch(name):
         label = f"an automaton is not called `{name}`: that is another file"
@@ -78,7 +84,10 @@ def check_file_name(name: str, span: Span, problems: Problems) -> None:
 
 
 def report_case_collisions(names: Iterable[tuple[str, Span]], problems: Problems) -> None:
-    """Report names that differ in case only: many tools for A2L and CSV do not tell them apart."""
+    """Report each name that differs from an earlier one in case only.
+
+    Many tools for A2L and CSV do not distinguish case.
+    """
     first: dict[str, tuple[str, Span]] = {}
     for name, span in names:
         other, place = first.setdefault(name.lower(), (name, span))

@@ -1,4 +1,4 @@
-"""Quantity: the text of a number, with or without a unit, to its exact value."""
+"""Number literals: the exact value of a number, with or without a unit, from its text."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PLAIN_DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?")
 QUANTITY_PATTERN = re.compile(rf"{DECIMAL_PATTERN.pattern} {UNIT_PATTERN.pattern}")
 MAX_QUANTITY = Fraction(sys.float_info.max)
 MAX_EXPONENT = 330
-"""Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
+"""Largest decimal exponent that is accepted; beyond it a double overflows or underflows."""
 
 
 def parse_number_literal(text: str, span: Span) -> NumberLiteral:
@@ -28,7 +28,7 @@ def parse_number_literal(text: str, span: Span) -> NumberLiteral:
 
 
 def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
-    """Return a number with a unit behind a blank. Raises SpecError."""
+    """Return a number with a unit, separated by one blank; its value is in SI. Raises SpecError."""
     digits, _, unit_text = text.partition(" ")
     value = parse_decimal_literal(digits, span.subspan(0, len(digits)))
     unit = _parse_unit(unit_text, span.subspan(len(digits) + 1, len(unit_text)))
@@ -38,7 +38,11 @@ def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
 
 
 def parse_decimal_literal(text: str, span: Span) -> Fraction:
-    """Return the exact value of a decimal literal. Raises SpecError for other forms."""
+    """Return the exact value of a decimal literal.
+
+    Raises SpecError for a form that YAML tools read differently (`1e3`, `010`), for another text,
+    and for an exponent above MAX_EXPONENT.
+    """
     if PLAIN_DECIMAL_PATTERN.fullmatch(text):
         return _to_fraction(text)
     problems = Problems()
@@ -61,22 +65,27 @@ def parse_decimal_literal(text: str, span: Span) -> Fraction:
 
 @lru_cache(maxsize=4096)
 def _to_fraction(text: str) -> Fraction:
+    """Return the exact value of a decimal text; cached."""
     return Fraction(text)
 
 
 def _missing_blank_hint(text: str) -> str:
-    """Return how `100ms` is written, or an empty text where this is no number before a unit."""
-    found = re.fullmatch(r"([0-9.]+?)\.?([A-Za-z].*)", text)
-    if not found or not DECIMAL_PATTERN.fullmatch(found[1]):
+    """Return the help text for a text like `100ms`.
+
+    The help text is empty if `text` is not a number followed by a unit.
+    """
+    match = re.fullmatch(r"([0-9.]+?)\.?([A-Za-z].*)", text)
+    if not match or not DECIMAL_PATTERN.fullmatch(match[1]):
         return ""
     try:
-        parse_unit(found[2])
+        parse_unit(match[2])
     except UnitError:
         return ""
-    return f"one blank stands before the unit: `{found[1]} {found[2]}`"
+    return f"one blank stands before the unit: `{match[1]} {match[2]}`"
 
 
 def _require_in_range(value: Fraction, text: str, span: Span) -> Fraction:
+    """Return the value. Raises SpecError if it is out of the range of a double."""
     if abs(value) > MAX_QUANTITY:
         problems = Problems()
         label = f"`{text}` is out of the range of a double"
@@ -86,11 +95,13 @@ def _require_in_range(value: Fraction, text: str, span: Span) -> Fraction:
 
 
 def _exponent_of(text: str) -> int:
+    """Return the decimal exponent of a literal, 0 if it has none."""
     parts = re.split("[eE]", text)
     return int(parts[1]) if len(parts) == 2 else 0
 
 
 def _parse_unit(text: str, span: Span) -> Unit:
+    """Return a unit. Raises SpecError with a suggestion if the text is not a unit."""
     try:
         return parse_unit(text)
     except UnitError as error:

@@ -1,4 +1,7 @@
-"""Parse: the text of an expression or balance to its tree, or a problem at the right place."""
+"""Parser: the text of an expression or a balance to its syntax tree, or to a problem.
+
+The span of a problem lies inside the text.
+"""
 
 from __future__ import annotations
 
@@ -21,35 +24,39 @@ from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import ScalarNode
 
 FOREIGN_OPERATORS = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not", "~": "not"}
-"""Operators of other languages, and how they are written here."""
+"""Operators of other languages, and the operators of this language with the same meaning."""
 
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 KEYWORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
 MAX_EXPRESSION_LENGTH = 2000
-"""Longest expression read; longer ones want an equation of their own."""
+"""Longest expression that is parsed [characters]."""
 MAX_DEPTH = 100
-"""Deepest tree: a sum of 100 terms; more want an equation of their own."""
+"""Largest depth of a tree; a sum of 100 terms has it."""
 
 
 def parse_expression(scalar: ScalarNode) -> SyntaxTree:
-    """Parse an expression. Raises SpecError with the place inside the text."""
+    """Return the tree of an expression. Raises SpecError with the place inside the text."""
     (tree,) = _parse(scalar, "expression")
     return tree
 
 
 def parse_balance(scalar: ScalarNode) -> tuple[SyntaxTree, SyntaxTree]:
-    """Parse `left = right`. Raises SpecError with the place inside the text."""
+    """Return the trees of both sides of `left = right`.
+
+    Raises SpecError with the place inside the text.
+    """
     left, right = _parse(scalar, "balance")
     return left, right
 
 
 def _parse(scalar: ScalarNode, start_rule: str) -> tuple[SyntaxTree, ...]:
+    """Return the trees of a text for a start rule of the grammar. Raises SpecError."""
     text, span = scalar.text, scalar.text_span
     problems = Problems()
     if len(text) > MAX_EXPRESSION_LENGTH:
         problems.error("expression", span, f"an expression of {len(text)} characters is too long")
     if "\n" in text:
-        problems.error("expression", span, "an expression stands on one line")
+        problems.error("expression", span, "an expression is written on one line")
     problems.raise_if_errors()
     simple = _parse_simple(text, span) if start_rule == "expression" else None
     if simple is not None:
@@ -68,7 +75,10 @@ def _parse(scalar: ScalarNode, start_rule: str) -> tuple[SyntaxTree, ...]:
 
 
 def _parse_simple(text: str, span: Span) -> SyntaxTree | None:
-    """Return a name or a literal without the parser: most values of a spec are one."""
+    """Return the tree of a single name or literal without the grammar; None for another text.
+
+    Most values of a spec are of this form.
+    """
     if SIMPLE_NAME.fullmatch(text) and text not in KEYWORDS:
         return Name(text, span.subspan(0, len(text)))
     if DECIMAL_PATTERN.fullmatch(text):
@@ -81,6 +91,7 @@ def _parse_simple(text: str, span: Span) -> SyntaxTree | None:
 def _explain_syntax_error(
     text: str, span: Span, start_rule: str, error: lark.exceptions.UnexpectedInput
 ) -> tuple[Span, str, str]:
+    """Return the span, the label and the help text for a syntax error."""
     column = getattr(error, "column", 0)
     token = str(getattr(error, "token", "")) or ""
     ended = (
@@ -103,7 +114,7 @@ def _explain_syntax_error(
     if re.match(r"(\+\+|--|[-+*/]=)", text[max(column - 2, 0) :]) or rest.startswith("+="):
         return place, f"`{rest.split(' ')[0][:20]}` was not expected here", increment_hint(text)
     if token in ("<", "<=", ">", ">=", "==", "!="):
-        return place, "one relation only", "write `a < b and b < c`"
+        return place, "an expression has one relation only", "write `a < b and b < c`"
     for foreign, ours in FOREIGN_OPERATORS.items():
         at = text.find(foreign, max(column - 2, 0), column - 1 + len(foreign))
         if at >= 0:

@@ -1,6 +1,7 @@
-"""Simplify: sums, products and quotients of expressions without what is exactly 0 or 1.
+"""Simplification: sums, products and quotients without terms that are exactly 0 or 1.
 
-For derived expressions only: what the user wrote is never rearranged.
+The functions build derived expressions; expressions of the user are never rearranged. A result has
+the span of the first operand.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ from language.text.diagnostic import Span
 
 
 def make_number(value: Fraction | int, span: Span) -> NumberLiteral:
-    """Return a number without a unit: derived expressions are past the check of dimensions."""
+    """Return a number without a unit; the dimensions of derived expressions are not checked."""
     return NumberLiteral(Fraction(value), NO_UNIT, span)
 
 
 def add(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a + b."""
+    """Return a + b; without a zero, with numbers added, `a + -b` as `a - b`."""
     if is_zero(a):
         return b
     if is_zero(b):
@@ -45,7 +46,7 @@ def add(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def subtract(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a - b; 0 where both are the same expression."""
+    """Return a - b; without a zero, with numbers subtracted, 0 if both are the same expression."""
     if is_zero(b):
         return a
     if is_zero(a):
@@ -60,7 +61,7 @@ def subtract(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def multiply(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a b."""
+    """Return a b; 0 if a factor is 0, without a factor of 1, with a negation moved in front."""
     if is_zero(a) or is_zero(b):
         return make_number(0, a.span)
     if is_one(a):
@@ -77,7 +78,7 @@ def multiply(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def divide(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a / b."""
+    """Return a / b; 0 if a is 0, a if b is 1, with a negation of a in front of the quotient."""
     if is_zero(a):
         return make_number(0, a.span)
     if is_one(b):
@@ -90,7 +91,7 @@ def divide(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def negate(a: SyntaxTree) -> SyntaxTree:
-    """Return -a."""
+    """Return -a; the negation of a number is a number, a double negation is removed."""
     if isinstance(a, NumberLiteral):
         return make_number(-a.value, a.span)
     if isinstance(a, Negation):
@@ -99,7 +100,7 @@ def negate(a: SyntaxTree) -> SyntaxTree:
 
 
 def raise_to_power(a: SyntaxTree, exponent: int) -> SyntaxTree:
-    """Return a^exponent."""
+    """Return a^exponent; 1 for exponent 0, a for exponent 1, a number for a nonzero number."""
     if exponent == 0:
         return make_number(1, a.span)
     if exponent == 1:
@@ -110,17 +111,20 @@ def raise_to_power(a: SyntaxTree, exponent: int) -> SyntaxTree:
 
 
 def is_zero(tree: SyntaxTree) -> bool:
-    """Tell whether this is the number 0."""
+    """Return whether a tree is the number 0."""
     return isinstance(tree, NumberLiteral) and tree.value == 0
 
 
 def is_one(tree: SyntaxTree) -> bool:
-    """Tell whether this is the number 1."""
+    """Return whether a tree is the number 1."""
     return isinstance(tree, NumberLiteral) and tree.value == 1
 
 
 def substitute_names(tree: SyntaxTree, replacements: Mapping[str, SyntaxTree]) -> SyntaxTree:
-    """Return the tree with some names replaced, simplified."""
+    """Return the tree with names replaced by trees, simplified.
+
+    The names inside `in(...)` are kept. `sin`, `tan` and `tanh` of 0 become 0.
+    """
 
     def inside(part: SyntaxTree) -> SyntaxTree:
         return substitute_names(part, replacements)

@@ -1,4 +1,4 @@
-"""Syntax: an expression as a tree in which every part knows its place."""
+"""Syntax tree: the nodes of an expression, each with its span, and functions on trees."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from language.text.diagnostic import Span
 
 @dataclass(frozen=True, slots=True)
 class NumberLiteral:
-    """A literal: its exact value in SI and its unit. A bare 0 goes with any dimension."""
+    """A number: its exact value in SI and its unit.
+
+    A 0 without a unit is compatible with any dimension.
+    """
 
     value: Fraction
     unit: Unit
@@ -22,7 +25,7 @@ class NumberLiteral:
 
     @property
     def is_bare_zero(self) -> bool:
-        """Tell whether this is `0` without a unit."""
+        """Return whether the literal is `0` without a unit."""
         return self.value == 0 and self.unit is NO_UNIT
 
 
@@ -60,7 +63,7 @@ class Not:
 
 @dataclass(frozen=True, slots=True)
 class Arithmetic:
-    """`+ - * /` of two operands."""
+    """A sum, difference, product or quotient of two operands."""
 
     operator: str
     left: SyntaxTree
@@ -70,7 +73,7 @@ class Arithmetic:
 
 @dataclass(frozen=True, slots=True)
 class Logic:
-    """`and`, `or`; both sides are evaluated."""
+    """`and` or `or` of two conditions; both sides are evaluated."""
 
     operator: str
     left: SyntaxTree
@@ -80,7 +83,7 @@ class Logic:
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """One relation of two sums."""
+    """A relation `< <= > >= == !=` of two operands."""
 
     operator: str
     left: SyntaxTree
@@ -99,7 +102,7 @@ class Power:
 
 @dataclass(frozen=True, slots=True)
 class Conditional:
-    """`if c then a else b`."""
+    """`if condition then ... else ...`."""
 
     condition: SyntaxTree
     then: SyntaxTree
@@ -118,7 +121,7 @@ class FunctionCall:
 
 @dataclass(frozen=True, slots=True)
 class ErrorNode:
-    """An expression that could not be read; its problem is reported already."""
+    """An expression that could not be parsed; its problem has been reported."""
 
     span: Span
 
@@ -143,16 +146,16 @@ DELAY_FUNCTIONS = ("previous", "delay")
 EDGE_FUNCTIONS = ("rising", "falling", "changed")
 TIME_FUNCTIONS = ("after", "every")
 MEMORY_FUNCTIONS = (*DELAY_FUNCTIONS, *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
-"""Functions with memory."""
+"""Functions with memory: their value depends on earlier ticks or instants."""
 
 
 def memory_key(tree: FunctionCall) -> str:
-    """Return the name under which the value of a function with memory is known."""
+    """Return the key of a call of a function with memory; calls that are written alike share it."""
     return f"{tree.function} {structural_key(tree.arguments)}"
 
 
 def names(tree: SyntaxTree) -> list[Name]:
-    """Return every name read in the tree, from left to right."""
+    """Return every name in the tree from left to right, with repetitions."""
     return [part for part in walk(tree) if isinstance(part, Name)]
 
 
@@ -170,7 +173,7 @@ def walk(tree: SyntaxTree) -> list[SyntaxTree]:
 
 
 def children(tree: SyntaxTree) -> tuple[SyntaxTree, ...]:
-    """Return the direct parts of a tree."""
+    """Return the direct parts of a tree; empty for a leaf."""
     parts = CHILDREN_BY_TYPE.get(type(tree))
     return () if parts is None else parts(tree)
 
@@ -185,11 +188,11 @@ CHILDREN_BY_TYPE: Mapping[type, Callable[[Any], tuple[SyntaxTree, ...]]] = {
     Conditional: lambda tree: (tree.condition, tree.then, tree.other),
     FunctionCall: lambda tree: tree.arguments,
 }
-"""The direct parts of each kind of tree that has some."""
+"""Function that gives the direct parts, for each type of tree that has parts."""
 
 
 def integer_literal(tree: SyntaxTree) -> int | None:
-    """Return the value of a literal like `2` or `-3`: a whole number without a unit, else None."""
+    """Return the value of a literal like `2` or `-3`, a whole number without a unit; else None."""
     match tree:
         case NumberLiteral(value, unit, _) if unit is NO_UNIT and value.denominator == 1:
             return int(value)
@@ -201,7 +204,7 @@ def integer_literal(tree: SyntaxTree) -> int | None:
 
 
 def structural_key(part: object) -> object:
-    """Return what a tree says without its places: two trees written alike have equal forms."""
+    """Return a hashable form of a tree without spans; equal for trees that are written alike."""
     if isinstance(part, tuple):
         return tuple(structural_key(item) for item in part)
     if dataclasses.is_dataclass(part):
@@ -211,7 +214,7 @@ def structural_key(part: object) -> object:
 
 
 def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
-    """Tell whether two trees are written alike: equal but for their places."""
+    """Return whether two trees are equal except for their spans."""
     stack = [(first, second)]
     while stack:
         a, b = stack.pop()
@@ -225,7 +228,7 @@ def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
 
 
 def node_label(tree: SyntaxTree) -> object:
-    """Return what a tree says itself, besides its parts."""
+    """Return the content of the root of a tree without its parts: operator, name, value, ..."""
     match tree:
         case NumberLiteral(value, unit, _):
             return (value.numerator, value.denominator, unit.text)
@@ -244,15 +247,18 @@ def node_label(tree: SyntaxTree) -> object:
 
 
 class TreeNumbering:
-    """Numbers trees: two have one number if they are written alike. Each part is read once."""
+    """A numbering of trees in which trees that are equal except for their spans have one number.
+
+    Trees seen before are found by identity.
+    """
 
     def __init__(self) -> None:
-        """Know no tree."""
+        """Create an empty numbering."""
         self.numbers_by_key: dict[object, int] = {}
         self.numbered_trees: dict[int, tuple[SyntaxTree, int]] = {}
 
     def number_of(self, tree: SyntaxTree) -> int:
-        """Return the number of a tree."""
+        """Return the number of a tree; a new tree gets the next number."""
         found = self.numbered_trees.get(id(tree))
         if found is None:
             key = (type(tree), node_label(tree), *map(self.number_of, children(tree)))
@@ -262,7 +268,7 @@ class TreeNumbering:
 
 
 def depth(tree: SyntaxTree) -> int:
-    """Return the length of the longest way from a tree to a leaf."""
+    """Return the number of nodes on the longest path from the root of a tree to a leaf."""
     level, deepest = [tree], 0
     while level:
         deepest += 1
@@ -271,5 +277,5 @@ def depth(tree: SyntaxTree) -> int:
 
 
 def is_bare_zero(tree: SyntaxTree) -> bool:
-    """Tell whether an expression is a bare 0: it goes with any dimension."""
+    """Return whether an expression is a 0 without a unit; it is compatible with any dimension."""
     return isinstance(tree, NumberLiteral) and tree.is_bare_zero

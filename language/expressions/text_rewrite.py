@@ -1,4 +1,7 @@
-"""Rewrite: change names in the text of an expression, token by token."""
+"""Text rewriting: replacement of names in the text of an expression, token by token.
+
+Effects and templates edit texts, so that the result is readable and has a place.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +17,26 @@ TOKEN_PATTERN = re.compile(
     r"|(?P<mark><=|>=|==|!=|[-+*/^()<>=,])"
     r"|(?P<blank>\s+)|(?P<other>.)"
 )
-"""The tokens of `expression.lark`, and holes such as `$speed`."""
+"""The tokens of `expression.lark`, and placeholders such as `$speed`."""
 ATOM_PATTERN = re.compile(r"\$?[A-Za-z]\w*|\d+(\.\d+)?")
-"""What can stand for a name as it is; anything else gets parentheses."""
+"""Texts that replace a name without parentheses."""
 
 
 def substitute_reads(text: str, replacements: Mapping[str, str]) -> tuple[str, frozenset[str]]:
-    """Return an expression in which names are replaced, and the names that were found.
+    """Return an expression with names replaced where they are read, and the replaced names.
 
-    A name is replaced where it is read: not as a function, nor as a part of a path, a unit or
-    another name, nor in `der(x)`, which says whose balance it is. What is put for a name is one
-    operand: an expression gets parentheses.
+    Not replaced are functions, parts of a path or of a unit, and the argument of `der(...)` and
+    `in(...)`. A replacement that is not a single name or number gets parentheses.
     """
     tokens = list(_tokenise(text))
     return _replace_tokens(tokens, replacements, lambda position: _is_read(tokens, position))
 
 
 def rename_names(text: str, replacements: Mapping[str, str]) -> str:
-    """Return an expression in which names are replaced, in `der(x)` too."""
+    """Return an expression with names replaced, also in `der(x)` and `in(x)`.
+
+    Functions are kept.
+    """
     tokens = list(_tokenise(text))
     return _replace_tokens(
         tokens, replacements, lambda position: not _is_function(tokens, position)
@@ -43,22 +48,26 @@ def _replace_tokens(
     replacements: Mapping[str, str],
     is_replaced: Callable[[int], bool],
 ) -> tuple[str, frozenset[str]]:
-    found: set[str] = set()
+    """Return the text with the accepted names replaced, and the set of replaced names."""
+    used_names: set[str] = set()
     parts = []
     for position, (kind, part) in enumerate(tokens):
         if kind == "name" and part in replacements and is_replaced(position):
-            found.add(part)
+            used_names.add(part)
             part = (
                 replacements[part]
                 if ATOM_PATTERN.fullmatch(replacements[part])
                 else f"({replacements[part]})"
             )
         parts.append(part)
-    return "".join(parts), frozenset(found)
+    return "".join(parts), frozenset(used_names)
 
 
 def names_in_text(text: str) -> list[str]:
-    """Return the names that an expression reads, as written, from left to right."""
+    """Return the names that an expression reads, from left to right, with repetitions.
+
+    A path is returned as it is written, blanks included.
+    """
     tokens = list(_tokenise(text))
     return [
         part
@@ -68,13 +77,16 @@ def names_in_text(text: str) -> list[str]:
 
 
 def split_balance(balance: str) -> tuple[str, str]:
-    """Return the left and the right side of a balance; the right one is empty without a `=`."""
+    """Return the left and the right side of a balance; the right side is empty without a `=`."""
     left, _, right = balance.partition("=")
     return left.strip(), right.strip()
 
 
 def split_summands(text: str) -> list[tuple[str, str]]:
-    """Return the top-level summands of an expression with their signs, `+` or `-`."""
+    """Return the top-level summands of an expression, each with its sign `+` or `-`.
+
+    An expression that begins with `if` is one summand.
+    """
     result: list[tuple[str, str]] = []
     sign, part, depth, operand = "+", "", 0, False
     if text.split(" ", 1)[0] == "if":
@@ -92,7 +104,7 @@ def split_summands(text: str) -> list[tuple[str, str]]:
 
 
 def join_summands(parts: list[tuple[str, str]]) -> str:
-    """Return summands with their signs as one expression; `0` where there are none."""
+    """Return summands with their signs as one expression; `0` for an empty list."""
     text = ""
     for sign, part in parts:
         if text:
@@ -103,16 +115,18 @@ def join_summands(parts: list[tuple[str, str]]) -> str:
 
 
 def _tokenise(text: str) -> Iterator[tuple[str, str]]:
+    """Yield kind and text of each token; the texts together are the whole text."""
     for match in TOKEN_PATTERN.finditer(text):
         yield str(match.lastgroup), match.group()
 
 
 def _is_function(tokens: list[tuple[str, str]], position: int) -> bool:
+    """Return whether the token at a position is followed by `(`."""
     after = [part for kind, part in tokens[position + 1 :] if kind != "blank"][:1]
     return after == ["("]
 
 
 def _is_read(tokens: list[tuple[str, str]], position: int) -> bool:
-    """Tell whether the name at a position is read: no function, not what `der` or `in` takes."""
+    """Return whether the name at a position is read: no function, no argument of `der` or `in`."""
     before = [part for kind, part in tokens[:position] if kind != "blank"][-2:]
     return not _is_function(tokens, position) and before not in (["der", "("], ["in", "("])

@@ -1,7 +1,7 @@
-"""Grammar: the shape of an expression - which tokens make which part of its tree.
+"""Token shapes: the parse tree of an expression as a function of the kinds of its tokens.
 
-lark finds it, once for each sequence of kinds of tokens: `a + 2 * b` and `x_1 - 7.5 / y` have one
-shape. A text whose tokens are not plainly those of the grammar is parsed by lark itself.
+lark parses each sequence of token kinds once: `a + 2 * b` and `x_1 - 7.5 / y` have the same shape.
+A text with other tokens is parsed by lark itself.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from importlib import resources
 import lark
 
 ParseShape = tuple[str, tuple["ParseShape | int", ...]]
-"""A rule of the grammar with its parts: other rules, or the numbers of tokens."""
+"""A rule of the grammar with its parts: other shapes, or the numbers of tokens."""
 
 TOKEN_PATTERN = re.compile(
     r" *(?:(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
@@ -28,21 +28,21 @@ TOKEN_PATTERN = re.compile(
 )
 """The tokens of `expression.lark`, each with the blanks before it.
 
-An exponent is one with its `^`, for a digit elsewhere is a number.
+An exponent is matched with its `^`, because digits elsewhere are a number.
 """
 REPRESENTATIVE_TOKENS = {"quantity": "1 m", "number": "1", "name": "x"}
-"""What stands for all tokens of a kind; words and signs stand for themselves."""
+"""Text that represents all tokens of a kind; words and signs represent themselves."""
 REPRESENTATIVE_EXPONENT = "^ 2"
 TOKEN_SEPARATOR = "  "
-"""Two blanks: after one, a name behind a number is its unit."""
+"""Two blanks: with one blank, a name after a number would be its unit."""
 START_RULES = ("expression", "balance")
 REPRESENTATIVE_SIGNS = {"/": "*", "<=": "<", ">=": "<", ">": "<", "==": "<", "!=": "<"}
-"""Signs that make the same part of a tree. `+` is not a `-`, which may be a sign of its own."""
+"""Signs with the same parse tree. `+` and `-` differ, because `-` may be unary."""
 
 
 @dataclass(frozen=True)
 class ParsedShape:
-    """The shape of a text with the text and the start of each token; `depth` of the shape."""
+    """The shape of a text, text and offset of each token, and a bound of the depth of its tree."""
 
     shape: ParseShape
     texts: tuple[str, ...]
@@ -51,7 +51,7 @@ class ParsedShape:
 
 
 def parse_shape(text: str, start_rule: str) -> ParsedShape:
-    """Parse a text from a start of the grammar. Raises lark's UnexpectedInput."""
+    """Return the shape of a text for a start rule of the grammar. Raises lark's UnexpectedInput."""
     kinds: list[str] = []
     texts: list[str] = []
     starts: list[int] = []
@@ -61,18 +61,18 @@ def parse_shape(text: str, start_rule: str) -> ParsedShape:
             break
         end = match.end()
         kind = str(match.lastgroup)
-        found = match[kind]
-        texts.append(found)
+        token_text = match[kind]
+        texts.append(token_text)
         starts.append(match.start(kind))
         if kind == "exponent":
             kinds.append(REPRESENTATIVE_EXPONENT)
         elif kind in REPRESENTATIVE_TOKENS:
             kinds.append(REPRESENTATIVE_TOKENS[kind])
         else:
-            kinds.append(REPRESENTATIVE_SIGNS.get(found, found))
-    known = _cached_shape(tuple(kinds), start_rule) if not text[end:].strip(" ") else None
-    if known:
-        return ParsedShape(known[0], tuple(texts), tuple(starts), known[1])
+            kinds.append(REPRESENTATIVE_SIGNS.get(token_text, token_text))
+    cached = _cached_shape(tuple(kinds), start_rule) if not text[end:].strip(" ") else None
+    if cached:
+        return ParsedShape(cached[0], tuple(texts), tuple(starts), cached[1])
     tokens: list[lark.Token] = []
 
     def number(token: lark.Token) -> int:
@@ -86,7 +86,10 @@ def parse_shape(text: str, start_rule: str) -> ParsedShape:
 
 @lru_cache(maxsize=4096)
 def _cached_shape(kinds: tuple[str, ...], start_rule: str) -> tuple[ParseShape, int] | None:
-    """Return the shape of a sequence of kinds and its depth, None where it is no expression."""
+    """Return the shape of a sequence of token kinds and its depth.
+
+    Return None if it is not an expression.
+    """
     places: dict[int, int] = {}
     at = 0
     for index, kind in enumerate(kinds):
@@ -101,6 +104,7 @@ def _cached_shape(kinds: tuple[str, ...], start_rule: str) -> tuple[ParseShape, 
 
 
 def _shape_of_tree(tree: lark.Tree[lark.Token], number: Callable[[lark.Token], int]) -> ParseShape:
+    """Return the shape of a parse tree of lark; `number` gives the number of a token."""
     parts = tuple(
         number(part) if isinstance(part, lark.Token) else _shape_of_tree(part, number)
         for part in tree.children
@@ -109,12 +113,13 @@ def _shape_of_tree(tree: lark.Tree[lark.Token], number: Callable[[lark.Token], i
 
 
 def _shape_depth(shape: ParseShape) -> int:
-    """Return a bound of the depth of the tree; a rule of a start is no part of it."""
+    """Return an upper bound of the depth of the syntax tree; start rules do not count."""
     deepest = max((_shape_depth(part) for part in shape[1] if not isinstance(part, int)), default=0)
     return deepest if shape[0] in START_RULES else deepest + 1
 
 
 @cache
 def _parser(start_rule: str) -> lark.Lark:
+    """Return the LALR parser for a start rule; cached."""
     grammar = resources.files("language.expressions").joinpath("expression.lark").read_text("utf-8")
     return lark.Lark(grammar, parser="lalr", start=start_rule)

@@ -1,4 +1,4 @@
-"""Symbols: what each symbol of a unit is in SI, exactly: factor, powers and power of the angle."""
+"""Unit symbols: the exact SI factor, the dimension and the power of the angle of each symbol."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 
 BASE_SYMBOLS = ("m", "kg", "s", "A", "K")
 PI = Fraction("3.1415926535897932384626433832795028841971693993751")
-"""Circumference over diameter, to 50 digits: a double needs 17."""
+"""pi to 50 digits; a double needs 17."""
 
 Powers = tuple[int, int, int, int, int]
 Symbol = tuple[Fraction, Powers, int]
@@ -98,4 +98,4 @@ MISSPELLED_UNITS: Mapping[str, str] = {
     **dict.fromkeys(("minute", "minutes", "mins"), "min"),
     **dict.fromkeys(("hour", "hours", "hr"), "h"),
 }
-"""Units as people write them, and how they are written here."""
+"""Common wrong spellings of units, with the spelling of this language."""

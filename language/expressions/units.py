@@ -1,4 +1,4 @@
-"""Units: a unit's text to its factor, dimension and power of the angle, exactly."""
+"""Units: the exact factor, dimension and power of the angle of a unit from its text (rule 20)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MECHANICAL_NAMES: dict[tuple[int, ...], str] = {
     (-1, 1, -2): "Pa",
     (2, 1, 0): "kg*m^2",
 }
-"""How dimensions of mechanics are shown: powers of m, kg, s."""
+"""Names of dimensions of mechanics, by the powers of m, kg, s."""
 COMMON_NAMES: dict[tuple[int, ...], str] = {
     (2, 1, -3, -1, 0): "V",
     (2, 1, -3, -2, 0): "ohm",
@@ -38,7 +38,7 @@ COMMON_NAMES: dict[tuple[int, ...], str] = {
     (-2, -1, 3, 0, 1): "K/W",
     (-1, 1, -3, 0, 0): "Pa/s",
 }
-"""Further common names, for readers alone: powers of m, kg, s, A, K. Programs do without them."""
+"""Further names, by the powers of m, kg, s, A, K; used in messages, never in a Program."""
 
 UNIT_PATTERN = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
 FACTOR_PATTERN = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
@@ -46,24 +46,24 @@ FACTOR_PATTERN = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
 
 @dataclass(frozen=True)
 class Dimension:
-    """Exponents of m, kg, s, A, K; `angle` is the power of the angle, None where it is free."""
+    """Exponents of m, kg, s, A, K; `angle` is the power of the angle, or None if it is free."""
 
     powers: tuple[int, ...] = (0, 0, 0, 0, 0)
     angle: int | None = 0
 
     @property
     def is_number(self) -> bool:
-        """Tell whether this is a pure number: no dimension and no angle."""
+        """Return whether this is a pure number: without dimension and without angle."""
         return not any(self.powers) and self.angle == 0
 
     @property
     def is_dimensionless(self) -> bool:
-        """Tell whether there is no dimension, whatever the angle."""
+        """Return whether the exponents of all base units are 0; the angle does not count."""
         return not any(self.powers)
 
     @property
     def display_name(self) -> str:
-        """The dimension for readers: by its common name where it has one."""
+        """The dimension for messages, by its common name if it has one."""
         return DISPLAY_NAMES.get(str(self), str(self))
 
     def __str__(self) -> str:
@@ -92,18 +92,19 @@ class Unit:
 
 
 class UnitError(ValueError):
-    """The text is not a unit; the message says why."""
+    """The error of a text that is not a unit; the message gives the reason."""
 
 
 PURE_NUMBER = Dimension()
 UNKNOWN_DIMENSION = Dimension((), None)
-"""What is in a unit that was reported: it fits everything, so that nothing is reported twice."""
+"""Dimension of an erroneous unit: compatible with everything, so no further problem follows."""
 SECOND = Dimension((0, 0, 1, 0, 0))
 NO_UNIT = Unit("1", Fraction(1), PURE_NUMBER)
 UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN_DIMENSION)
 
 
 def _format_power(name: str, power: int) -> str:
+    """Return `m^2`, or `m` for the power 1."""
     return name if power == 1 else f"{name}^{power}"
 
 
@@ -111,13 +112,13 @@ DISPLAY_NAMES = {str(Dimension(powers)): text for powers, text in COMMON_NAMES.i
 
 
 def display_unit(text: str) -> str:
-    """Return how a unit of a Program is shown: by its common name where it has one."""
+    """Return the common name of a unit of a Program for messages, or its text if it has none."""
     return DISPLAY_NAMES.get(text, text)
 
 
 @cache
 def parse_unit(text: str) -> Unit:
-    """Return the unit written as `N*m*s/rad`, `1/s`, `kg*m^2`. Raises UnitError."""
+    """Return the unit of a text like `N*m*s/rad`, `1/s`, `kg*m^2`, `degC`. Raises UnitError."""
     if text == "1":
         return NO_UNIT
     if not UNIT_PATTERN.fullmatch(text):
@@ -139,10 +140,11 @@ def parse_unit(text: str) -> Unit:
 
 
 def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
-    """Return the dimension of a * b (sign 1) or a / b (sign -1), with rule 20's angle power.
+    """Return the dimension of a * b (sign 1) or a / b (sign -1), with the angle power of rule 20.
 
-    A factor that is a pure number keeps the power of the other; of two quantities with
-    dimensions, or one and an angle, the result is free; angles alone multiply exactly.
+    A factor that is a pure number keeps the angle power of the other. The power is free (None) for
+    two quantities with dimensions, and for one with a dimension and an angle. Powers of angles
+    alone add exactly.
     """
     if UNKNOWN_DIMENSION in (a, b):
         return UNKNOWN_DIMENSION
@@ -157,25 +159,31 @@ def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
 
 
 def rate_dimension(a: Dimension) -> Dimension:
-    """Return the dimension of the rate of a quantity, whose power of the angle stays."""
+    """Return the dimension of the time derivative of a quantity.
+
+    The power of the angle stays the same.
+    """
     if a == UNKNOWN_DIMENSION:
         return UNKNOWN_DIMENSION
     return Dimension(tuple(x - y for x, y in zip(a.powers, SECOND.powers, strict=True)), a.angle)
 
 
 def dimension_power(a: Dimension, exponent: int) -> Dimension:
-    """Return the dimension of a^exponent."""
+    """Return the dimension of a^exponent; the angle power is free unless a is a pure angle.
+
+    Exponent 0 gives a pure number, exponent 1 gives a unchanged.
+    """
     if a.is_number or exponent == 1:
         return a
     if exponent == 0:
         return PURE_NUMBER
     powers = tuple(exponent * x for x in a.powers)
-    exact = a.angle is not None and a.is_dimensionless
-    return Dimension(powers, exponent * (a.angle or 0) if exact else None)
+    is_angle_known = a.angle is not None and a.is_dimensionless
+    return Dimension(powers, exponent * (a.angle or 0) if is_angle_known else None)
 
 
 def dimension_sqrt(a: Dimension) -> Dimension | None:
-    """Return the dimension of sqrt(a), or None where a power is odd."""
+    """Return the dimension of sqrt(a), or None if a power is odd."""
     if a == UNKNOWN_DIMENSION:
         return UNKNOWN_DIMENSION
     odd_angle = a.angle is not None and a.angle % 2 != 0
@@ -185,21 +193,24 @@ def dimension_sqrt(a: Dimension) -> Dimension | None:
 
 
 def are_compatible(a: Dimension, b: Dimension) -> bool:
-    """Tell whether two quantities may be added, compared, assigned: rule 20."""
+    """Return whether two quantities may be added, compared or assigned (rule 20)."""
     if UNKNOWN_DIMENSION in (a, b):
         return True
     return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
 
 
 def common_dimension(a: Dimension, b: Dimension) -> Dimension:
-    """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
+    """Return the dimension of a sum of two compatible quantities.
+
+    A known angle power has precedence.
+    """
     if UNKNOWN_DIMENSION in (a, b):
         return UNKNOWN_DIMENSION
     return b if a.angle is None else a
 
 
 def unit_hint(text: str) -> str:
-    """Return "did you mean `N*m`?" for a text that is no unit, or an empty text."""
+    """Return "did you mean `N*m`?" for a text that is not a unit; empty without a suggestion."""
     if text in MISSPELLED_UNITS:
         return f"did you mean `{MISSPELLED_UNITS[text]}`?"
     changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
@@ -210,24 +221,28 @@ def unit_hint(text: str) -> str:
 
 
 def matching_units_hint(dimension: Dimension) -> str:
-    """Return the symbols that fit, like `s`, `ms`, `min`; an empty text where there are none."""
-    fitting = [
+    """Return a help text with the symbols of a dimension, like `s`, `ms`, `min`.
+
+    The text is empty if there are none.
+    """
+    matching = [
         f"`{name}`"
         for name, (_, powers, angle) in SYMBOLS.items()
         if Dimension(powers, angle) == dimension and not dimension.is_number
     ]
-    return f"units that fit: {', '.join(fitting)}" if fitting else ""
+    return f"units that fit: {', '.join(matching)}" if matching else ""
 
 
 def _nearest_symbol(symbol: str) -> str:
+    """Return the symbol most similar to a text; the text itself if there is none."""
     if symbol in SYMBOLS:
         return symbol
-    found = difflib.get_close_matches(symbol, SYMBOLS, n=1)
-    return MISSPELLED_UNITS.get(symbol, found[0] if found else symbol)
+    matches = difflib.get_close_matches(symbol, SYMBOLS, n=1)
+    return MISSPELLED_UNITS.get(symbol, matches[0] if matches else symbol)
 
 
 def angle_hint(left: Dimension, right: Dimension) -> str:
-    """Return what to do where two dimensions differ in the angle only; else nothing."""
+    """Return the help text for two dimensions that differ in the angle only; else an empty text."""
     if left.powers != right.powers:
         return ""
     if left.is_dimensionless and 0 in (left.angle, right.angle):

@@ -70,7 +70,7 @@ def max_operations(blocks: Blocks, name: str) -> int:
 def count_expr(value: Expr) -> int:
     """Return the number of operations of an expression.
 
-    Of a choice only the longer alternative counts.
+    Only the longer alternative of a choice counts.
     """
     match value:
         case Unary(_, operand):

@@ -141,9 +141,9 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """Increment of a counter, saturating at `limit`, if the condition is true.
+    """Increment of a counter if the condition is true, else its reset to 0 (rule 4b).
 
-    Else reset to 0 (rule 4b).
+    The counter saturates at `limit`.
     """
 
     timer: str

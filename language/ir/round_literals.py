@@ -36,7 +36,7 @@ def round_program(program: Program) -> Program:
 def round_block(block: Block, number_type: NumberType) -> Block:
     """Return a block with its literals rounded to a number type.
 
-    Float64 leaves the block unchanged.
+    For float64 the block is returned unchanged.
     """
     return block if number_type == "float64" else _round_node(block, number_type)
 

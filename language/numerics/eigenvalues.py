@@ -137,7 +137,7 @@ def _wilkinson_shift(rows: list[ComplexRow]) -> complex:
 def _eigenvector(a: Matrix, eigenvalue: complex) -> ComplexRow:
     """Return the eigenvector of an eigenvalue by two steps of inverse iteration.
 
-    Largest entry 1 in size.
+    The vector is scaled so that its largest entry has size 1.
     """
     n = len(a)
     scale = max(abs(eigenvalue), max(abs(x) for row in a for x in row), 1e-300)

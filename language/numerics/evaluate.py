@@ -71,7 +71,7 @@ def sign(x: float) -> float:
 def floor(x: float) -> float:
     """Return the largest whole number not above x.
 
-    -0.0, infinities and NaN are returned unchanged.
+    The values -0.0, infinities and NaN are returned unchanged.
     """
     return x if x == 0.0 or not math.isfinite(x) else float(math.floor(x))
 

@@ -34,7 +34,7 @@ EXP_SERIES = (
 )
 """Coefficients of (e^r - 1 - r) / r^2, degree 9 in r, |r| <= ln 2 / 2.
 
-Error of e^r 2^-57.9 relative. Minimax by mpmath at 60 digits (Lawson's weights). The lowest
+The error of e^r is 2^-57.9 relative. Minimax by mpmath at 60 digits (Lawson's weights). The lowest
 coefficient is rounded to double and fixed, the others are fitted again, and so on upwards. The
 error is that of the rounded coefficients.
 """

@@ -41,7 +41,7 @@ EXP_SERIES = (
 )
 """Coefficients of (e^r - 1 - r) / r^2, degree 4 in r, |r| <= ln 2 / 2.
 
-Error of e^r 2^-28.1 relative. This and the next two: minimax by mpmath at 40 digits (Remez
+The error of e^r is 2^-28.1 relative. This and the next two: minimax by mpmath at 40 digits (Remez
 exchange). The lowest coefficient is rounded to float32 and fixed, the others are fitted again, and
 so on upwards.
 """
@@ -63,12 +63,12 @@ a number of quarter turns are exact.
 SIN_SERIES = (-0.16666653752326965, 0.00833209604024887, -0.00019505627278704196)
 """Coefficients of (sin r / r - 1) / r^2, degree 2 in r^2, |r| <= pi/4.
 
-Error of sin r / r 2^-27.7.
+The error of sin r / r is 2^-27.7.
 """
 COS_SERIES = (0.04166664555668831, -0.0013887288514524698, 2.4428207325399853e-05)
 """Coefficients of (cos r - 1 + r^2 / 2) / r^4, degree 2 in r^2, |r| <= pi/4.
 
-Error of cos r 2^-32.8.
+The error of cos r is 2^-32.8.
 """
 
 TANH_SATURATION = real(10.0)

@@ -69,7 +69,7 @@ COS_SERIES = (
 )
 """Coefficients of (cos r - 1 + r^2 / 2) / r^4, degree 5 in r^2, |r| <= pi/4.
 
-Error of cos r 2^-64.1.
+The error of cos r is 2^-64.1.
 """
 
 TANH_SATURATION = real(20.0)
@@ -160,7 +160,7 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
 def horner_in_pieces(body: FunctionBuilder, coefficients: tuple[float, ...], x: Expr) -> Expr:
     """Append a polynomial c0 + x (c1 + ...) as locals of at most four coefficients.
 
-    Return the last.
+    The last of these locals is returned.
     """
     rest: Expr | None = None
     for k in reversed(range(0, len(coefficients), 4)):
@@ -243,7 +243,7 @@ TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT, "1e5"
 def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     """Return sin as a function of operations.
 
-    X is clamped, and the result is x itself for tiny x.
+    x is clamped. The result is x itself for tiny x, so that sin -0.0 is -0.0.
     """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)

@@ -48,7 +48,8 @@ ATAN_SERIES = (
 )
 """Coefficients of (atan r / r - 1) / r^2, degree 11 in r^2, |r| <= 7/16.
 
-Error of atan r / r 2^-62.3. Least squares at 60 Chebyshev nodes by mpmath at 50 digits, weight r^2.
+The error of atan r / r is 2^-62.3. Least squares at 60 Chebyshev nodes by mpmath at 50 digits,
+weight r^2.
 The lowest coefficient is rounded to double and fixed, the others are fitted again, and so on
 upwards.
 """
@@ -98,7 +99,8 @@ RISE, RUN = Ref("work.rise"), Ref("work.run")
 def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     """Return tan as a function of operations; x is clamped.
 
-    sin / cos of the reduced argument, -cos / sin in odd quadrants.
+    The result is sin / cos of the reduced argument, in odd quadrants -cos / sin. It is x itself for
+    tiny x.
     """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)

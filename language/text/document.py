@@ -95,10 +95,10 @@ class Document:
 def require_kind(document: Document, kind: str, problems: Problems) -> None:
     """Raise SpecError if a document is not of the kind `kind`; report the problem, too."""
     if document.kind != kind:
-        given, wanted = (
-            f"{'an' if each[0] in 'aeiou' else 'a'} {each}" for each in (document.kind, kind)
+        actual_text, expected_text = (
+            f"{'an' if word[0] in 'aeiou' else 'a'} {word}" for word in (document.kind, kind)
         )
-        label = f"`{document.name}` is {given}, not {wanted}"
+        label = f"`{document.name}` is {actual_text}, not {expected_text}"
         problems.error("form", document.name_span, label)
         problems.raise_if_errors()
 

@@ -12,7 +12,7 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 def entries(node: YamlNode | None) -> Iterator[Entry]:
     """Yield the entries of a mapping in the order of the file.
 
-    Yield nothing for another node or None.
+    Another kind of node, or None, has no entries.
     """
     if isinstance(node, MappingNode):
         yield from node

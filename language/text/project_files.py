@@ -260,7 +260,7 @@ def _yaml_files(folder: Path) -> Iterator[Path]:
 def _heads_in(path: Path, texts: Mapping[Path, str]) -> list[tuple[str, str]]:
     """Return the kinds and names in the first 65536 characters of a file.
 
-    An unreadable file has none.
+    A file that cannot be read has none.
     """
     text = texts.get(path.resolve()) if texts else None
     try:

@@ -208,7 +208,7 @@ class _YamlBuilder:
     def _add_entry(self, level: _OpenCollection, key: YamlNode, node: YamlNode) -> None:
         """Add a key and its value to a mapping.
 
-        Report `<<`, a duplicate, a key that is no scalar.
+        Instead report `<<`, a duplicate key, and a key that is not a scalar.
         """
         if self._join_split_value(level, key, node):
             return

@@ -1,1 +1,1 @@
-"""Types, dimensions and ranges of expressions."""
+"""Types, dimensions and value ranges of expressions."""

@@ -1,4 +1,4 @@
-"""Scope: what names mean at one place of a document."""
+"""Name environment: the meaning of names at one place of a document."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from language.typecheck.types import ExprType
 
 @dataclass(frozen=True)
 class NameEnvironment:
-    """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
+    """The meaning of names at one place: their types, and the modes that `in(...)` may name.
 
-    `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
-    functions with memory that may be used, `tables` what `lookup` reads,
-    `mode` the mode that reads, `owners` a mode for each equation that any mode has, `events` those
-    of a chart, which are no values.
+    A type of None belongs to a declaration with a problem. `location` describes the place for
+    messages. `angle_units` has the units of parameters declared in a unit of angle,
+    `memory_functions` the functions with memory allowed here, `tables` the lookup tables. `mode` is
+    the mode of the expression and `equation_owners` gives one mode for each equation of any mode.
+    `events` are the events of a chart, which have no value.
     """
 
     types: Mapping[str, ExprType | None]

@@ -1,4 +1,4 @@
-"""Function: what the elementary functions and `in` take, and what they return (rule 20)."""
+"""Function calls: argument and result types of the elementary functions and of `in` (rule 20)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from language.typecheck.typing_context import TypingContext
 
 ANGLE = Dimension(angle=1)
 SAME_UNIT_FUNCTIONS = {"abs": 1, "min": 2, "max": 2, "clip": 3}
-"""Functions whose arguments and value have one dimension, with their number of arguments."""
+"""Functions whose arguments and result have one dimension, with their number of arguments."""
 MAX_NESTING = 4
-"""Functions of whole numbers inside each other: each holds copies of what is inside."""
+"""Deepest nesting of functions of whole numbers; each level copies its arguments."""
 NUMBER_FUNCTIONS = {"exp": 1, "log": 1, "tanh": 1, "floor": 1, "sign": 1, "pow": 2}
 ANGLE_FUNCTIONS = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENT_COUNTS = {
@@ -39,7 +39,7 @@ FUNCTION_NAMES = (*ARGUMENT_COUNTS, *MEMORY_FUNCTIONS, "lookup", "in", "der")
 
 
 def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
-    """Return what a function returns; None where a problem was reported."""
+    """Return the type of a function call; None if a problem was reported."""
     name, arguments = tree.function, tree.arguments
     if name == "in":
         return _infer_in(checker, tree)
@@ -47,8 +47,8 @@ def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType 
         return infer_memory_call(checker, tree)
     if name == "lookup":
         return infer_lookup(checker, tree)
-    wanted = ARGUMENT_COUNTS.get(name)
-    if wanted is None:
+    expected = ARGUMENT_COUNTS.get(name)
+    if expected is None:
         label = f"`{name}` is not a function that can be used here"
         usable = (*ARGUMENT_COUNTS, *sorted(checker.environment.memory_functions), "lookup")
         hint = (
@@ -74,14 +74,14 @@ def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType 
 
 
 def argument_count_error(tree: FunctionCall) -> str:
-    """Return what is wrong with the number of arguments of an elementary function."""
-    wanted, given = ARGUMENT_COUNTS.get(tree.function), len(tree.arguments)
-    is_right = wanted is None or given == wanted
-    return "" if is_right else f"`{tree.function}` takes {wanted} argument(s), not {given}"
+    """Return a message if an elementary function has a wrong number of arguments; else empty."""
+    expected, actual = ARGUMENT_COUNTS.get(tree.function), len(tree.arguments)
+    is_correct = expected is None or actual == expected
+    return "" if is_correct else f"`{tree.function}` takes {expected} argument(s), not {actual}"
 
 
 def is_integer_call(arguments: Sequence[SyntaxTree], are_integers: Sequence[bool]) -> bool:
-    """Tell whether some arguments are whole numbers, and all others literals like `2`."""
+    """Return whether an argument is a whole number and all others are or are literals like `2`."""
     pairs = zip(arguments, are_integers, strict=True)
     return any(are_integers) and all(
         whole or integer_literal(tree) is not None for tree, whole in pairs
@@ -91,10 +91,13 @@ def is_integer_call(arguments: Sequence[SyntaxTree], are_integers: Sequence[bool
 def _infer_integer_call(
     checker: TypingContext, tree: FunctionCall, argument_types: Sequence[ExprType | None]
 ) -> IntType | None:
-    """`min`, `max`, `abs` and `clip` of whole numbers are whole; what is inside is copied."""
+    """Return the range of `min`, `max`, `abs` or `clip` of whole numbers.
+
+    Report calls that are nested too deeply and return None.
+    """
     if _nesting_depth(tree) > MAX_NESTING:
         label = f"`{tree.function}` of whole numbers is nested too deeply"
-        checker.report("expression", tree.span, label, "give what is inside an equation of its own")
+        checker.report("expression", tree.span, label, "write an equation for the inner expression")
         return None
     ranges = []
     for argument, kind in zip(tree.arguments, argument_types, strict=True):
@@ -104,7 +107,7 @@ def _infer_integer_call(
 
 
 def _nesting_depth(tree: SyntaxTree) -> int:
-    """Return how many functions of one kind stand inside each other."""
+    """Return the largest number of SAME_UNIT_FUNCTIONS that are nested in a tree."""
     inside = max((_nesting_depth(part) for part in children(tree)), default=0)
     return inside + (isinstance(tree, FunctionCall) and tree.function in SAME_UNIT_FUNCTIONS)
 
@@ -112,6 +115,7 @@ def _nesting_depth(tree: SyntaxTree) -> int:
 def _infer_elementary(
     checker: TypingContext, tree: FunctionCall, dimensions: list[Dimension]
 ) -> Dimension | None:
+    """Return the dimension of an elementary function of reals; None if its arguments do not fit."""
     name, first = tree.function, dimensions[0]
     if name in SAME_UNIT_FUNCTIONS or name == "atan2":
         base: SyntaxTree = tree.arguments[0]
@@ -139,6 +143,7 @@ def _infer_elementary(
 
 
 def _infer_in(checker: TypingContext, tree: FunctionCall) -> ExprType:
+    """Return the type of `in(mode)`; report an argument that is not a mode of a run or a region."""
     name = tree.arguments[0]
     if not isinstance(name, Name) or name.path not in checker.environment.modes:
         shown = name.path if isinstance(name, Name) else "..."

@@ -1,4 +1,4 @@
-"""Dimension check: the dimension of every expression, and what does not fit (rule 20)."""
+"""Type inference: the type and dimension of every expression, and their problems (rule 20)."""
 
 from __future__ import annotations
 
@@ -49,26 +49,32 @@ from language.typecheck.types import (
 )
 
 MAX_HINTS = 200
-"""Problems after which no nearest name is looked for: all names are compared with it."""
+"""Number of problems after which no similar name is suggested, because that search is slow."""
 
 
 class TypeChecker:
-    """Infers dimensions bottom up; reports each mistake once and goes on."""
+    """Bottom-up inference of types and dimensions that reports each mistake once and continues."""
 
     def __init__(self, environment: NameEnvironment, problems: Problems) -> None:
-        """Check against `environment`, report into `problems`."""
+        """Create a checker for an environment that reports into `problems`."""
         self.environment = environment
         self.problems = problems
 
     def inside_memory_function(self, *functions: str) -> TypeChecker:
-        """Return the check of what stands inside a function with memory."""
+        """Return a checker for the argument of a function with memory.
+
+        Of the functions with memory only `functions` are allowed there.
+        """
         memory = self.environment.memory_functions & {*functions}
         return TypeChecker(
             dataclasses.replace(self.environment, memory_functions=memory), self.problems
         )
 
     def check_quantity(self, tree: SyntaxTree, expected: Dimension, what: str) -> None:
-        """Check that an expression is a quantity that fits `expected`."""
+        """Report an expression that is not a quantity of the dimension `expected`.
+
+        `what` names the target.
+        """
         kind = as_real_type(self.infer_type(tree))
         if isinstance(kind, str | EnumType):
             label = f"`{what}` is a quantity, this is {describe_type(kind)}"
@@ -85,7 +91,11 @@ class TypeChecker:
             self.report("dimension", tree.span, label, hint)
 
     def check_assignment(self, tree: SyntaxTree, expected: ExprType, what: str) -> None:
-        """Check that an expression may be assigned to something of a kind."""
+        """Report an expression that cannot be assigned to a target of a type.
+
+        `what` names the target. A whole-number target accepts whole numbers, literals and
+        `floor(...)`.
+        """
         if isinstance(expected, Dimension):
             self.check_quantity(tree, expected, what)
         elif expected == "truth":
@@ -101,6 +111,7 @@ class TypeChecker:
                 self.report("type", tree.span, label, hint if isinstance(kind, Dimension) else "")
 
     def _check_same_type(self, tree: SyntaxTree, expected: ExprType, what: str) -> None:
+        """Report an expression whose type is not exactly `expected`."""
         kind = self.infer_type(tree)
         if kind is not None and kind != expected:
             label = f"`{what}` is {describe_type(expected)}, this is {describe_type(kind)}"
@@ -108,7 +119,7 @@ class TypeChecker:
             self.report("type", tree.span, label, hint)
 
     def check_condition(self, tree: SyntaxTree, what: str) -> None:
-        """Check that an expression is true or false."""
+        """Report an expression that is not true or false; `what` names the place."""
         kind = self.infer_type(tree)
         if kind is not None and kind != "truth":
             hint = condition_hint(tree)
@@ -116,7 +127,7 @@ class TypeChecker:
             self.report("type", tree.span, label, hint)
 
     def infer_type(self, tree: SyntaxTree) -> ExprType | None:
-        """Return what the expression is, None where a problem was reported inside it."""
+        """Return the type of an expression; None if a problem was reported inside it."""
         match tree:
             case Name():
                 return self._infer_name(tree)
@@ -151,15 +162,18 @@ class TypeChecker:
                 return None
 
     def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
-        """Report a problem."""
+        """Report a problem as an error."""
         self.problems.error(kind, span, label, help)
 
     def infer_real(self, tree: SyntaxTree) -> Dimension | None:
-        """Return the dimension of a quantity; reports what is none."""
+        """Return the dimension of a quantity; report another type and return None."""
         return self.require_real(self.infer_type(tree), tree)
 
     def require_real(self, kind: ExprType | None, tree: SyntaxTree) -> Dimension | None:
-        """What a whole number is in arithmetic of reals: a number without a unit."""
+        """Return the dimension of a type used as a real; report a truth value or an enumeration.
+
+        A whole number is a pure number. None, the type of an erroneous expression, stays None.
+        """
         kind = as_real_type(kind)
         if isinstance(kind, Dimension):
             return kind
@@ -168,6 +182,7 @@ class TypeChecker:
         return None
 
     def _infer_name(self, tree: Name) -> ExprType | None:
+        """Return the type of a name; report an unknown name, an event or a table."""
         if tree.path in self.environment.tables:
             hint = f"read it with `lookup({tree.path}, ...)`"
             self.report("table", tree.span, f"`{tree.path}` is a table, not a value", hint)
@@ -187,6 +202,7 @@ class TypeChecker:
         return None
 
     def _infer_arithmetic(self, tree: Arithmetic) -> Dimension | IntType | None:
+        """Return the type of an arithmetic operation: a range (whole numbers) or a dimension."""
         first, second = self.infer_type(tree.left), self.infer_type(tree.right)
         wholes = int_operand_types(tree.left, first, tree.right, second)
         if wholes and tree.operator != "/":
@@ -204,7 +220,10 @@ class TypeChecker:
         return self.unify_dimensions(tree.left, left, tree.right, right, tree.span, tree.operator)
 
     def _check_angle_units(self, tree: Arithmetic) -> None:
-        """Two declared numbers in `deg` and `rad` are not added: rule 20, nothing is converted."""
+        """Report a sum of parameters declared in two units of angle.
+
+        Nothing is converted (rule 20).
+        """
         known = self.environment.angle_units
         first, second = (
             known.get(part.path) if isinstance(part, Name) else None
@@ -215,7 +234,7 @@ class TypeChecker:
             self.report("dimension", tree.span, label, "declare both in one unit of angle")
 
     def _check_int32(self, kind: IntType, tree: Arithmetic) -> IntType:
-        """Whole numbers are held in 32 bits: what may not fit is a problem."""
+        """Return the type of whole-number arithmetic; report a range that does not fit 32 bits."""
         if kind.fits_int32:
             return kind
         label = f"this may lie from {kind.low} to {kind.high}: past {MAX_INT}"
@@ -232,7 +251,11 @@ class TypeChecker:
         span: Span,
         operator: str,
     ) -> Dimension | None:
-        """Return the dimension of what joins `a` and `b`; reports where they do not fit."""
+        """Return the common dimension of the operands `a` and `b`; report dimensions that differ.
+
+        A 0 without a unit takes the dimension of the other operand. None is returned after a
+        problem.
+        """
         if is_bare_zero(a):
             return right
         if is_bare_zero(b):
@@ -248,6 +271,11 @@ class TypeChecker:
         return None
 
     def _infer_relation(self, tree: Relation) -> BoolType:
+        """Return the type of a relation, a truth value; report operands that cannot be compared.
+
+        `==` and `!=` need whole numbers, truth values or enumerations; reals need an order
+        relation.
+        """
         first, second = self.infer_type(tree.left), self.infer_type(tree.right)
         equality = tree.operator in ("==", "!=")
         if int_operand_types(tree.left, first, tree.right, second):
@@ -257,7 +285,8 @@ class TypeChecker:
             return "truth"
         if equality and len(named) == 2:
             if first != second:
-                label = f"`{tree.operator}` compares {describe_type(named[0])} and {describe_type(named[1])}"
+                kinds = " and ".join(describe_type(kind) for kind in named)
+                label = f"`{tree.operator}` compares {kinds}"
                 self.report("type", tree.span, label)
             return "truth"
         if equality and "truth" in (first, second):
@@ -276,6 +305,7 @@ class TypeChecker:
         return "truth"
 
     def _infer_conditional(self, tree: Conditional) -> ExprType | None:
+        """Return the common type of both alternatives; report types that differ and return None."""
         self.check_condition(tree.condition, "if")
         first, second = self.infer_type(tree.then), self.infer_type(tree.other)
         if first is None or second is None:
@@ -287,9 +317,9 @@ class TypeChecker:
         if isinstance(left, Dimension) and isinstance(right, Dimension):
             return self.unify_dimensions(tree.then, left, tree.other, right, tree.span, "if")
         if left != right:
-            label = f"one arm is {describe_type(first)}, the other {describe_type(second)}"
+            label = f"one alternative is {describe_type(first)}, the other {describe_type(second)}"
             if "truth" in (left, right) and Dimension in (type(left), type(right)):
-                label = "one arm is a condition, the other a quantity"
+                label = "one alternative is a condition, the other a quantity"
             self.report("type", tree.span, label)
             return None
         return left

@@ -1,4 +1,7 @@
-"""Whole: `abs`, `min`, `max` and `clip` of whole numbers - their ranges and their expressions."""
+"""Integer functions: `abs`, `min`, `max` and `clip` of whole numbers (rule C10).
+
+The module has the ranges of their values and their expressions in a Program.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from language.typecheck.types import IntType
 
 
 def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
-    """Return where the value of a function lies whose arguments lie in some ranges."""
+    """Return the range of the value of a function whose arguments lie in the given ranges."""
     first = ranges[0]
     match function:
         case "abs":
@@ -26,7 +29,10 @@ def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
 
 
 def lower_integer_call(function: str, parts: Sequence[Expr]) -> Expr:
-    """Return `abs`, `min`, `max` or `clip` of whole numbers; the order is that of the reals."""
+    """Return the expression of `abs`, `min`, `max` or `clip` of whole numbers as selections.
+
+    The order of comparisons is that of the functions of reals (rule C7).
+    """
     first = parts[0]
     match function:
         case "abs":

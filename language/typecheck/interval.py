@@ -1,4 +1,7 @@
-"""Interval: numbers from one to another, and what functions make of them."""
+"""Intervals: ranges of reals, and the images of functions over them.
+
+The bounds are computed in double without outward rounding.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """All values from `low` to `high`; `known` if they follow from declared ranges alone.
+    """All values from `low` to `high`; `excludes_zero` removes 0 from them.
 
-    One that is `broken` does not hold 0, though it may lie on both sides of it.
+    `is_certain` is true if the bounds follow from declared ranges alone.
     """
 
     low: float = -math.inf
@@ -22,43 +25,47 @@ class Interval:
 
     @property
     def contains_zero(self) -> bool:
-        """Tell whether 0 is among the values."""
+        """Return whether 0 is among the values."""
         return self.low <= 0.0 <= self.high and not self.excludes_zero
 
     def intersect(self, other: Interval) -> Interval:
-        """Return the part that lies in another one too."""
+        """Return the intersection with another interval; it keeps the certainty of this one."""
         broken = self.excludes_zero or other.excludes_zero
         return Interval(
             max(self.low, other.low), min(self.high, other.high), self.is_certain, broken
         )
 
     def hull(self, other: Interval) -> Interval:
-        """Return what holds the values of both."""
+        """Return the smallest interval that contains both; it is certain if both are."""
         known = self.is_certain and other.is_certain
         broken = not (self.contains_zero or other.contains_zero)
         return Interval(min(self.low, other.low), max(self.high, other.high), known, broken)
 
 
 UNBOUNDED = Interval()
+"""The interval of all reals, not certain."""
 
 
 def image_of_corners(
     left: Interval, right: Interval, operation: Callable[[float, float], float]
 ) -> Interval:
-    """Return what `operation` makes of two intervals, where it is monotonic in both."""
+    """Return the interval of `operation` over two intervals, if it is monotonic in both arguments.
+
+    It is evaluated at the four corners; a NaN (0 times an infinity) counts as 0.
+    """
     values = [operation(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
     values = [0.0 if value != value else value for value in values]  # 0 times an infinity
     return Interval(min(values), max(values), left.is_certain and right.is_certain)
 
 
 def even_power(base: Interval, exponent: int) -> Interval:
-    """Return an even power of an interval."""
+    """Return the interval of an even power over an interval."""
     ends = [power_or_inf(base.low, exponent), power_or_inf(base.high, exponent)]
     return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.is_certain)
 
 
 def power_or_inf(value: float, exponent: int) -> float:
-    """Return a whole power of a number, infinite where it is too large."""
+    """Return a whole power of a number; an infinity of the right sign on overflow."""
     try:
         return float(value**exponent)
     except OverflowError:
@@ -66,7 +73,11 @@ def power_or_inf(value: float, exponent: int) -> float:
 
 
 def function_image(name: str, parts: list[Interval]) -> Interval:
-    """Return what a function makes of intervals; anything where that is not known."""
+    """Return the interval of a function over the intervals of its arguments.
+
+    An unknown function gives UNBOUNDED. Arguments outside of the domain of `sqrt`, `log` and `pow`
+    are clamped to it.
+    """
     first, known = parts[0], all(part.is_certain for part in parts)
     match name:
         case "abs":
@@ -101,10 +112,15 @@ def function_image(name: str, parts: list[Interval]) -> Interval:
 
 
 def _clamped_log(value: float) -> float:
+    """Return log of a value clamped to the positive normal numbers."""
     return math.log(min(max(value, sys.float_info.min), sys.float_info.max))
 
 
 def _clamped_pow(base: float, degree: float) -> float:
+    """Return the power of a non-negative base, limited to the range of `exp`.
+
+    The result is 0 for base 0 and a degree above 0. A negative base counts as 0.
+    """
     if base <= 0.0 < degree:
         return 0.0
     try:
@@ -115,4 +131,5 @@ def _clamped_pow(base: float, degree: float) -> float:
 
 
 def _clamped_exp(value: float) -> float:
+    """Return exp of a value clamped to [-708, 709]."""
     return math.exp(min(max(value, -708.0), 709.0))

@@ -1,4 +1,4 @@
-"""Lookup tables: axes, values, units."""
+"""Lookup tables: axes, values and units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from language.expressions.units import Unit
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a table: its strictly ascending points in SI, exact, and as they are `written`."""
+    """An axis of a table: its strictly ascending points in SI, exact, and their texts."""
 
     name: str
     unit: Unit

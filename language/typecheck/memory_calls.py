@@ -1,4 +1,4 @@
-"""Call: what functions with memory and `lookup` are, and where they may stand."""
+"""Memory calls: types of functions with memory and of `lookup`, and where they are allowed."""
 
 from __future__ import annotations
 
@@ -19,19 +19,22 @@ ALLOWED_PLACES = {
     "delay": "it is for equations, balances, updates, resets and guards",
     **dict.fromkeys((*EDGE_FUNCTIONS, *TIME_FUNCTIONS), "it is for guards: `when`"),
 }
-"""What functions with memory are for."""
+"""Help text for each function with memory at a place where it is not allowed."""
 
 
 def infer_memory_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
-    """`delay` and `previous` have the kind of what they keep, the others are conditions."""
+    """Return the type of a call of a function with memory; None if a problem was reported.
+
+    `delay` and `previous` have the type of their first argument; the others are truth values.
+    """
     name, arguments = tree.function, tree.arguments
-    wanted = 2 if name == "delay" else 1
+    expected = 2 if name == "delay" else 1
     if name not in checker.environment.memory_functions:
         label = f"`{name}` is not a function that can be used here"
         checker.problems.error("name", tree.span, label, ALLOWED_PLACES[name])
         return None
-    if len(arguments) != wanted:
-        label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
+    if len(arguments) != expected:
+        label = f"`{name}` takes {expected} argument(s), not {len(arguments)}"
         hint = f"a time has its unit: `{name}(5 s)`" if name in TIME_FUNCTIONS else ""
         checker.problems.error("arguments", tree.span, label, hint)
         return None
@@ -48,7 +51,10 @@ def infer_memory_call(checker: TypingContext, tree: FunctionCall) -> ExprType | 
 
 
 def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
-    """`lookup(table, x)` or `lookup(table, x, y)`: each argument fits its axis."""
+    """Return the dimension of `lookup(table, x)` or `lookup(table, x, y)`; report unfit arguments.
+
+    None is returned if there is no such table or the number of arguments is wrong.
+    """
     first, *arguments = tree.arguments
     table = checker.environment.tables.get(first.path) if isinstance(first, Name) else None
     if table is None:
@@ -66,6 +72,6 @@ def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
 
 
 def table_name_of(tree: FunctionCall) -> str:
-    """Return the name of the table that a `lookup` reads."""
+    """Return the name of the table of a `lookup`; `...` if its first argument is not a name."""
     first = tree.arguments[0]
     return first.path if isinstance(first, Name) else "..."

@@ -1,7 +1,8 @@
-"""Ranging: what values an expression can have, from the ranges that are declared.
+"""Range analysis: intervals of the values of expressions, from declared ranges and from conditions.
 
-An interval is known where every name in it has a declared range. What is not known never gives a
-problem: bounds are then only used where a function or an `if` gives them.
+An interval is certain if every name in it has a declared range. An interval that is not certain
+never leads to a problem; it still uses the bounds that functions and `if` give. The analysis is
+interval arithmetic (Moore 1966), refined by the conditions of enclosing alternatives.
 """
 
 from __future__ import annotations
@@ -38,17 +39,19 @@ from language.typecheck.interval import (
 NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 Constraints = Mapping[int, Interval]
-"""What enclosing conditions say of expressions, by the number of what is written alike."""
+"""Intervals that enclosing conditions impose on expressions, by the number of the expression."""
 NO_CONSTRAINTS: Constraints = {}
 IntervalLookup = Callable[[str], Interval]
 DomainReport = Callable[[str, SyntaxTree, Interval], None]
 
 
 class RangeAnalysis:
-    """Finds intervals; `look` gives those of names, `report` takes divisors and roots.
+    """Interval analysis of expressions.
 
-    A quiet one has no `report`: what conditions say is not looked into, only what they exclude.
-    While it reports, `path` holds the conditions around a place and whether they hold there.
+    `report` gets divisors and arguments outside of their domain. `report` is called with the kind
+    ("divisor", "root", "log", "power", "inverse power"), the tree and its interval. While it is
+    called, `branch_path` holds the enclosing conditions and whether they are true. Without `report`
+    the conditions themselves are not analysed; only the constraints that they impose are.
     """
 
     def __init__(
@@ -58,7 +61,10 @@ class RangeAnalysis:
         numbering: TreeNumbering,
         report: DomainReport | None = None,
     ) -> None:
-        """Know the names; `numbering` numbers the expressions that limits are about."""
+        """Store the intervals of names and tables.
+
+        `numbering` identifies expressions that are equal.
+        """
         self.name_interval = name_interval
         self.table_interval = table_interval
         self.numbering = numbering
@@ -70,7 +76,10 @@ class RangeAnalysis:
         self.branch_path: list[tuple[SyntaxTree, bool]] = []
 
     def analyse(self, tree: SyntaxTree) -> Interval:
-        """Return the interval of an expression, reporting what is outside a domain inside it."""
+        """Return the interval of an expression.
+
+        Report arguments outside of their domain inside it.
+        """
         self.unreported.bound_cache.clear()
         before, self.branch_path = self.branch_path, []
         interval = self.interval_of(tree, NO_CONSTRAINTS)
@@ -78,7 +87,10 @@ class RangeAnalysis:
         return interval
 
     def interval_of(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
-        """Return the interval of a part of an expression within the limits that hold there."""
+        """Return the interval of a part of an expression under constraints.
+
+        A condition gives UNBOUNDED; its operands are analysed for reports.
+        """
         if isinstance(tree, Relation | Logic | Not):
             if self.report:
                 for part in children(tree):
@@ -89,6 +101,7 @@ class RangeAnalysis:
         return interval.intersect(held) if held else interval
 
     def _compute_interval(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
+        """Return the interval of an expression from the intervals of its parts."""
         match tree:
             case NumberLiteral(value, _, _):
                 return Interval(float(value), float(value), True)
@@ -113,13 +126,17 @@ class RangeAnalysis:
     def _branch_interval(
         self, condition: SyntaxTree, holds: bool, tree: SyntaxTree, constraints: Constraints
     ) -> Interval:
-        """Return the interval of an alternative of a choice."""
+        """Return the interval of the alternative `tree` of a choice.
+
+        The condition is true there if `holds` is true, else false.
+        """
         self.branch_path.append((condition, holds))
         interval = self.interval_of(tree, self._assume(condition, holds, constraints))
         self.branch_path.pop()
         return interval
 
     def _arithmetic(self, tree: Arithmetic, constraints: Constraints) -> Interval:
+        """Return the interval of an arithmetic operation; report a divisor that may be 0."""
         left, right = (
             self.interval_of(tree.left, constraints),
             self.interval_of(tree.right, constraints),
@@ -141,6 +158,7 @@ class RangeAnalysis:
         return image_of_corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
+        """Return the interval of a power; report a base that may be 0 under a negative exponent."""
         if exponent < 0 and base.contains_zero and self.report:
             self.report("divisor", tree.base, base)
         if exponent < 0 and base.low <= 0.0 <= base.high:
@@ -155,6 +173,10 @@ class RangeAnalysis:
         )
 
     def _call(self, tree: FunctionCall, constraints: Constraints) -> Interval:
+        """Return the interval of a function call.
+
+        Report arguments of sqrt, log and pow out of domain.
+        """
         name = tree.function
         if name == "lookup":
             for part in tree.arguments[1:] if self.report else ():
@@ -176,7 +198,10 @@ class RangeAnalysis:
         return function_image(name, parts)
 
     def _assume(self, condition: SyntaxTree, holds: bool, constraints: Constraints) -> Constraints:
-        """Return the limits where a condition holds, or does not."""
+        """Return the constraints where a condition is true, or false if `holds` is false.
+
+        Of a disjunction only the constraints that both sides impose are kept, as hulls.
+        """
         match condition:
             case Not(operand, _):
                 return self._assume(operand, not holds, constraints)
@@ -210,7 +235,7 @@ class RangeAnalysis:
         return constraints
 
     def bound_of(self, side: SyntaxTree, constraints: Constraints) -> Interval:
-        """Return the interval of a side of a condition, found once for both its outcomes."""
+        """Return the interval of one side of a relation; cached, as both outcomes need it."""
         key = id(side), id(constraints)
         if key not in self.bound_cache:
             self.bound_cache[key] = constraints, self.interval_of(side, constraints)
@@ -219,6 +244,10 @@ class RangeAnalysis:
     def _constrain_by_relation(
         self, side: SyntaxTree, operator: str, bound: Interval, constraints: Constraints
     ) -> Constraints:
+        """Return the constraints where `side operator x` is true for some x within `bound`.
+
+        A strict relation excludes the bound itself; `abs(x) > a` with a >= 0 excludes 0 from x.
+        """
         low, high = -math.inf, math.inf
         if operator == ">":
             low = math.nextafter(bound.low, math.inf)
@@ -236,7 +265,7 @@ class RangeAnalysis:
     def _constrain_equal(
         self, side: SyntaxTree, bound: Interval, constraints: Constraints
     ) -> Constraints:
-        """Return the limits where a side is equal to what has a bound."""
+        """Return the constraints where a side equals a value within `bound`."""
         return self._constrain(
             side, Interval(bound.low, bound.high, excludes_zero=bound.excludes_zero), constraints
         )
@@ -244,7 +273,10 @@ class RangeAnalysis:
     def _constrain_unequal(
         self, side: SyntaxTree, bound: Interval, constraints: Constraints
     ) -> Constraints:
-        """Return the limits where a side is not equal to what has a bound: here only 0 counts."""
+        """Return the constraints where a side differs from a value within `bound`.
+
+        Only `!= 0` adds a constraint: it excludes 0.
+        """
         is_zero = bound.low == bound.high == 0.0
         return (
             self._constrain(side, Interval(excludes_zero=True), constraints)
@@ -255,5 +287,6 @@ class RangeAnalysis:
     def _constrain(
         self, side: SyntaxTree, bound: Interval, constraints: Constraints
     ) -> Constraints:
+        """Return the constraints with the interval of a side intersected with `bound`."""
         number = self.numbering.number_of(side)
         return {**constraints, number: constraints.get(number, UNBOUNDED).intersect(bound)}

@@ -1,4 +1,4 @@
-"""Kind: what a value is - a quantity, a truth value, a whole number, one name of a list."""
+"""Types: quantity, truth value, whole number and enumeration as types of expressions."""
 
 from __future__ import annotations
 
@@ -9,41 +9,41 @@ from language.expressions.syntax_tree import Name, Relation, SyntaxTree, integer
 from language.expressions.units import PURE_NUMBER, Dimension
 
 TypeName = Literal["real", "int", "bool", "enum"]
-"""What a declaration says after `type:`."""
+"""The word of a declaration after `type:`."""
 TYPE_NAMES = ("real", "int", "bool", "enum")
 MAX_INT = 2**31 - 1
-"""Whole numbers are held in 32 bits; -2^31 itself stands for what `floor` makes of no number."""
+"""Largest whole number of 32 bits; -2^31 is reserved for `floor` of a NaN."""
 
 
 @dataclass(frozen=True)
 class IntType:
-    """A whole number that lies from `low` to `high`, both included."""
+    """A whole number from `low` to `high`, both included."""
 
     low: int = -MAX_INT
     high: int = MAX_INT
 
     def __str__(self) -> str:
-        """Return the word of the language."""
+        """Return the word of the language, `int`."""
         return "int"
 
     @property
     def fits_int32(self) -> bool:
-        """Tell whether it fits 32 bits."""
+        """Return whether the range fits 32 bits."""
         return self.low >= -MAX_INT and self.high <= MAX_INT
 
     def hull(self, other: IntType) -> IntType:
-        """Return what holds both."""
+        """Return the smallest range that contains both."""
         return IntType(min(self.low, other.low), max(self.high, other.high))
 
 
 @dataclass(frozen=True)
 class EnumType:
-    """One of some names; its number is its place in the list."""
+    """An enumeration; the number of a value is its position in the list, from 0."""
 
     values: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return the names."""
+        """Return `enum of ` with the names."""
         return f"enum of {', '.join(self.values)}"
 
 
@@ -52,7 +52,7 @@ ExprType = Dimension | BoolType | IntType | EnumType
 
 
 def int_type_of(operator: str, left: IntType, right: IntType) -> IntType:
-    """Return the range of `left operator right` (`+ - *`): the outermost of its corners."""
+    """Return the range of `left operator right` for `+ - *`, from the corners of both ranges."""
     if operator == "+":
         return IntType(left.low + right.low, left.high + right.high)
     if operator == "-":
@@ -62,12 +62,12 @@ def int_type_of(operator: str, left: IntType, right: IntType) -> IntType:
 
 
 def as_real_type(kind: ExprType | None) -> ExprType | None:
-    """Return what a kind is in arithmetic of reals: a whole number is a number without a unit."""
+    """Return a type as an operand of real arithmetic: a whole number becomes a pure number."""
     return PURE_NUMBER if isinstance(kind, IntType) else kind
 
 
 def describe_type(kind: ExprType) -> str:
-    """Return a kind in words."""
+    """Return a type in words for messages."""
     if kind == "truth":
         return "true or false"
     if isinstance(kind, EnumType):
@@ -78,7 +78,11 @@ def describe_type(kind: ExprType) -> str:
 def int_operand_types(
     a: SyntaxTree, a_type: ExprType | None, b: SyntaxTree, b_type: ExprType | None
 ) -> tuple[IntType, IntType] | None:
-    """Return both as whole numbers where one is, and the other is too or is a literal like `2`."""
+    """Return both operands as whole numbers; None if they are not.
+
+    At least one is a whole number; the other one may be a literal like `2`, with a range of one
+    value.
+    """
     if isinstance(a_type, IntType) and isinstance(b_type, IntType):
         return a_type, b_type
     if isinstance(a_type, IntType) and (value := integer_literal(b)) is not None:
@@ -89,16 +93,19 @@ def int_operand_types(
 
 
 def condition_hint(tree: SyntaxTree) -> str:
-    """Return what is written for 0 and 1, else how a number becomes a condition."""
+    """Return the help text for an expression where a condition is needed."""
     words = {0: "write `false`", 1: "write `true`"}
     number = integer_literal(tree)
     return "compare it: `x > 0`" if number is None else words.get(number, "compare it: `x > 0`")
 
 
 def comparison_hint(tree: Relation, condition: SyntaxTree) -> str:
-    """Return how a condition is written that `tree` compares with 0 or 1, else nothing."""
+    """Return the help text for a truth value `condition` that `tree` compares with 0 or 1.
+
+    The text is empty for another comparison.
+    """
     number = integer_literal(tree.right if condition is tree.left else tree.left)
     if not isinstance(condition, Name) or number not in (0, 1):
         return ""
-    wanted = (number == 1) == (tree.operator == "==")
-    return f"it is written `{'' if wanted else 'not '}{condition.path}`"
+    is_affirmed = (number == 1) == (tree.operator == "==")
+    return f"it is written `{'' if is_affirmed else 'not '}{condition.path}`"

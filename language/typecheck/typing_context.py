@@ -1,4 +1,4 @@
-"""The type checker as functions of expressions see it: types of arguments, names, problems."""
+"""Typing context: the interface of the type checker for the functions that type calls."""
 
 from __future__ import annotations
 
@@ -12,25 +12,28 @@ from language.typecheck.types import ExprType
 
 
 class TypingContext(Protocol):
-    """Infers and checks types of arguments in an environment; `infer.TypeChecker` is one."""
+    """Inference and checks of types in an environment; `infer.TypeChecker` implements it."""
 
     environment: NameEnvironment
     problems: Problems
 
     def inside_memory_function(self, *functions: str) -> TypingContext:
-        """Return the context for an argument of a function with memory, which may use `functions`."""
+        """Return the context for an argument of a function with memory.
+
+        Of the functions with memory only `functions` are allowed there.
+        """
 
     def infer_type(self, tree: SyntaxTree) -> ExprType | None:
-        """Return the type of an expression, None where a problem was reported inside it."""
+        """Return the type of an expression; None if a problem was reported inside it."""
 
     def require_real(self, kind: ExprType | None, tree: SyntaxTree) -> Dimension | None:
-        """Return the dimension of a real quantity; reports an expression of another type."""
+        """Return the dimension of a type used as a real; report another type and return None."""
 
     def check_quantity(self, tree: SyntaxTree, expected: Dimension, what: str) -> None:
-        """Check that an expression is a quantity of the expected dimension."""
+        """Report an expression that is not a quantity of the expected dimension."""
 
     def check_condition(self, tree: SyntaxTree, what: str) -> None:
-        """Check that an expression is a condition."""
+        """Report an expression that is not a condition."""
 
     def unify_dimensions(
         self,
@@ -41,7 +44,10 @@ class TypingContext(Protocol):
         span: Span,
         what: str,
     ) -> Dimension | None:
-        """Return the common dimension of two operands; reports operands that do not fit."""
+        """Return the common dimension of two operands.
+
+        Report operands that do not fit and return None.
+        """
 
     def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
-        """Report a problem."""
+        """Report a problem as an error."""
