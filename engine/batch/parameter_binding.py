@@ -249,9 +249,8 @@ def _with_parameter_value(system: System, name: str, value: float) -> System:
     A derived parameter becomes fixed.
     """
     owner, _, short = name.partition(".")
-    exact = Fraction(
-        repr(float(value))
-    )  # the shortest decimal, so that a wait of 2 ms is exactly two ticks
+    # The shortest decimal is exact, so that a wait of 2 ms has two ticks of 1 ms.
+    exact = Fraction(repr(float(value)))
 
     def with_value(automaton: Automaton) -> Automaton:
         old = automaton.parameters.get(short)
@@ -280,9 +279,9 @@ def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
     """
     owner, _, short = name.partition(".")
     values = batch.parameters[name]
-    own = _single_instance_system(batch.system, owner)
+    single_system = _single_instance_system(batch.system, owner)
     ends = [
-        _with_parameter_value(own, name, end)
+        _with_parameter_value(single_system, name, end)
         for end in sorted({float(min(values)), float(max(values))})
     ]
     for system in ends:
@@ -303,9 +302,9 @@ def _rebuild_reason(batch: Batch, scenario: Scenario, name: str) -> str | None:
 
 def _is_not_real(programs: Mapping[str, Program], name: str) -> bool:
     """Return whether a tunable parameter is not real in its Program, as a wait in ticks."""
-    owner, _, own = name.partition(".")
+    owner, _, short = name.partition(".")
     constants = programs[owner].constants if owner in programs else ()
-    return any(c.name == f"calibration.{own}" and c.type != "real" for c in constants)
+    return any(c.name == f"calibration.{short}" and c.type != "real" for c in constants)
 
 
 def _single_instance_system(system: System, owner: str) -> System:

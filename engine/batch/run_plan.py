@@ -170,7 +170,7 @@ def _happens(instants: Integers, grids: Sequence[Integers]) -> NDArray[np.uint32
 
 
 def _row_at(instants: Integers, rows: Integers) -> Integers:
-    """Return the number of the row at each instant, NEVER where there is none."""
+    """Return the number of the row at each instant; `NO_ROW` at an instant without row."""
     found = np.full(len(instants), NO_ROW, dtype=np.int64)
     at = np.isin(rows, instants, assume_unique=True)
     found[np.searchsorted(instants, rows[at])] = np.flatnonzero(at)

@@ -24,7 +24,7 @@ class FastPath:
         self._happened = stepper.make_reader(("work.event", "work.left"))
 
     def locate_step(self, time: Fraction) -> tuple[int, bool]:
-        """Return the last major step up to a time, and whether the time is after it."""
+        """Return the index of the last major step up to a time [s], and whether time is later."""
         step = self._step
         number, rest = divmod(time.numerator * step.denominator, time.denominator * step.numerator)
         return number, rest > 0

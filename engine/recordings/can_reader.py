@@ -58,7 +58,7 @@ def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]
     the project.
     """
     problems = Problems()
-    found: dict[FrameKey, Any] = {}
+    messages: dict[FrameKey, Any] = {}
     for written in mapping.databases:
         folders = (Path(written.span.source.name).parent, Path())
         paths = [folder / written.text for folder in folders if path_exists(folder / written.text)]
@@ -77,12 +77,12 @@ def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]
             )
             try:
                 database = cantools.database.load_file(paths[0])
-                found |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
+                messages |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
             except Exception as error:  # the library raises errors of any type for a broken file
                 label = f"`{written.text}` cannot be understood: {_first_line(error)}"
                 problems.error("unreadable", written.span, label)
     problems.raise_if_errors()
-    return found
+    return messages
 
 
 def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[CanFrame]]:
@@ -91,18 +91,18 @@ def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[Ca
     Raises SpecError if the log cannot be understood.
     """
     readers = {".blf": can.BLFReader, ".asc": can.ASCReader, ".log": can.CanutilsLogReader}
-    found: dict[FrameKey, list[CanFrame]] = {}
+    frames: dict[FrameKey, list[CanFrame]] = {}
     try:
         with readers[path.suffix.lower()](str(path)) as log:
             for frame in log:
                 if not (frame.is_error_frame or frame.is_remote_frame):
                     key = (frame.arbitration_id, frame.is_extended_id)
-                    found.setdefault(key, []).append((frame.timestamp, bytes(frame.data)))
+                    frames.setdefault(key, []).append((frame.timestamp, bytes(frame.data)))
     except Exception as error:  # the library raises errors of any type for a broken file
         raise unreadable_error(
             source, f"understood as a log of CAN frames: {_first_line(error)}"
         ) from None
-    return found
+    return frames
 
 
 class _CanLog:
@@ -124,7 +124,7 @@ class _CanLog:
     def to_recorded_file(self) -> RecordedFile:
         """Return the log as a recorded file of the signals whose messages occur in it."""
         names = [
-            name for name, found in self.places.items() for key, _ in found if key in self.frames
+            name for name, places in self.places.items() for key, _ in places if key in self.frames
         ]
         count = sum(len(frames) for frames in self.frames.values())
         return RecordedFile(

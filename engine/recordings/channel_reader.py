@@ -94,7 +94,7 @@ class ChannelReader:
         stamps = None if self.has_max_problems else _parse_plain_stamps(samples)
         if stamps is not None:
             return [value * factor for value in stamps] if factor != 1 else [*stamps]
-        found: list[Fraction | None] = []
+        result: list[Fraction | None] = []
         last: Fraction | None = None
         rounded = -math.inf
         for k in range(len(samples.values)):
@@ -112,8 +112,8 @@ class ChannelReader:
                 if last is not None and number <= rounded and value <= last:
                     self._report_unsorted(text, last, samples.place(k))
                 last, rounded = value, number
-            found.append(value)
-        return found
+            result.append(value)
+        return result
 
     def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
         """Report a time stamp that is not above the previous one."""
@@ -191,7 +191,7 @@ class ChannelReader:
         scaled = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
         if scaled is not None:
             return [*scaled]
-        found: list[float | None] = []
+        result: list[float | None] = []
         for k, value in enumerate(samples.values):
             if self.has_max_problems:
                 break
@@ -203,8 +203,8 @@ class ChannelReader:
                 label = f"{self.file.noun} `{name}` has no value here"
                 hint = "`blank: skip` in the map leaves empty cells out"
                 self.problems.error("value", samples.place(k), label, hint)
-            found.append(None if value is None else value * factor + offset)
-        return found
+            result.append(None if value is None else value * factor + offset)
+        return result
 
     def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
         """Report a known unit of the file that differs from the unit of the map."""
@@ -241,13 +241,13 @@ def _scale_all(
 
 def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
     """Return the mean of each row over columns of equal length; None if a cell has no value."""
-    found: list[float | None] = []
+    means: list[float | None] = []
     for row in zip(*columns, strict=False):
         total = 0.0
         for cell in row:
             total += cell or 0.0
-        found.append(None if None in row else total / len(row))
-    return found
+        means.append(None if None in row else total / len(row))
+    return means
 
 
 def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
@@ -263,8 +263,8 @@ def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
     texts = [samples.text(k) for k in range(len(numbers))]
     if not STAMP_LINES.fullmatch("\n".join(texts)) or max(map(len, texts)) > MAX_STAMP_LENGTH:
         return None
-    found = [_parse_plain_stamp(text) for text in texts]
-    return found if max(-found[0], found[-1]) < TIME_LIMIT else None
+    stamps = [_parse_plain_stamp(text) for text in texts]
+    return stamps if max(-stamps[0], stamps[-1]) < TIME_LIMIT else None
 
 
 @lru_cache(STAMP_CACHE_SIZE)

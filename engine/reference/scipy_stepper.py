@@ -88,8 +88,8 @@ def evaluated_guards(program: Program, mode: ModeInfo) -> tuple[str, ...]:
     These are the guards of transitions from the mode and those of all parallel regions.
     """
     infos = program.transitions
-    found = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
-    return tuple(dict.fromkeys(found))
+    slots = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
+    return tuple(dict.fromkeys(slots))
 
 
 class ScipyStepper:

@@ -90,9 +90,9 @@ class RunDifference:
     @property
     def first(self) -> tuple[float, str] | None:
         """First time [s] and signal that differ, modes included; None if there is none."""
-        found = [(item.first, item.name) for item in self.signals if item.first is not None]
-        found += [(window.start, window.signal) for window in self.windows]
-        return min(found, default=None)
+        differences = [(item.first, item.name) for item in self.signals if item.first is not None]
+        differences += [(window.start, window.signal) for window in self.windows]
+        return min(differences, default=None)
 
 
 def compare_runs(
@@ -122,13 +122,13 @@ def compare_runs(
         if name not in modes:
             allowed = _tolerance_of(name, a, relative, tolerances or {})
             signals.append(_compare_signal(name, a, b, times, allowed))
-    windows = [found for name in modes for found in _mode_windows(name, a, b, times)]
+    windows = [window for name in modes for window in _mode_windows(name, a, b, times)]
     bounds = (float(times[0]), float(times[-1]))
     return RunDifference(
         span=bounds,
         samples=len(times),
         signals=tuple(signals),
-        windows=tuple(found for found in windows if found.end - found.start > slack),
+        windows=tuple(window for window in windows if window.end - window.start > slack),
         sequences=tuple(_compare_mode_sequences(a, b, common, bounds)),
         only_a=tuple(name for name in names if name not in b.signals),
         only_b=tuple(n for n in b.signals if n not in a.signals and _matches(n, patterns)),
@@ -144,8 +144,8 @@ def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
     if values.dtype == np.int64:
         return _hold_previous(trajectory.times, values, times).astype(np.float64)
     with np.errstate(invalid="ignore"):
-        found: Reals = np.interp(times, trajectory.times, values)
-    return found
+        resampled: Reals = np.interp(times, trajectory.times, values)
+    return resampled
 
 
 def _hold_previous(sample_times: Reals, values: SignalArray, times: Reals) -> SignalArray:
@@ -163,9 +163,9 @@ def _common_times(
     """
     if not len(a.times) or not len(b.times):
         raise ValueError("a run without samples cannot be compared")
-    wanted = span or (-np.inf, np.inf)
-    starts = [max(float(run.times[0]), wanted[0]) for run in (a, b)]
-    ends = [min(float(run.times[-1]), wanted[1]) for run in (a, b)]
+    limits = span or (-np.inf, np.inf)
+    starts = [max(float(run.times[0]), limits[0]) for run in (a, b)]
+    ends = [min(float(run.times[-1]), limits[1]) for run in (a, b)]
     times = a.times[(a.times >= max(starts)) & (a.times <= min(ends))]
     if not len(times):
         raise ValueError("the runs have no time in common")
@@ -200,8 +200,10 @@ def _tolerance_of(
     """Return the allowed difference of a signal in SI: the largest that applies."""
     values = np.abs(run.signals[name].astype(np.float64))
     peak = float(np.max(values, initial=0.0, where=np.isfinite(values)))
-    given = [value for pattern, value in tolerances.items() if fnmatch.fnmatchcase(name, pattern)]
-    return max([relative * peak, *given])
+    matching = [
+        value for pattern, value in tolerances.items() if fnmatch.fnmatchcase(name, pattern)
+    ]
+    return max([relative * peak, *matching])
 
 
 def _compare_signal(
@@ -211,13 +213,13 @@ def _compare_signal(
     values_a, values_b = resample_signal(a, name, times), resample_signal(b, name, times)
     same = (values_a == values_b) | (np.isnan(values_a) & np.isnan(values_b))
     with np.errstate(invalid="ignore", over="ignore"):
-        apart = np.where(same, 0.0, np.abs(values_a - values_b))
-        apart = np.where(np.isnan(apart), np.inf, apart)
-        rms = float(np.sqrt(np.mean(apart**2)))
-    beyond = np.flatnonzero(apart > allowed)
-    worst = int(np.argmax(apart))
+        deviation = np.where(same, 0.0, np.abs(values_a - values_b))
+        deviation = np.where(np.isnan(deviation), np.inf, deviation)
+        rms = float(np.sqrt(np.mean(deviation**2)))
+    beyond = np.flatnonzero(deviation > allowed)
+    worst = int(np.argmax(deviation))
     first = float(times[beyond[0]]) if len(beyond) else None
-    largest = float(apart[worst])
+    largest = float(deviation[worst])
     return SignalDifference(name, a.units[name], rms, largest, float(times[worst]), allowed, first)
 
 
@@ -248,12 +250,12 @@ def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> 
     """
     names = run.modes.get(name) or other.modes[name]
     values = run.signals[name]
-    held = (
+    numbers = (
         values
         if run.times.tobytes() == times.tobytes()
         else _hold_previous(run.times, values, times)
     )
-    return [names.get(int(number), str(number)) for number in held]
+    return [names.get(int(number), str(number)) for number in numbers]
 
 
 def _compare_mode_sequences(
@@ -267,11 +269,11 @@ def _compare_mode_sequences(
         return []  # a run of samples alone has no events to compare
     compared = {name.rpartition(".")[0] for name in common}
     parts = dict.fromkeys((event.instance, event.region) for event in (*a.events, *b.events))
-    found = []
+    sequences = []
     for instance, region in parts:
         if compared != {""} and instance not in compared:
             continue
-        ours, theirs = (
+        events_a, events_b = (
             [
                 event
                 for event in _events_within(run.events_of(instance), span)
@@ -279,16 +281,16 @@ def _compare_mode_sequences(
             ]
             for run in (a, b)
         )
-        pairs = list(zip(ours, theirs, strict=False))
+        pairs = list(zip(events_a, events_b, strict=False))
         same = next(
             (k for k, (x, y) in enumerate(pairs) if (x.source, x.target) != (y.source, y.target)),
             len(pairs),
         )
-        parted = None if same == len(ours) == len(theirs) else same
-        apart = max((abs(x.time - y.time) for x, y in pairs[:same]), default=0.0)
+        parted = None if same == len(events_a) == len(events_b) else same
+        time_distance = max((abs(x.time - y.time) for x, y in pairs[:same]), default=0.0)
         name = instance if region == CHART else f"{instance}.{region}"
-        found.append(ModeSequence(name, len(ours), len(theirs), parted, apart))
-    return found
+        sequences.append(ModeSequence(name, len(events_a), len(events_b), parted, time_distance))
+    return sequences
 
 
 def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:

@@ -72,11 +72,11 @@ class Schedule:
                 if read in system.delayed_signals
             ):
                 reader, owner = connection.target[0], line.source.partition(".")[0]
-                at = self.captures.setdefault(line.name, [])
+                captures = self.captures.setdefault(line.name, [])
                 ticking = self.ticks.get(owner) or self.samples.get(line.source)
                 if reader in self.ticks and ticking is None and line.source not in system.inputs:
-                    own = self.ticks[reader]
-                    at.append(TimeGrid(own.start - line.delay, own.period))
+                    reader_ticks = self.ticks[reader]
+                    captures.append(TimeGrid(reader_ticks.start - line.delay, reader_ticks.period))
                 elif reader not in self.ticks and ticking is not None:
                     self._arrivals.append(TimeGrid(ticking.start + line.delay, ticking.period))
         pages = (page.time for page in scenario.calibrations)

@@ -54,17 +54,17 @@ class InputWiring:
         """
         stepper, changed = self.steppers[name], False
         for connection in self.wires[name]:
-            thing = connection.target[1]
+            input_name = connection.target[1]
             value = self.signals.evaluate_connection(connection)
-            kind = self.system.instances[name].automaton.inputs[thing].type
+            kind = self.system.instances[name].automaton.inputs[input_name].type
             if kind != "real":
                 value = bool(value) if kind == "bool" else int(value)
-            before = stepper.get(f"input.{thing}")
-            stepper.set(f"input.{thing}", value)
-            now = stepper.get(f"input.{thing}")
-            if not math.isfinite(now) and (name, thing) not in self._saturated:
+            before = stepper.get(f"input.{input_name}")
+            stepper.set(f"input.{input_name}", value)
+            now = stepper.get(f"input.{input_name}")
+            if not math.isfinite(now) and (name, input_name) not in self._saturated:
                 place = describe_instant(name, self.programs[name], stepper, time)
-                raise SimulationStopped(f"{place}: input `{thing}` is {now}")
+                raise SimulationStopped(f"{place}: input `{input_name}` is {now}")
             changed = changed or now != before
         return changed
 
@@ -75,13 +75,13 @@ class InputWiring:
         are the sensors with a sample period.
         """
         for connection in self.wires[name]:
-            thing = connection.target[1]
+            input_name = connection.target[1]
             read = [sensor for sensor in connection.reads if sensor in sampling]
-            if read and (name, thing) in self._flags:
+            if read and (name, input_name) in self._flags:
                 counts = {sensor: self.signals.sensors[sensor].count for sensor in read}
-                news = [self._seen.get((name, thing, s), 0) != n for s, n in counts.items()]
-                self._seen.update({(name, thing, s): count for s, count in counts.items()})
-                self.steppers[name].set(f"is_new.{thing}", any(news))
+                are_new = [self._seen.get((name, input_name, s), 0) != n for s, n in counts.items()]
+                self._seen.update({(name, input_name, s): count for s, count in counts.items()})
+                self.steppers[name].set(f"is_new.{input_name}", any(are_new))
 
 
 def describe_instant(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:

@@ -218,9 +218,9 @@ class _TickRecorder:
                     self.squares[name] += stepper.get(name) ** 2
                     self.counts[name] += 1
         name, program = self.program.name, self.program
-        taken = fired_by_micro_step(program, stepper)
+        fired = fired_by_micro_step(program, stepper)
         self.events += [
-            transition_event(name, program, info, float(time), step) for step, info in taken
+            transition_event(name, program, info, float(time), step) for step, info in fired
         ]
         self.mode = stepper.get("memory.mode")
 

@@ -100,7 +100,7 @@ class Signals:
     def read_inputs(self, time: Fraction) -> None:
         """Set the instant and evaluate every input of the system there."""
         self.time = time
-        self._inputs = {name: course.at(time) for name, course in self.courses.items()}
+        self._inputs = {name: signal.at(time) for name, signal in self.courses.items()}
 
     def current_value(self, name: str) -> Any:
         """Return the present value of a signal.
@@ -124,10 +124,10 @@ class Signals:
 
         Only inputs, and delayed inputs, with a varying stimulus do.
         """
-        course = self.courses.get(name)
-        if course is None and name in self.lines:
-            course = self.lines[name].course
-        return course is not None and course.varies
+        signal = self.courses.get(name)
+        if signal is None and name in self.lines:
+            signal = self.lines[name].course
+        return signal is not None and signal.varies
 
     def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
         """Return a reader of signals at a time [s] within the step that began at `since`.
@@ -137,9 +137,9 @@ class Signals:
         """
 
         def read(name: str) -> Any:
-            course = self.courses.get(name)
-            if course:
-                return course.at(time, since)
+            signal = self.courses.get(name)
+            if signal:
+                return signal.at(time, since)
             line = self.lines.get(name)
             return line.at(time, since) if line and line.course else self.current_value(name)
 

@@ -376,13 +376,13 @@ class _AutomatonChecker:
         These are the nested leaves of the chart, or all modes if there is no such leaf.
         """
         automaton = self.automaton
-        found = list(automaton.modes.values())
+        modes = list(automaton.modes.values())
         if automaton.statechart:
             chart = automaton.statechart
             node = next(node for node in chart.nodes if node.mode_key == mode.key)
             leaves = [n for n in chart.leaves(CHART) if chart.are_nested(n.index, node.index)]
-            found = [automaton.modes_by_key[leaf.mode_key] for leaf in leaves] or found
-        return found
+            modes = [automaton.modes_by_key[leaf.mode_key] for leaf in leaves] or modes
+        return modes
 
     def _check_transitions(self, mode: Mode, check: TypeChecker) -> None:
         """Check the transitions of a mode; waits may read parameters only."""

@@ -40,23 +40,31 @@ def unreachable_chart_modes(
     `dead_transitions` are keys. The set of modes that a history can enter is over-estimated. The
     fault mode and the initial modes are reachable.
     """
-    seen = {node.index for node in chart.initial_configuration()}
+    reachable = {node.index for node in chart.initial_configuration()}
     if automaton.fault_mode:
-        seen.update(
+        reachable.update(
             _entry_set(chart, [n.index for n in chart.nodes if n.path == automaton.fault_mode])
         )
     while True:
         targets: list[int] = []
         for node in chart.nodes[ROOT + 1 :]:
             mode = automaton.modes_by_key.get(node.mode_key)
-            if node.index in seen and mode:
-                ways = (way for way in mode.transitions if way.key not in dead_transitions)
-                targets += [t for way in ways for t in chart.transitions[way.key].targets]
-        more = seen | _entry_set(chart, targets)
-        if more == seen:
+            if node.index in reachable and mode:
+                transitions = (
+                    transition
+                    for transition in mode.transitions
+                    if transition.key not in dead_transitions
+                )
+                targets += [
+                    t
+                    for transition in transitions
+                    for t in chart.transitions[transition.key].targets
+                ]
+        more = reachable | _entry_set(chart, targets)
+        if more == reachable:
             break
-        seen = more
-    nodes = (node for node in chart.nodes if node.mode_key and node.index not in seen)
+        reachable = more
+    nodes = (node for node in chart.nodes if node.mode_key and node.index not in reachable)
     return [automaton.modes_by_key[node.mode_key] for node in nodes]
 
 
@@ -66,15 +74,15 @@ def _entry_set(chart: Chart, targets: list[int]) -> set[int]:
     These are the initial configurations of the nodes, their ancestors, and the other regions of
     parallel ancestors.
     """
-    found: set[int] = set()
+    entered: set[int] = set()
     for target in targets:
         node = chart.nodes[target]
-        found.update(inner.index for inner in chart.entry_set(node, ()))
+        entered.update(inner.index for inner in chart.entry_set(node, ()))
         for outer in chart.ancestors(node):
-            found.add(outer.index)
+            entered.add(outer.index)
             if outer.kind == "parallel":
-                found.update(inner.index for inner in chart.entry_set(outer, [target]))
-    return found
+                entered.update(inner.index for inner in chart.entry_set(outer, [target]))
+    return entered
 
 
 def _check_inner(chart: Chart, node: ChartNode, mode: Mode, problems: Problems) -> None:
@@ -126,11 +134,15 @@ def _check_history(
     The history stores the last configuration before the mode was left, and this transition does not
     leave it.
     """
-    way = chart.transitions[transition.key]
-    for index in way.targets:
+    chart_transition = chart.transitions[transition.key]
+    for index in chart_transition.targets:
         target = chart.nodes[index]
         outer = chart.nodes[target.parent]
-        stays = way.domain is not None and outer.contains(way.domain) and outer.contains(node.index)
+        stays = (
+            chart_transition.domain is not None
+            and outer.contains(chart_transition.domain)
+            and outer.contains(node.index)
+        )
         if target.kind == "history" and stays and target.initial:
             label = f"`{target.name}` is what `{outer.path}` was left in, which this does not leave"
             back = chart.nodes[target.initial[0]]
@@ -161,9 +173,15 @@ def _can_leave_both(chart: Chart, left: ChartNode, right: ChartNode) -> bool:
     Both regions need a transition with a domain; one of these domains has to contain the parallel
     mode.
     """
-    ways = [way for way in chart.transitions.values() if way.domain is not None]
-    from_left = [way.domain for way in ways if left.contains(way.source)]
-    from_right = [way.domain for way in ways if right.contains(way.source)]
+    transitions = [
+        transition for transition in chart.transitions.values() if transition.domain is not None
+    ]
+    from_left = [
+        transition.domain for transition in transitions if left.contains(transition.source)
+    ]
+    from_right = [
+        transition.domain for transition in transitions if right.contains(transition.source)
+    ]
     if not from_left or not from_right:
         return False
     outer = left.parent
@@ -191,8 +209,8 @@ def _check_memory(
     targets = chart.transitions[transition.key].targets
     reached = [n for n in chart.nodes if any(chart.are_nested(n.index, t) for t in targets)]
     modes = [automaton.modes_by_key[node.mode_key] for node in reached if node.mode_key]
-    kept = any(way.wait for mode in modes for way in mode.transitions)
-    if transition.memory == "continue" and not kept:
+    has_counters = any(each.wait for mode in modes for each in mode.transitions)
+    if transition.memory == "continue" and not has_counters:
         label = "`memory: continue` keeps wait counters: nothing that is entered has one"
         hint = "states belong to the automaton and keep their values anyway"
         problems.error("form", transition.span, label, hint)
@@ -225,9 +243,9 @@ def _assigned_names(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]
     for formulas in (mode.entry, mode.exit):
         yield from ((name, formula.span, False) for name, formula in formulas.items())
     yield from ((name, formula.span, True) for name, formula in mode.update.items())
-    for way in mode.transitions:
-        stays = chart.transitions[way.key].domain is None
-        yield from ((name, formula.span, stays) for name, formula in way.reset.items())
+    for transition in mode.transitions:
+        stays = chart.transitions[transition.key].domain is None
+        yield from ((name, formula.span, stays) for name, formula in transition.reset.items())
 
 
 def _are_parallel(chart: Chart, left: str, right: str) -> bool:

@@ -30,7 +30,9 @@ DELAYED_PREFIXES = ("memory.previous", "memory.delay")
 AGE_PREFIXES = (TIME_IN_MODE, "memory.every")
 """Variables that restart when a mode is entered."""
 CYCLE_HINT = "let one of them wait, or its guard exclude the one before"
+"""Hint for a cycle without events."""
 EVENT_HINT = "let one of them raise no event"
+"""Hint for a cycle with events."""
 
 
 def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
@@ -41,18 +43,20 @@ def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems
     chart = automaton.statechart
     if chart is None or chart.micro_steps < 2:
         return
-    ways = {way.key: way for mode in automaton.all_modes for way in mode.transitions}
-    after = {key: list(_possible_successors(automaton, chart, way)) for key, way in ways.items()}
+    transitions = {each.key: each for mode in automaton.all_modes for each in mode.transitions}
+    after = {
+        key: list(_possible_successors(automaton, chart, each)) for key, each in transitions.items()
+    }
     for members in islice(simple_cycles(after), MAX_CYCLES):
-        way = tuple(ways[key] for key in members)
-        found = _find_endless_witness(automaton, chart, way, query_engine)
-        if found:
-            path = " -> ".join(f"`{each.source}`" for each in (*way, way[0]))
+        cycle = tuple(transitions[key] for key in members)
+        witness = _find_endless_witness(automaton, chart, cycle, query_engine)
+        if witness:
+            path = " -> ".join(f"`{each.source}`" for each in (*cycle, cycle[0]))
             label = "this fires in every micro-step of a tick"
-            label += f": {path}" if way[0].targets else ""
-            hint = EVENT_HINT if way[0].events else CYCLE_HINT
-            hint = hint if way[0].targets else _self_loop_hint(automaton, way[0])
-            problems.warning("cycle", way[-1].span, label, found.hint_prefix + hint)
+            label += f": {path}" if cycle[0].targets else ""
+            hint = EVENT_HINT if cycle[0].events else CYCLE_HINT
+            hint = hint if cycle[0].targets else _self_loop_hint(automaton, cycle[0])
+            problems.warning("cycle", cycle[-1].span, label, witness.hint_prefix + hint)
 
 
 def _self_loop_hint(automaton: Automaton, transition: Transition) -> str:
@@ -60,17 +64,21 @@ def _self_loop_hint(automaton: Automaton, transition: Transition) -> str:
 
     The hint depends on whether the guard reads time and whether the source is a superstate.
     """
-    own = automaton.source_mode(transition)
+    source = automaton.source_mode(transition)
     reads_time = any(
         isinstance(part, FunctionCall) and part.function in TIME_FUNCTIONS
         for part in walk(transition.when.tree)
     )
     if not reads_time and not transition.wait:
         return "`to: []` starts nothing anew: write `rising(...)`"
-    if own in automaton.superstates:
-        hint = f"`to: []` starts no time anew, and `to: {own.name}` starts what is inside anew: let"
-        return f"{hint} a mode of a region beside go to itself when `in({own.name}) and after(...)`"
-    hint = f"`to: []` starts nothing anew: write `to: {own.name}` and `after(...)`"
+    if source in automaton.superstates:
+        hint = (
+            f"`to: []` starts no time anew, and `to: {source.name}` starts what is inside anew: let"
+        )
+        return (
+            f"{hint} a mode of a region beside go to itself when `in({source.name}) and after(...)`"
+        )
+    hint = f"`to: []` starts nothing anew: write `to: {source.name}` and `after(...)`"
     return hint if reads_time else f"{hint}, or `rising(...)`"
 
 
@@ -93,8 +101,8 @@ def _possible_successors(
     if any(target.kind == "history" for target in targets):
         return
     entered = {node.index for target in targets for node in chart.entry_set(target, ())}
-    around = {node.index for target in targets for node in chart.ancestors(target)}
-    for index in sorted(entered | around):
+    ancestors = {node.index for target in targets for node in chart.ancestors(target)}
+    for index in sorted(entered | ancestors):
         mode = automaton.modes_by_key.get(chart.nodes[index].mode_key)
         for other in mode.transitions if mode else ():
             if other.targets and not (other.wait and evaluate_exactly(other.wait, automaton)):
@@ -128,8 +136,8 @@ def _find_endless_witness(
         return None
     if not query.variables:
         return Witness({}, "") if query.holds_at({}) else None
-    found = query_engine.answer(query)
-    return found if isinstance(found, Witness) else None
+    answer = query_engine.answer(query)
+    return answer if isinstance(answer, Witness) else None
 
 
 def _has_required_events(automaton: Automaton, chart: Chart, cycle: Cycle) -> bool:
@@ -195,7 +203,11 @@ def _is_constant_in_tick(
     """
     written: set[str] = set()
     for mode in automaton.all_modes:
-        for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):
+        for formulas in (
+            mode.entry,
+            mode.exit,
+            *(transition.reset for transition in mode.transitions),
+        ):
             written.update(formulas)
     return not any(
         name.startswith(("mode.", *changing_prefixes)) or name.partition(".")[2] in written

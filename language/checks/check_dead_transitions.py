@@ -48,8 +48,10 @@ def check_dead_transitions(
             if _waits_for_unraised_event(automaton, transition):
                 names = " or ".join(f"`{name}`" for name in transition.events)
                 label = f"this never fires: nothing raises {names}, and no input is it"
-                one = transition.events[0]
-                hint = f"`raise: {one}` on a transition, or `events: {{{one}: {{from: input}}}}`"
+                event = transition.events[0]
+                hint = (
+                    f"`raise: {event}` on a transition, or `events: {{{event}: {{from: input}}}}`"
+                )
                 problems.warning("dead", transition.span, label, hint)
                 dead_transitions.add(transition.key)
                 continue
@@ -85,11 +87,13 @@ def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems:
     for mode in automaton.all_modes:
         guards = _ModeGuards(automaton, mode, query_engine)
         for earlier, later in _waiting_pairs(mode):
-            if any(tunable_wait(automaton, way.wait) for way in (earlier, later)):
+            if any(tunable_wait(automaton, transition.wait) for transition in (earlier, later)):
                 continue
-            first, second = (_wait_seconds(automaton, way) for way in (earlier, later))
-            apart = abs(first - second)
-            if first and second and 0 < apart < automaton.period:
+            first, second = (
+                _wait_seconds(automaton, transition) for transition in (earlier, later)
+            )
+            difference = abs(first - second)
+            if first and second and 0 < difference < automaton.period:
                 if guards.are_exclusive(earlier, later):
                     continue
                 times = [f"{float(time) * 1e3:g} ms" for time in (second, first, automaton.period)]
@@ -107,11 +111,15 @@ def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems
     """
     superstates = {mode.key for mode in automaton.superstates}
     for mode in automaton.all_modes:
-        ways = [way for each in _enclosing_modes(automaton, mode) for way in each.transitions]
+        transitions = [
+            transition
+            for each in _enclosing_modes(automaton, mode)
+            for transition in each.transitions
+        ]
         if (
             mode.key not in superstates
-            and ways
-            and all(way.key in dead_transitions for way in ways)
+            and transitions
+            and all(transition.key in dead_transitions for transition in transitions)
         ):
             label = f"mode `{mode.name}` cannot be left: none of its transitions ever fires"
             problems.warning("stuck", mode.span, label)
@@ -121,8 +129,8 @@ def _enclosing_modes(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
     """Yield a mode and the modes of a chart that enclose it."""
     yield mode
     chart = automaton.statechart
-    own = next(node for node in chart.nodes if node.mode_key == mode.key) if chart else None
-    for node in chart.ancestors(own) if chart and own else ():
+    own_node = next(node for node in chart.nodes if node.mode_key == mode.key) if chart else None
+    for node in chart.ancestors(own_node) if chart and own_node else ():
         if node.mode_key != mode.key and node.mode_key in automaton.modes_by_key:
             yield automaton.modes_by_key[node.mode_key]
 
@@ -174,11 +182,11 @@ class _ModeGuards:
 
         The result is False if a condition is None.
         """
-        found = [condition for condition in conditions if condition is not None]
-        if len(found) < len(conditions):
+        known = [condition for condition in conditions if condition is not None]
+        if len(known) < len(conditions):
             return False
         return self.query_engine.is_unsatisfiable(
-            self.query_engine.build_query(self.snapshot.path, found)
+            self.query_engine.build_query(self.snapshot.path, known)
         )
 
     def report_inner_shadow(self, transition: Transition, problems: Problems) -> bool:
@@ -186,26 +194,28 @@ class _ModeGuards:
 
         Return whether this was proven for every inner mode.
         """
-        found = list(inner_preceding_transitions(self.automaton, self.mode))
-        held = self.wait_of(transition)
-        for leaf, ways in found:
+        inner_transitions = list(inner_preceding_transitions(self.automaton, self.mode))
+        wait = self.wait_of(transition)
+        for leaf, transitions in inner_transitions:
             inside = _ModeGuards(self.automaton, leaf, self.query_engine)
-            first = [way for way in ways if not self.wait_of(way)]
-            first = [way for way in first if covers_events(self.automaton, way, transition)]
+            first = [each for each in transitions if not self.wait_of(each)]
+            first = [each for each in first if covers_events(self.automaton, each, transition)]
             others = [_negate(guard) for guard in map(inside.guard_of, first) if guard is not None]
             if not others or not inside.are_incompatible(inside.guard_of(transition), *others):
                 return False
         what = "one of the transitions inside, which win by `order`, fires"
-        return bool(found) and _report_shadow(transition, what, bool(held), problems, ORDER_HINT)
+        return bool(inner_transitions) and _report_shadow(
+            transition, what, bool(wait), problems, ORDER_HINT
+        )
 
     def never_fires(self, transition: Transition) -> bool:
         """Return whether it is proven that a guard never holds unless an earlier guard does.
 
         This single query excludes most transitions from the search for the reason.
         """
-        held = self.wait_of(transition)
-        others = (_negate(self.guard_of(way)) for way in self._earlier_transitions(transition))
-        return self.are_incompatible(self.guard_of(transition), *self._active_for(held), *others)
+        wait = self.wait_of(transition)
+        others = (_negate(self.guard_of(each)) for each in self._earlier_transitions(transition))
+        return self.are_incompatible(self.guard_of(transition), *self._active_for(wait), *others)
 
     def never_holds(self, transition: Transition) -> bool:
         """Return whether it is proven that a guard never holds."""
@@ -223,24 +233,24 @@ class _ModeGuards:
         guard = self.guard_of(transition)
         if guard is None:
             return False
-        before = {way.key for way in preceding_transitions(self.automaton, self.mode, transition)}
+        before = {each.key for each in preceding_transitions(self.automaton, self.mode, transition)}
         wait = _shortest_wait(self.automaton, transition)
         first = self._earlier_transitions(transition)
-        at_once = [way for way in first if way.key in before and not self.wait_of(way)]
+        at_once = [each for each in first if each.key in before and not self.wait_of(each)]
         lasted = self._active_for(wait)
-        for way in first:
-            own = self._active_for(wait - self.wait_of(way)) if way.key in before else ()
-            if self.are_incompatible(guard, *own, _negate(self.guard_of(way))):
-                what, hint = f"`{way.name}` fires", PRIORITY_HINT
-                if way.source != transition.source:
+        for each in first:
+            own = self._active_for(wait - self.wait_of(each)) if each.key in before else ()
+            if self.are_incompatible(guard, *own, _negate(self.guard_of(each))):
+                what, hint = f"`{each.name}` fires", PRIORITY_HINT
+                if each.source != transition.source:
                     what, hint = (
-                        f"`{way.name}` of `{way.source}`, which is around it, fires",
+                        f"`{each.name}` of `{each.source}`, which is around it, fires",
                         ORDER_HINT,
                     )
                 return _report_shadow(transition, what, bool(wait), problems, hint)
-        others = [_negate(self.guard_of(way)) for way in at_once]
+        others = [_negate(self.guard_of(each)) for each in at_once]
         if len(others) > 1 and self.are_incompatible(guard, *lasted, *others):
-            names = ", ".join(f"`{way.name}`" for way in at_once)
+            names = ", ".join(f"`{each.name}`" for each in at_once)
             what = f"one of {names} fires"
             return _report_shadow(transition, what, bool(wait), problems, PRIORITY_HINT)
         return False
@@ -252,15 +262,15 @@ class _ModeGuards:
         """
         wait = _shortest_wait(self.automaton, transition)
         before = {
-            way.key: way for way in preceding_transitions(self.automaton, self.mode, transition)
+            each.key: each for each in preceding_transitions(self.automaton, self.mode, transition)
         }
         own = self.mode.transitions
-        along = {way.key: way for way in own if covers_events(self.automaton, way, transition)}
-        ways = {**along, **before}.values()
+        along = {each.key: each for each in own if covers_events(self.automaton, each, transition)}
+        transitions = {**along, **before}.values()
         return [
-            way
-            for way in ways
-            if self.guard_of(way) is not None and self._fires_before(way, before, wait)
+            each
+            for each in transitions
+            if self.guard_of(each) is not None and self._fires_before(each, before, wait)
         ]
 
     def _fires_before(
@@ -270,11 +280,11 @@ class _ModeGuards:
 
         `before` has the transitions of higher precedence by their keys.
         """
-        own = self.wait_of(other)
+        other_wait = self.wait_of(other)
         if not wait:
-            return not own and other.key in before
+            return not other_wait and other.key in before
         leaves = bool(other.targets) and not other.internal
-        return (leaves and own < wait) or (own == wait and other.key in before)
+        return (leaves and other_wait < wait) or (other_wait == wait and other.key in before)
 
     def _active_for(self, wait: Fraction) -> tuple[Expr, ...]:
         """Return the condition that the mode has been active for a wait.
@@ -338,13 +348,13 @@ def _wait_range(automaton: Automaton, transition: Transition) -> Range:
     if tunable:
         return wait_range_in_ticks(automaton, automaton.parameters[tunable])
     wait = _wait_seconds(automaton, transition)
-    held = Fraction(seconds_to_ticks(automaton, wait)) if automaton.period else wait
-    return held, held
+    exact = Fraction(seconds_to_ticks(automaton, wait)) if automaton.period else wait
+    return exact, exact
 
 
 def _waiting_pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
     """Yield each pair of transitions of a mode that both have a wait."""
-    waiting = [way for way in mode.transitions if way.wait]
+    waiting = [transition for transition in mode.transitions if transition.wait]
     for position, later in enumerate(waiting):
         for earlier in waiting[:position]:
             yield earlier, later

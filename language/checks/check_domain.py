@@ -111,9 +111,9 @@ class _ModeDomainChecker:
         """Warn of spectral densities of an observer whose interval contains negative values."""
         noise = self.mode.observer.process_noise if self.mode.observer else {}
         for name, formula in noise.items():
-            found = self.unreported_range_analysis.analyse(formula.tree)
-            if found.is_certain and found.low < 0.0:
-                label = f"the density of `{name}` may be negative: from {found.low:g} on"
+            interval = self.unreported_range_analysis.analyse(formula.tree)
+            if interval.is_certain and interval.low < 0.0:
+                label = f"the density of `{name}` may be negative: from {interval.low:g} on"
                 help = "its square, its `abs`, or `max(0, ...)`"
                 self.problems.warning("observer", formula.span, label, help)
 
@@ -152,9 +152,9 @@ class _ModeDomainChecker:
             return self.unreported_range_analysis.analyse(parameter.derived.tree)
         if parameter is not None and parameter.kind == "fixed" and parameter.value is not None:
             return Interval(float(parameter.value), float(parameter.value), True)
-        thing = parameter or automaton.inputs.get(name) or automaton.state_variables.get(name)
-        if thing is not None:
-            limits = thing.range
+        declaration = parameter or automaton.inputs.get(name) or automaton.state_variables.get(name)
+        if declaration is not None:
+            limits = declaration.range
             return Interval(float(limits[0]), float(limits[1]), True) if limits else UNBOUNDED
         ranging = (
             self.range_analysis if name in self.mode.equations else self.unreported_range_analysis
@@ -196,11 +196,11 @@ class _ModeDomainChecker:
         """
         with suppress(KeyError, SpecError):
             snapshot = GuardSnapshot(self.automaton, self.mode)
-            around = [
+            branches = [
                 (snapshot.lower_expression(part), holds)
                 for part, holds in self.range_analysis.branch_path
             ]
-            conditions = [part if holds else Unary("not", part) for part, holds in around]
+            conditions = [part if holds else Unary("not", part) for part, holds in branches]
             value = snapshot.lower_expression(tree)
             conditions.append(Compare(OUTSIDE_RELATION[what], value, real(0)))
             query_engine = QueryEngine(self.automaton)

@@ -58,9 +58,9 @@ def _endless_cycles(automaton: Automaton, lengths: range) -> Iterator[tuple[Cycl
     if automaton.is_sampled:
         return  # see language/checks/check_chart_cycles.py
     query_engine = QueryEngine(automaton)
-    for way in instant_cycles(automaton):
-        for turn in range(len(way) if len(way) in lengths else 0):
-            cycle = (*way[turn:], *way[:turn])
+    for members in instant_cycles(automaton):
+        for start in range(len(members) if len(members) in lengths else 0):
+            cycle = (*members[start:], *members[:start])
             witness = _find_endless_witness(automaton, cycle, query_engine)
             if witness:
                 yield cycle, witness
@@ -75,17 +75,19 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
     is cached.
     """
     query_engine = QueryEngine(automaton)
-    ways = {way.key: way for way in instant_transitions(automaton)}
-    after: dict[str, list[str]] = {key: [] for key in ways}
-    for first, seconds in _candidate_successors(automaton, list(ways.values())):
+    transitions = {each.key: each for each in instant_transitions(automaton)}
+    after: dict[str, list[str]] = {key: [] for key in transitions}
+    for first, seconds in _candidate_successors(automaton, list(transitions.values())):
         after[first.key] = [
-            way.key for way in _feasible_successors(automaton, first, seconds, query_engine)
+            each.key for each in _feasible_successors(automaton, first, seconds, query_engine)
         ]
     follows: dict[tuple[str, str], bool] = {}
-    found: list[Cycle] = []
+    cycles: list[Cycle] = []
     for members in islice(simple_cycles(after), MAX_CYCLES):
-        way = tuple(ways[key] for key in members)
-        pairs = [(first, second) for first, second in zip(way, (*way[1:], way[0]), strict=True)]
+        cycle = tuple(transitions[key] for key in members)
+        pairs = [
+            (first, second) for first, second in zip(cycle, (*cycle[1:], cycle[0]), strict=True)
+        ]
         for first, second in pairs:
             key = first.key, second.key
             if key not in follows:
@@ -93,14 +95,18 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
             if not follows[key]:
                 break
         else:
-            found.append(way)
-    return tuple(found)
+            cycles.append(cycle)
+    return tuple(cycles)
 
 
 def instant_transitions(automaton: Automaton) -> list[Transition]:
     """Return the transitions without a wait, or with a wait of 0."""
-    found = [way for mode in automaton.all_modes for way in mode.transitions]
-    return [way for way in found if not (way.wait and evaluate_exactly(way.wait, automaton))]
+    transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
+    return [
+        transition
+        for transition in transitions
+        if not (transition.wait and evaluate_exactly(transition.wait, automaton))
+    ]
 
 
 def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
@@ -109,7 +115,7 @@ def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
     `after` gives the successors of each node. A cycle starts with its first node in the order of
     `after`.
     """
-    place = {name: number for number, name in enumerate(after)}
+    position = {name: number for number, name in enumerate(after)}
     for group in strongly_connected_components(after):
         inside = set(group)
         for start in group:
@@ -119,7 +125,7 @@ def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
                 for name in after[path[-1]]:
                     if name == start:
                         yield path
-                    elif name in inside and place[name] > place[start] and name not in path:
+                    elif name in inside and position[name] > position[start] and name not in path:
                         stack += [(*path, name)] if len(path) < MAX_CYCLE_LENGTH else []
 
 
@@ -133,19 +139,21 @@ def _candidate_successors(
     """
     modes: dict[str, list[str]] = {f"{m.region} {m.name}": [] for m in automaton.all_modes}
     leaving: dict[str, list[Transition]] = {}
-    for way in transitions:
-        modes[f"{way.region} {way.source}"].append(f"{way.region} {way.target}")
-        leaving.setdefault(f"{way.region} {way.source}", []).append(way)
+    for transition in transitions:
+        modes[f"{transition.region} {transition.source}"].append(
+            f"{transition.region} {transition.target}"
+        )
+        leaving.setdefault(f"{transition.region} {transition.source}", []).append(transition)
     groups = {
         name: number
         for number, group in enumerate(strongly_connected_components(modes))
         for name in group
     }
-    for way in transitions:
-        target = f"{way.region} {way.target}"
-        if groups[target] == groups[f"{way.region} {way.source}"]:
+    for transition in transitions:
+        target = f"{transition.region} {transition.target}"
+        if groups[target] == groups[f"{transition.region} {transition.source}"]:
             seconds = [(f"{second.region} {second.target}", second) for second in leaving[target]]
-            yield way, [second for name, second in seconds if groups[name] == groups[target]]
+            yield transition, [second for name, second in seconds if groups[name] == groups[target]]
 
 
 def _feasible_successors(
@@ -210,19 +218,19 @@ def _find_endless_witness(
     The result is None if there are none or if another region can interfere.
     """
     try:
-        found = query_engine.answer(
+        answer = query_engine.answer(
             query_engine.build_query(*path_constraints(automaton, cycle * 2))
         )
-        if not isinstance(found, Witness):
+        if not isinstance(answer, Witness):
             return None
-        if _may_be_disturbed(automaton, cycle, found):
+        if _may_be_disturbed(automaton, cycle, answer):
             return None
         bound = len(automaton.region(cycle[0].region).modes)
         rounds = bound // len(cycle) + 2
         lasting = query_engine.build_query(*path_constraints(automaton, cycle * rounds))
     except (KeyError, SpecError):
         return None
-    return found if lasting.holds_at(found.valuation) else None
+    return answer if lasting.holds_at(answer.valuation) else None
 
 
 def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> bool:
@@ -236,7 +244,7 @@ def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> b
 
 def _assigned_names(mode: Mode) -> Iterator[str]:
     """Yield the names that entry, exit and resets of a mode assign."""
-    for formulas in (mode.entry, mode.exit, *(way.reset for way in mode.transitions)):
+    for formulas in (mode.entry, mode.exit, *(transition.reset for transition in mode.transitions)):
         yield from formulas
 
 

@@ -24,13 +24,13 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
     if number == "float64":
         return
     for value, span in dict.fromkeys(_numbers_in(automaton)):
-        near = round_to_type(value, number)
-        if math.isinf(near):
+        rounded = round_to_type(value, number)
+        if math.isinf(rounded):
             label = (
                 f"{_format_short(value)} is beyond the largest {number}, {_largest_float32():.4g}"
             )
             problems.error("value", span, label, "`numbers: float64` has room for it")
-        elif near == 0.0 and value != 0:
+        elif rounded == 0.0 and value != 0:
             label = f"{_format_short(value)} is 0 in {number}"
             problems.error("value", span, label, "`numbers: float64` tells it from 0")
     check_ranges(automaton, problems)

@@ -71,10 +71,10 @@ def _check_reads(
             if read.path in observer.states:
                 label = f"`f` reads the observer's own state `{read.path}`: that belongs into `A`"
                 problems.error("observer", read.span, label)
-    held = {*automaton.parameters, *automaton.inputs, *automaton.states}
+    known = {*automaton.parameters, *automaton.inputs, *automaton.states}
     for formula in (*observer.f.values(), *observer.process_noise.values()):
         for read in names_of(formula.tree):
-            if read.path in kinds and read.path not in held:
+            if read.path in kinds and read.path not in known:
                 label = f"`{read.path}` is an equation: an observer reads states and inputs"
                 problems.error("observer", read.span, label)
 
@@ -97,8 +97,8 @@ def _observed_equations(automaton: Automaton, observer: Observer) -> dict[str, D
     model = automaton.model
     if observer.of is None or model is None:
         return {}
-    found = model.modes[observer.of].equations
-    return {name: model.dimensions[name] for name in found if name in model.dimensions}
+    equations = model.modes[observer.of].equations
+    return {name: model.dimensions[name] for name in equations if name in model.dimensions}
 
 
 def _check_point(automaton: Automaton, observer: Observer, check: TypeChecker) -> None:

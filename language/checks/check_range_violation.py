@@ -34,12 +34,14 @@ def check_range_violations(
                 if target is None or not _is_checked(target):
                     continue
                 try:
-                    found = _find_violation(automaton, mode, formula, guard, target, query_engine)
+                    witness = _find_violation(automaton, mode, formula, guard, target, query_engine)
                 except (KeyError, SpecError):
                     continue
-                if found:
+                if witness:
                     label = f"`{name}` may be past its range of {_format_range(target)} here"
-                    hint = f"at {found.text} in SI; limit the value with `clip`, or widen the range"
+                    hint = (
+                        f"at {witness.text} in SI; limit the value with `clip`, or widen the range"
+                    )
                     problems.warning("past", formula.span, label, hint)
 
 
@@ -88,10 +90,10 @@ def _find_violation(
     ):
         return None
     below, above = Compare("<", value, real(low)), Compare(">", value, real(high))
-    found = query_engine.answer(
+    answer = query_engine.answer(
         query_engine.build_query(snapshot.path, [*conditions, Binary("or", below, above)])
     )
-    return found if isinstance(found, Witness) else None
+    return answer if isinstance(answer, Witness) else None
 
 
 def _format_range(target: State) -> str:

@@ -49,15 +49,15 @@ def _unreachable_in_region(
     automaton: Automaton, region: Region, dead_transitions: set[str]
 ) -> list[str]:
     """Return the names of the unreachable modes of a region."""
-    found = unreachable_modes(region.modes, region.initial, dead_transitions)
+    unreachable = unreachable_modes(region.modes, region.initial, dead_transitions)
     fault_mode = automaton.fault_mode
     if fault_mode is not None and fault_mode in region.modes:
-        found = [
+        unreachable = [
             name
-            for name in found
+            for name in unreachable
             if name in unreachable_modes(region.modes, fault_mode, dead_transitions)
         ]
-    return found
+    return unreachable
 
 
 def check_final_modes(automaton: Automaton, problems: Problems) -> None:
@@ -71,14 +71,18 @@ def check_final_modes(automaton: Automaton, problems: Problems) -> None:
         return
     asked = _queried_nodes(automaton, chart)
     for node in chart.nodes[ROOT + 1 :]:
-        around = _completed_mode(chart, node)
-        if not node.is_final or around is None or node.index in asked:
+        completed = _completed_mode(chart, node)
+        if not node.is_final or completed is None or node.index in asked:
             continue
-        owner = automaton.modes_by_key[around.mode_key]
-        if not any(way.is_completion for way in owner.transitions):
-            label = f"`{node.name}` is final, but nothing goes on when `{around.name}` is at its "
+        owner = automaton.modes_by_key[completed.mode_key]
+        if not any(transition.is_completion for transition in owner.transitions):
+            label = (
+                f"`{node.name}` is final, but nothing goes on when `{completed.name}` is at its "
+            )
             label += "end"
-            hint = f"a transition of `{around.name}` without `when` and `event`; else leave `final`"
+            hint = (
+                f"a transition of `{completed.name}` without `when` and `event`; else leave `final`"
+            )
             hint += " out"
             problems.warning("stuck", automaton.modes_by_key[node.mode_key].span, label, hint)
 
@@ -94,12 +98,14 @@ def _completed_mode(chart: Chart, node: ChartNode) -> ChartNode | None:
 def _queried_nodes(automaton: Automaton, chart: Chart) -> set[int]:
     """Return the indices of the nodes that a guard or an equation reads by `in(...)`."""
     paths = mode_paths(chart)
-    trees = [way.when.tree for mode in automaton.all_modes for way in mode.transitions]
+    trees = [
+        transition.when.tree for mode in automaton.all_modes for transition in mode.transitions
+    ]
     trees += [each.tree for mode in automaton.all_modes for each in mode.equations.values()]
-    found: set[int] = set()
+    indices: set[int] = set()
     for part in (part for tree in trees for part in walk(tree)):
         if isinstance(part, FunctionCall) and part.function == "in":
             name = part.arguments[0]
             if isinstance(name, Name) and name.path in paths:
-                found.add(paths[name.path].index)
-    return found
+                indices.add(paths[name.path].index)
+    return indices

@@ -89,18 +89,18 @@ def _find_uncovered(
     `before` has the values of the first conditions, and `rows` agree with them. `width` is the
     number of conditions. A value of None means that the condition does not matter.
     """
-    place = len(before)
+    position = len(before)
     if not rows:
-        return before + (None,) * (width - place)
-    if any(all(mark is None for mark in row.marks[place:]) for row in rows):
+        return before + (None,) * (width - position)
+    if any(all(mark is None for mark in row.marks[position:]) for row in rows):
         return None
-    if all(row.marks[place] is None for row in rows):
+    if all(row.marks[position] is None for row in rows):
         return _find_uncovered(rows, (*before, None), width)
     for value in (True, False):
-        fitting = [row for row in rows if row.marks[place] in (value, None)]
-        found = _find_uncovered(fitting, (*before, value), width)
-        if found is not None:
-            return found
+        fitting = [row for row in rows if row.marks[position] in (value, None)]
+        uncovered = _find_uncovered(fitting, (*before, value), width)
+        if uncovered is not None:
+            return uncovered
     return None
 
 

@@ -19,7 +19,12 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
     """
     model = automaton.model
     read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
-    read |= {name for m in automaton.all_modes for way in m.transitions for name in way.events}
+    read |= {
+        name
+        for m in automaton.all_modes
+        for transition in m.transitions
+        for name in transition.events
+    }
     read |= {*_observer_names(automaton), *(_run_names(automaton) if model else ())}
     for name, parameter in automaton.parameters.items():
         if not (model and name in model.parameters) and name not in read:

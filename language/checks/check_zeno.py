@@ -79,13 +79,13 @@ def _find_zeno_equilibrium(
     path = SymbolicPath()
     start = snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
     exact: list[Expr] = []
-    near: list[Expr] = []
+    relaxed: list[Expr] = []
     assigned: dict[str, Expr] = {}
     for transition in cycle:
         guard = snapshot.lower_expression(transition.when.tree)
         becoming = _EnablingCondition(snapshot)
         exact.append(becoming.condition_for(guard, True))
-        near.append(_relax_equalities(exact[-1]))
+        relaxed.append(_relax_equalities(exact[-1]))
         after = snapshot.apply_transition(transition)
         for state in automaton.states:
             if after.bindings[state] != start.bindings[state]:
@@ -95,14 +95,14 @@ def _find_zeno_equilibrium(
                 )
                 same = Compare("==", after.bindings[state], start.bindings[state])
                 exact.append(same)
-                near.append(_relax_equalities(same))
+                relaxed.append(_relax_equalities(same))
         snapshot = after
     witness = query_engine.find_confirmed_witness(
-        query_engine.build_query(path, exact), query_engine.build_query(path, near)
+        query_engine.build_query(path, exact), query_engine.build_query(path, relaxed)
     )
     return (
         witness
-        if witness and _is_contracting(assigned, query_engine.build_query(path, near), witness)
+        if witness and _is_contracting(assigned, query_engine.build_query(path, relaxed), witness)
         else None
     )
 
@@ -114,11 +114,11 @@ def _is_contracting(assigned: Mapping[str, Expr], query: SolverQuery, witness: W
     1 and is not contracting.
     """
     for name, value in assigned.items():
-        place = float(witness.valuation.get(name, 0.0))
-        moved = place + SECANT_STEP * (1.0 + abs(place))
+        equilibrium = float(witness.valuation.get(name, 0.0))
+        moved = equilibrium + SECANT_STEP * (1.0 + abs(equilibrium))
         beside = query.value_at({**witness.valuation, name: moved}, value)
         here = query.value_at(witness.valuation, value)
-        if abs(beside - here) >= (1.0 - EQUALITY_TOLERANCE) * abs(moved - place):
+        if abs(beside - here) >= (1.0 - EQUALITY_TOLERANCE) * abs(moved - equilibrium):
             return False
     return True
 
@@ -146,11 +146,11 @@ class _EnablingCondition:
                 relation = operator if is_true else NEGATED_RELATION[operator]
                 return self._relation(relation, left, right)
             case Ref(name):
-                found = next(
+                assigned = next(
                     (v for target, v in self.snapshot.path.assignments if target == name), None
                 )
-                if found is not None:
-                    return self.condition_for(found, is_true)
+                if assigned is not None:
+                    return self.condition_for(assigned, is_true)
         return condition if is_true else Unary("not", condition)
 
     def _relation(self, operator: str, left: Expr, right: Expr) -> Expr:
@@ -180,6 +180,6 @@ def _relax_equalities(condition: Expr) -> Expr:
             return Binary(operator, _relax_equalities(left), _relax_equalities(right))
         case Compare("==", left, right) if not isinstance(left, Ref) or not left.is_integer:
             size = Binary("+", real(1.0), Call("abs", (right,)))
-            apart = Call("abs", (subtract(left, right),))
-            return Compare("<=", apart, multiply(real(EQUALITY_TOLERANCE), size))
+            difference = Call("abs", (subtract(left, right),))
+            return Compare("<=", difference, multiply(real(EQUALITY_TOLERANCE), size))
     return condition

@@ -150,14 +150,14 @@ class GuardSnapshot:
         """
         self._define_equations(formula.tree for formula in formulas.values())
         known = {**self.bindings, **values}
-        found = dict(values)
+        result = dict(values)
         for name, formula in formulas.items():
             is_whole = self.automaton.state_variables[name].type in WHOLE_TYPES
             target = f"{storage_of(self.automaton, name)} {len(self.path.assignments)}"
             value = lower_assigned_value(formula.tree, known, is_whole)
             self.path.assignments.append((target, value))
-            found[name] = Ref(target, is_whole)
-        return found
+            result[name] = Ref(target, is_whole)
+        return result
 
     def _mode_bindings(self) -> dict[str, Expr]:
         """Return the values of `in(...)`: constants for this region, comparisons for other regions.
@@ -165,18 +165,20 @@ class GuardSnapshot:
         The mode variables of other regions are added to the domains of the path.
         """
         model = self.automaton.model
-        found = _run_mode_bindings(model, self.path.domains) if model else {}
+        bindings = _run_mode_bindings(model, self.path.domains) if model else {}
         if self.automaton.statechart:
-            return {**found, **self._chart_mode_bindings(self.automaton.statechart)}
+            return {**bindings, **self._chart_mode_bindings(self.automaton.statechart)}
         for region in self.automaton.all_regions:
-            own = region.name == self.mode.region
+            is_own = region.name == self.mode.region
             selector = Ref(f"mode.{region.name}", True)
-            if not own:
+            if not is_own:
                 self.path.domains[selector.name] = _mode_domain(region.modes.values())
             for name, mode in region.modes.items():
                 is_in: Expr = Compare("==", selector, integer(mode.number))
-                found[f"in {region.name}.{name}"] = Value(name == self.mode.name) if own else is_in
-        return found
+                bindings[f"in {region.name}.{name}"] = (
+                    Value(name == self.mode.name) if is_own else is_in
+                )
+        return bindings
 
     def _chart_mode_bindings(self, chart: Chart) -> dict[str, Expr]:
         """Return the values of `in(...)` in a chart and restrict the mode variables of its regions.
@@ -184,22 +186,28 @@ class GuardSnapshot:
         A region that contains the mode can have only modes that are nested with it. A region
         elsewhere can also be inactive.
         """
-        own = next(node for node in chart.nodes if node.mode_key == self.mode.key)
+        own_node = next(node for node in chart.nodes if node.mode_key == self.mode.key)
         for region in self.automaton.all_regions:
             leaves = chart.leaves(region.name)
-            around = chart.region_node(region.name).contains(own.index)
-            here = [leaf for leaf in leaves if leaf.contains(own.index) or own.contains(leaf.index)]
-            numbers = [
-                leaf.number for leaf in (here if around else leaves) if leaf.number is not None
+            is_enclosing = chart.region_node(region.name).contains(own_node.index)
+            nested = [
+                leaf
+                for leaf in leaves
+                if leaf.contains(own_node.index) or own_node.contains(leaf.index)
             ]
-            if not around and region.inactive is not None:
+            numbers = [
+                leaf.number
+                for leaf in (nested if is_enclosing else leaves)
+                if leaf.number is not None
+            ]
+            if not is_enclosing and region.inactive is not None:
                 numbers.append(region.inactive)
             name = mode_variable("mode", region.name)
             self.path.domains[name] = VariableDomain("whole", numbers=tuple(numbers))
-        found: dict[str, Expr] = {}
+        bindings: dict[str, Expr] = {}
         for path, (node, active) in _mode_activity(chart).items():
-            found[f"in {path}"] = Value(True) if node.contains(own.index) else active
-        return found
+            bindings[f"in {path}"] = Value(True) if node.contains(own_node.index) else active
+        return bindings
 
     def _define_equations(self, trees: Iterable[SyntaxTree]) -> None:
         """Assign the equations that expressions need, each after the equations that it reads.
@@ -215,7 +223,10 @@ class GuardSnapshot:
                 continue
             needed[name] = list(self._alternatives(name))
             stack += [read for _, _, formula in needed[name] for read in formula.reads]
-        reads = {n: [r for _, _, f in found for r in f.reads] for n, found in needed.items()}
+        reads = {
+            n: [r for _, _, f in alternatives for r in f.reads]
+            for n, alternatives in needed.items()
+        }
         for name in post_order(reads):
             if needed[name]:
                 self._define_equation(name, needed[name])
@@ -247,12 +258,12 @@ class GuardSnapshot:
         value: Expr | None = None
         for number, region, formula in reversed(alternatives):
             self.define_memory(formula.tree)
-            own = lower_assigned_value(formula.tree, self.bindings, formula.is_integer)
+            lowered = lower_assigned_value(formula.tree, self.bindings, formula.is_integer)
             if value is None or number is None:
-                value = own
+                value = lowered
             else:
                 is_in = Compare("==", Ref(f"mode.{region}", True), integer(number))
-                value = Select(is_in, own, value)
+                value = Select(is_in, lowered, value)
         assert value is not None
         target = f"equation.{name}{self.suffix}"
         self.path.assignments.append((target, value))
@@ -324,11 +335,11 @@ class GuardSnapshot:
         Unbounded for other expressions.
         """
         path = getattr(tree, "path", "")
-        thing = self.automaton.inputs.get(path) or self.automaton.state_variables.get(path)
-        if thing is None or thing.range is None:
+        declaration = self.automaton.inputs.get(path) or self.automaton.state_variables.get(path)
+        if declaration is None or declaration.range is None:
             return VariableDomain()
         low, high = (
-            Fraction(round_to_type(bound, self.automaton.numbers)) for bound in thing.range
+            Fraction(round_to_type(bound, self.automaton.numbers)) for bound in declaration.range
         )
         return VariableDomain(low=low, high=high)
 
@@ -355,16 +366,16 @@ def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> 
 
     The mode variables of the run are added to `domains`.
     """
-    found: dict[str, Expr] = {}
+    bindings: dict[str, Expr] = {}
     for region in model.all_regions:
         selector = Ref(f"run.{region.name}", True)
         domains[selector.name] = _mode_domain(region.modes.values())
         for name, mode in region.modes.items():
             is_in = Compare("==", selector, integer(mode.number))
-            found[f"in {model.name}.{region.name}.{name}"] = is_in
+            bindings[f"in {model.name}.{region.name}.{name}"] = is_in
             if region.name == model.root_region.name:
-                found[f"in {model.name}.{name}"] = is_in
-    return found
+                bindings[f"in {model.name}.{name}"] = is_in
+    return bindings
 
 
 def _mode_domain(modes: Iterable[Mode]) -> VariableDomain:

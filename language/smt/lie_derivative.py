@@ -104,12 +104,12 @@ class LieDerivative:
         """
         if name in self.rates:
             return self.rates[name]
-        found = next((value for target, value in self.assignments if target == name), None)
-        if found is None:
+        assigned = next((value for target, value in self.assignments if target == name), None)
+        if assigned is None:
             if name.startswith("memory."):
                 raise UnknownRateError(name)
             return ZERO  # an input, a parameter or a discrete variable
-        change = self.differentiate(found)
+        change = self.differentiate(assigned)
         if change != ZERO:
             target = f"rate of {name}"
             self.assignments.append((target, change))

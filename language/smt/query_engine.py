@@ -106,13 +106,13 @@ class QueryEngine:
         narrower = narrow_domains(query)
         if narrower is None:
             return "never"
-        found = next(filter(query.holds_at, first_sample_points(query, narrower)), None)
-        if found is None:
+        valuation = next(filter(query.holds_at, first_sample_points(query, narrower)), None)
+        if valuation is None:
             decided = self._solve(query)
             if isinstance(decided, str) and decided == "never":
                 return decided
-            found = self._search_points(query) if isinstance(decided, str) else decided
-        return _build_witness(query, found) if found else "open"
+            valuation = self._search_points(query) if isinstance(decided, str) else decided
+        return _build_witness(query, valuation) if valuation else "open"
 
     def answer_for_all_tunables(self, query: SolverQuery) -> Witness | Verdict:
         """Return the answer for the present values of tunable parameters.
@@ -120,9 +120,9 @@ class QueryEngine:
         If that is "never", return the answer for all values in the ranges of the tunable
         parameters.
         """
-        found = self.answer(query)
-        wider = self.free_tunables(query) if found == "never" else None
-        return self.answer(wider) if wider else found
+        answer = self.answer(query)
+        wider = self.free_tunables(query) if answer == "never" else None
+        return self.answer(wider) if wider else answer
 
     def is_unsatisfiable(self, query: SolverQuery) -> bool:
         """Return whether it is proven that the conditions never hold, for all tunable values.
@@ -145,21 +145,24 @@ class QueryEngine:
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or narrow_domains(exact) is None:
             return None
-        found = shared_solver().solve(exact, SMALL_RESOURCE_LIMIT)
+        solution = shared_solver().solve(exact, SMALL_RESOURCE_LIMIT)
         return (
-            _build_witness(near, found)
-            if not isinstance(found, str) and near.holds_at(found)
+            _build_witness(near, solution)
+            if not isinstance(solution, str) and near.holds_at(solution)
             else None
         )
 
     def _solve(self, query: SolverQuery) -> Valuation | Verdict:
         """Return a solution of z3 that evaluation confirms, "never", or "open"."""
         self.query_count += 1
-        found = shared_solver().solve(query) if self.query_count <= MAX_SOLVER_QUERIES else "open"
-        if isinstance(found, str):
-            return found
+        solution = (
+            shared_solver().solve(query) if self.query_count <= MAX_SOLVER_QUERIES else "open"
+        )
+        if isinstance(solution, str):
+            return solution
         return next(
-            (point for point in neighbouring_points(found, query) if query.holds_at(point)), "open"
+            (point for point in neighbouring_points(solution, query) if query.holds_at(point)),
+            "open",
         )
 
     def _search_points(self, query: SolverQuery) -> Valuation | None:
@@ -219,10 +222,10 @@ def _declared_domains(automaton: Automaton) -> Iterator[tuple[str, VariableDomai
 
     The default of an input is the default of its domain.
     """
-    for name, thing in automaton.inputs.items():
-        domain = _declared_domain(thing, automaton.numbers)
-        if thing.default is not None:
-            default: Scalar = round_to_type(thing.default, automaton.numbers)
+    for name, declaration in automaton.inputs.items():
+        domain = _declared_domain(declaration, automaton.numbers)
+        if declaration.default is not None:
+            default: Scalar = round_to_type(declaration.default, automaton.numbers)
             domain = replace(domain, default=_cast_to_domain(default, domain))
         yield f"input.{name}", domain
     for name, variable in automaton.state_variables.items():

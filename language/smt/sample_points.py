@@ -38,8 +38,8 @@ def all_sample_points(query: SolverQuery) -> Iterator[Valuation]:
 
     A projection replaces one side of a relation of the conditions so that both sides are equal.
     """
-    found = [part for condition in query.conditions for part in subexpressions(condition)]
-    relations = [part for part in found if isinstance(part, Compare)]
+    parts = [part for condition in query.conditions for part in subexpressions(condition)]
+    relations = [part for part in parts if isinstance(part, Compare)]
     for index in range(1, MAX_SAMPLE_COUNT):
         point = _sample_point(query, query.domains, index)
         yield point
