@@ -123,7 +123,7 @@ def max_entry_ticks(program: Program) -> int:
 def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
     """Write the C of a Program and the main that executes corpus entries.
 
-    Return the C files to compile.
+    Returns the C files to compile. Raises ValueError for a Program that has no C.
     """
     sources = write_harness(
         program, folder, main=MAIN, extra_context={"page": page_scalars(program)}

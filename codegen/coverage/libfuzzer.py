@@ -136,8 +136,8 @@ def _run_libfuzzer(app: Path, runs: int, most: int, seed: int) -> FuzzerRun:
     edges = max(
         (int(found) for line in done.lines for found in COVERAGE_LINE.findall(line)), default=0
     )
-    kept = app.parent / SEQUENCES_FILE
-    data = kept.read_bytes() if kept.exists() else b""  # absent if the first sequence fails
+    file = app.parent / SEQUENCES_FILE
+    data = file.read_bytes() if file.exists() else b""  # absent if the first sequence fails
     return FuzzerRun(tuple(_read_sequences(data)), edges, done.findings)
 
 

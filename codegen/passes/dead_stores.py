@@ -1,7 +1,9 @@
 """Dead store elimination: a pass that removes assignments to variables that nothing reads.
 
-  before: work.a = x + y; work.b = work.a * 2; state.x = x
-  after:  state.x = x
+  before                      after
+  work.a := (x + y)           state.x := x
+  work.b := (work.a * 2.0)
+  state.x := x
 
 Variables without a remaining assignment are removed from the Program.
 """

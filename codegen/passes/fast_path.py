@@ -1,10 +1,22 @@
 """Fast path: a pass that adds a straight-line block for a step without an event (rule C18).
 
-  before: step = if started { flow; ... } else enter
-  after:  step = if started { leap } ; if not is_leapt { through_events }
-          leap = switch mode { m: leap_m }
-          leap_m = <values up to the guards> if <no guard changed> { <end of the step>; is_leapt }
-          through_events = <the step as it was before>
+  before                      after
+  block step                  block step
+      if memory.started           memory.is_leapt := False
+          <flow>                  if memory.started
+      else                            run leap
+          <enter>                 if (not memory.is_leapt)
+      <end of the step>               run through_events
+                              block leap
+                                  when memory.mode is 1
+                                      run leap_<mode>
+                              block leap_<mode>
+                                  <values up to the guards>
+                                  if <no guard changed>
+                                      <states and equations at the end of the step>
+                                      memory.is_leapt := True
+                              block through_events
+                                  <the block step of before>
 
 In most steps of a continuous automaton no guard changes; the same holds for most ticks that run a
 model. Block `leap_<mode>` executes such a step. It is specialised to what is known of it: its
@@ -184,7 +196,7 @@ def _are_unconditional(
     paths: Mapping[ModeConfiguration, ExecutionPath], configurations: Sequence[ModeConfiguration]
 ) -> bool:
     """Tell whether every configuration has a path without guards."""
-    return all(stay in paths and paths[stay].is_unconditional for stay in configurations)
+    return all(one in paths and paths[one].is_unconditional for one in configurations)
 
 
 def _is_event_loop(block: Block) -> bool:
@@ -249,28 +261,27 @@ def _insert_fast_path(
     `block_name` is the name of the dispatching block. The Program is returned as it is if there are
     no paths, or if one of the new names is taken.
     """
-    if not paths or {block_name, *(stay.block_name for stay in paths)} & set(program.blocks):
+    if not paths or {block_name, *(one.block_name for one in paths)} & set(program.blocks):
         return program
     sets_taken = FAST_PATH_TAKEN in names_used(changed.values())
-    done = {
-        stay: _remove_dead_assignments(_fast_path_block(path, sets_taken))
-        for stay, path in paths.items()
-    }
-    blocks = {stay.block_name: _rename_values(done[stay], path) for stay, path in paths.items()}
-    chosen = _dispatch_on_modes([(stay.mode_numbers, stay.block_name) for stay in paths])
-    made: dict[str, Variable] = {}
+    blocks = {}
+    for configuration, path in paths.items():
+        block = _remove_dead_assignments(_fast_path_block(path, sets_taken))
+        blocks[configuration.block_name] = _rename_values(block, path)
+    dispatch = _dispatch_on_modes([(one.mode_numbers, one.block_name) for one in paths])
+    added: dict[str, Variable] = {}
     used = names_used(blocks.values())
     for path in paths.values():
         names = ((old, name) for old, name in _value_names(path).items() if name in used)
-        made |= {n: dataclasses.replace(path.values[old].variable, name=n) for old, n in names}
-    made[FAST_PATH_TAKEN] = Variable(
-        FAST_PATH_TAKEN, "truth", about="the whole step is taken: nothing happened in it"
+        added |= {n: dataclasses.replace(path.values[old].variable, name=n) for old, n in names}
+    added[FAST_PATH_TAKEN] = Variable(
+        FAST_PATH_TAKEN, "truth", about="the fast path was taken: no guard changed in the step"
     )
     variables = (
-        *(v for v in program.variables if v.name not in made),
-        *made.values(),
+        *(v for v in program.variables if v.name not in added),
+        *added.values(),
     )
-    blocks = {**program.blocks, **blocks, block_name: chosen, **changed}
+    blocks = {**program.blocks, **blocks, block_name: dispatch, **changed}
     return finalise_program(
         dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES
     )
@@ -359,17 +370,17 @@ def _live_operations(block: Block, live_names: set[str]) -> Iterator[Op]:
     `live_names` holds the names that later operations read; it is extended in place.
     """
     for op in reversed(block):
-        kept = op
+        live = op
         if isinstance(op, Branch):
             arms = [
                 tuple(reversed(list(_live_operations(arm, live_names))))
                 for arm in (op.then, op.other)
             ]
-            kept = Branch(op.condition, *arms)
+            live = Branch(op.condition, *arms)
         elif (
             isinstance(op, Assign) and op.target.startswith("work.") and op.target not in live_names
         ):
             continue
         for expr in direct_expressions(op):
             live_names.update(expr_names(expr))
-        yield kept
+        yield live

@@ -1,9 +1,16 @@
 """Range check merging: a pass that checks all inputs of a step with one condition (rule C17).
 
-  before: latch = if a >= 0 and a <= 5 { latched.a = a } else { ... }; if b - b >= 0 { ... } ...
-  after:  latch = if within(a, 0, 5) and abs(b) <= MAX { latched.a = a; latched.b = b }
-                  else latch_each
-          latch_each = <latch as it was before>
+  before                                            after
+  block latch                                       block latch
+      if ((input.a >= 0.0) and (input.a <= 5.0))        if (within(input.a, 0.0, 5.0) and
+          latched.a := input.a                                  (abs(input.b) <= 1.0))
+      else                                                  latched.a := input.a
+          fault range_a of a                                latched.b := input.b
+          latched.a := clip(input.a, 0.0, 5.0)          else
+      if ((input.b >= -1.0) and (input.b <= 1.0))           run latch_each
+          latched.b := input.b                      block latch_each
+      else                                              <the block latch of before>
+          ...
 
 A Program saturates its inputs one by one (rule 18), and these operations are independent of each
 other. In nearly all steps every input is within its range, so one branch takes them all. The bits

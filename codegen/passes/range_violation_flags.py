@@ -1,7 +1,8 @@
 """Range violation flags: a pass that records which signals left their range, for simulations.
 
-before: faults[f] = true (signal s)
-after:  faults[f] = true (signal s); memory.left_k = true
+before                      after
+fault range_a of a          fault range_a of a
+                            memory.left_0 := True
 """
 
 from __future__ import annotations

@@ -250,8 +250,9 @@ class Predictor:
     ) -> StackedPrediction:
         """Return the predictions of several recordings, each with its own parameters.
 
-        Innovations beyond `limits` (outputs,) count linearly in the sums of squares, as in
-        `sum_squares`. The other arguments are those of `predict`.
+        `pages` (recordings, tunables) holds a row of parameters for each recording. Innovations
+        beyond `limits` (outputs,) count linearly in the sums of squares, as in `sum_squares`. The
+        other arguments are those of `predict`.
         """
         samples = len(recordings.inputs)
         stacked = Prediction(

@@ -70,10 +70,7 @@ OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
 def write_chart_contracts(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
-    """Write the C with its contracts into a folder.
-
-    Return the names of the functions that have one.
-    """
+    """Write the C with its contracts into a folder; return the functions that have a contract."""
     name = made.made.name
     text, names = made.annotated(files[f"{name}.c"])
     head = made.with_apart(files[f"{name}.h"])
