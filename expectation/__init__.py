@@ -1,2 +1,3 @@
-"""Tests of specs: read expectations, evaluate them on runs, measure coverage, trace requirements.
+"""Tests of specs: read expectations, evaluate them on runs, measure coverage, trace
+requirements.
 """

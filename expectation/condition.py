@@ -107,9 +107,15 @@ class ConditionReader:
             return None
         literals = {name: place for name, (_, place) in self.literals.items()}
         return Condition(
-            Formula(resolved_tree, key), text, resolver.signals, resolver.stays, resolver.flags, resolver.running,
-            literals, kind or PURE_NUMBER,
-        )  # fmt: skip
+            Formula(resolved_tree, key),
+            text,
+            resolver.signals,
+            resolver.stays,
+            resolver.flags,
+            resolver.running,
+            literals,
+            kind or PURE_NUMBER,
+        )
 
     def full_name(self, name: str) -> str:
         """Return the full name of a signal: a single instance needs no prefix, an output has a

@@ -163,7 +163,8 @@ def instrument_programs(
 
 
 def merge_coverages(parts: Iterable[Coverage]) -> list[Coverage]:
-    """Return the union of coverages, one for each automaton name, in the order of first occurrence.
+    """Return the union of coverages, one for each automaton name, in the order of first
+    occurrence.
     """
     merged: dict[str, Coverage] = {}
     for part in parts:
@@ -188,7 +189,8 @@ def _merge_two(first: Coverage, second: Coverage) -> Coverage:
 
 
 class _CoverageInterpreter(Interpreter):
-    """Interpreter that evaluates guards at each output instant and records transitions and modes.
+    """Interpreter that evaluates guards at each output instant and records transitions and
+    modes.
     """
 
     def __init__(self, program: Program) -> None:

@@ -26,7 +26,8 @@ TruthSeries = list[tuple[int, float, bool]]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of an expectation with the time [s] of the decision, and modes and values there.
+    """The result of an expectation with the time [s] of the decision, and modes and values
+    there.
     """
 
     name: str
@@ -78,7 +79,8 @@ class _ExpectationEvaluator:
         ]
 
     def _occurrences(self, trigger: Trigger, when: TimeConstraint) -> list[float]:
-        """Return the times [s] in the window at which an event occurred or a condition became true.
+        """Return the times [s] in the window at which an event occurred or a condition became
+        true.
         """
         if isinstance(trigger, ModeEntryEvent):
             times = self.seen.times_of(trigger)
@@ -92,7 +94,8 @@ class _ExpectationEvaluator:
         ]
 
     def _window(self, when: TimeConstraint) -> tuple[float, float]:
-        """Return start and end [s] of the constraint `from` and `until`; by default the whole run.
+        """Return start and end [s] of the constraint `from` and `until`; by default the whole
+        run.
         """
         low = 0.0 if when.since is None else float(when.since)
         high = self.seen.end if when.until is None else float(when.until)
@@ -108,7 +111,8 @@ class _ExpectationEvaluator:
     # Conditions.
 
     def _evaluate_that(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
-        """Return the outcome of `that`: at a time, near a time, before a time or after a trigger.
+        """Return the outcome of `that`: at a time, near a time, before a time or after a
+        trigger.
         """
         if when.at is not None and when.within is None:
             return self._check_at(truths, float(when.at))
@@ -203,9 +207,8 @@ class _ExpectationEvaluator:
                 return self._fail_run_ended(high)
             inside = self._truths_within(truths, low, high)
             if not inside:
-                return self._fail(
-                    f"no row lies from {_format_time(low)} to {_format_time(high)}: a smaller `every`"
-                )
+                interval = f"from {_format_time(low)} to {_format_time(high)}"
+                return self._fail(f"no row lies {interval}: a smaller `every`")
             for k, time, value in inside:
                 if value != expected_truth:
                     at = max(time, low)
@@ -215,7 +218,8 @@ class _ExpectationEvaluator:
     # Events and modes.
 
     def _evaluate_event(self, when: TimeConstraint) -> Outcome:
-        """Return the outcome of `event`: near a time, before a time, after a trigger, or its count.
+        """Return the outcome of `event`: near a time, before a time, after a trigger, or its
+        count.
         """
         subject = self.expectation.subject
         assert isinstance(subject, ModeEntryEvent)

@@ -153,7 +153,8 @@ def _evaluate(structure: DecisionStructure, combination: int) -> bool:
 
 
 def _condition_text(tree: SyntaxTree) -> str:
-    """Return the text of a condition as in the file, or formatted if it is not a single text there.
+    """Return the text of a condition as in the file, or formatted if it is not a single text
+    there.
     """
     span = tree.span
     if not span.is_atomic and 1 <= span.line <= len(span.source.lines):

@@ -83,7 +83,8 @@ def leaf_modes_entered(system: System, event: ModeEntryEvent) -> frozenset[str]:
 
 
 def is_chart(system: System, instance: str) -> bool:
-    """Return whether the automaton of an instance is a chart (nested modes or several micro-steps).
+    """Return whether the automaton of an instance is a chart (nested modes or several
+    micro-steps).
     """
     return system.instances[instance].automaton.statechart is not None
 
@@ -98,7 +99,8 @@ def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
 
 
 def fault_words(system: System) -> dict[str, str]:
-    """Return the instances by fault-word signal; signals of instances before outputs of the system.
+    """Return the instances by fault-word signal; signals of instances before outputs of the
+    system.
     """
     found = {
         f"{name}.{output}": name
@@ -131,7 +133,8 @@ def require_mode_output(system: System, instance: str, at: Span, problems: Probl
 
 
 def suggest_output(system: System, name: str) -> str:
-    """Return the hint to make an internal variable of an instance an output; empty if it has none.
+    """Return the hint to make an internal variable of an instance an output; empty if it has
+    none.
     """
     head, _, own = name.rpartition(".")
     instance = system.instances.get(head or system.sole_instance or "")

@@ -64,7 +64,8 @@ class TracedRequirement:
 
 @dataclass(frozen=True)
 class RequirementTrace:
-    """All requirements: first those of the list in its order, then others in order of occurrence.
+    """All requirements: first those of the list in its order, then others in order of
+    occurrence.
     """
 
     requirements: tuple[TracedRequirement, ...] = field(default_factory=tuple)
@@ -101,11 +102,15 @@ def trace_requirements(
     names = dict.fromkeys([*requirement_texts, *implementations, *verifications])
     return RequirementTrace(
         tuple(
-            TracedRequirement(name, requirement_texts.get(name, ""), tuple(implementations.get(name, ())),
-                   tuple(verifications.get(name, ())))
+            TracedRequirement(
+                name,
+                requirement_texts.get(name, ""),
+                tuple(implementations.get(name, ())),
+                tuple(verifications.get(name, ())),
+            )
             for name in names
         )
-    )  # fmt: skip
+    )
 
 
 def citations(code: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, str], list[CodeLine]]:

@@ -1,2 +1,3 @@
-"""Studies: simulate many variants of a system, store the results in Parquet files, summarise them.
+"""Studies: simulate many variants of a system, store the results in Parquet files, summarise
+them.
 """

@@ -93,7 +93,8 @@ class ImportedPage:
 
 @dataclass(frozen=True)
 class ResolvedPage:
-    """A page with recomputed solved numbers, the changes, and the numbers that were absent before.
+    """A page with recomputed solved numbers, the changes, and the numbers that were absent
+    before.
     """
 
     page: CalibrationPage

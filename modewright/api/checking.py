@@ -26,7 +26,8 @@ from sweep.definition.study_reader import read_study
 
 @dataclass(frozen=True)
 class CheckResult:
-    """The problems of a spec including warnings; `limits` are lines about the step of an automaton.
+    """The problems of a spec including warnings; `limits` are lines about the step of an
+    automaton.
     """
 
     problems: tuple[Problem, ...]
@@ -34,7 +35,8 @@ class CheckResult:
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec including warnings; an empty list means that the spec is valid.
+    """Return all problems of a spec including warnings; an empty list means that the spec is
+    valid.
     """
     return list(check_spec(reference, root).problems)
 

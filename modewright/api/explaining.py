@@ -31,6 +31,7 @@ from language.text.provenance import (
     format_spec,
     provenance_entries,
 )
+from modewright.runtime.json_format import format_entry
 
 PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
 Values = Mapping[str, str]
@@ -113,7 +114,8 @@ def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
     """
     document = _load_expanded(spec, Project(root or Path()))
     found = [_row_json(row) for row in provenance_entries(document.root)]
-    return {"kind": document.kind, "name": document.name, "values": found}
+    head = {"kind": document.kind, "name": document.name}
+    return {**format_entry("spec"), **head, "values": found}
 
 
 def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
@@ -128,7 +130,7 @@ def spec_differences_json(spec: str, other: str, root: Path | None = None) -> di
         }
         for difference in diff_specs(old, new)
     ]
-    return {"differences": found}
+    return {**format_entry("spec-differences"), "differences": found}
 
 
 def _load_expanded(spec: str, project: Project) -> Document:

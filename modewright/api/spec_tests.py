@@ -40,7 +40,8 @@ class TestRun:
 
     @property
     def passed(self) -> bool:
-        """Return whether all expectations are met, the run did not stop, and C gave the same run.
+        """Return whether all expectations are met, the run did not stop, and C gave the same
+        run.
         """
         all_passed = all(outcome.passed for outcome in self.outcomes)
         return all_passed and not self.difference and self.stopped is None
@@ -85,7 +86,8 @@ def run_tests(
 
 
 def run_test(test: Test, *, compiled: bool = True) -> TestRun:
-    """Return the result of a test on the engine and, if `compiled`, in C. Raises MissingToolError.
+    """Return the result of a test on the engine and, if `compiled`, in C. Raises
+    MissingToolError.
     """
     start = time.perf_counter()
     trajectory = simulate(test.system, test.scenario)

@@ -94,7 +94,7 @@ def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
-        help="Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step.",
+        help="Hybrid automata in YAML: simulate them, generate C code, keep both in lock-step.",
         epilog=EXIT_CODES,
         callback=options,
     )
@@ -111,6 +111,7 @@ def command_stub(command: Callable[..., None]) -> Callable[[], None]:
 
     def stub() -> None:
         raise AssertionError(f"{command.__name__} has no parameters")
+
     stub.__name__, stub.__doc__ = command.__name__, command.__doc__
     return stub
 
@@ -120,10 +121,11 @@ def options(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="print each step")] = False,
     log_file: Annotated[Path | None, typer.Option(help="append the log to this file")] = None,
     allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="allow specs to refer to files outside their project")
+        bool,
+        typer.Option("--allow-outside", help="allow specs to refer to files outside their project"),
     ] = False,
 ) -> None:
-    """Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step."""
+    """Hybrid automata in YAML: simulate them, generate C code, keep both in lock-step."""
     require_writable(log_file)
     configure(quiet, verbose, log_file)
     if allow_outside:

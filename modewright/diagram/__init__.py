@@ -1,1 +1,1 @@
-"""Diagrams of modes: boxes, layout, SVG and Mermaid."""
+"""Diagrams of modes: read boxes and arrows from a spec, compute a layout, draw SVG or Mermaid."""

@@ -1,4 +1,4 @@
-"""TODO docstring."""
+"""Boxes: the elements of a diagram - regions, modes and transitions."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Literal
 from modewright.diagram.label_text import ModeKind
 
 ModePath = tuple[str, ...]
+"""The path of a mode from the root."""
 
 Shade = Literal["", "covered", "part", "missed"]
-"""What tests have reached of a mode or a transition; empty where nothing is said of it."""
+"""The test coverage of a mode or a transition; empty if unknown."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Arrow:
 
 @dataclass(frozen=True)
 class ModeBox:
-    """A mode: its path, what holds in it, and its inner regions (none in a plain mode)."""
+    """A mode with its path, the lines of its content and its inner regions."""
 
     path: ModePath
     lines: tuple[str, ...]
@@ -43,7 +44,7 @@ class ModeBox:
 
 @dataclass(frozen=True)
 class RegionBox:
-    """Modes of which one is active, and the initial one; a name only if there are several."""
+    """A region with its modes and its initial mode; the name is empty for a single region."""
 
     name: str
     initial: str
@@ -51,7 +52,10 @@ class RegionBox:
 
 
 def lift_arrow(arrow: Arrow) -> Arrow:
-    """Return an arrow between modes of one region: those that hold its ends, which it names."""
+    """Return an arrow between the enclosing modes of both ends that are in the same region.
+
+    The label names an end that is inside the enclosing mode (`from`, `to`).
+    """
     depth = 0
     for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):
         if a != b:

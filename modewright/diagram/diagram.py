@@ -1,6 +1,6 @@
-"""Diagram: the modes of an automaton as boxes and arrows, as the spec writes them.
+"""Diagram: read the modes and transitions of an automaton from its expanded document.
 
-It is read from the laid-out text, so that guards stand in it as their author wrote them.
+The text of the document is used so that guards appear as the author wrote them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from modewright.diagram.label_text import label_lines, mode_kind_of, mode_lines,
 
 @dataclass(frozen=True)
 class Diagram:
-    """All regions of an automaton and its transitions; a notebook shows it as a picture."""
+    """All regions and transitions of an automaton; a notebook displays it as SVG."""
 
     name: str
     about: str
@@ -28,7 +28,7 @@ class Diagram:
     arrows: tuple[Arrow, ...]
 
     def mermaid(self) -> str:
-        """Return the diagram as Mermaid text, for Markdown that Git hosts show."""
+        """Return the diagram as Mermaid text for Markdown."""
         from modewright.diagram.mermaid import render_mermaid
 
         return render_mermaid(self.name, self.regions, self.arrows)
@@ -40,13 +40,14 @@ class Diagram:
         return render_svg(self.name, self.regions, self.arrows)
 
     def _repr_svg_(self) -> str:
+        """Return the SVG for notebooks."""
         return self.svg()
 
 
 def diagram_of(document: Document) -> Diagram:
-    """Return the diagram of an automaton's document, with variants laid over it already.
+    """Return the diagram of the expanded document of an automaton.
 
-    The automaton must have been checked: targets are there.
+    The automaton must be valid, so that all targets exist.
     """
     templates = document.root.get("templates")
     root = (
@@ -69,7 +70,7 @@ def diagram_of(document: Document) -> Diagram:
 
 
 def _mark_fault_mode(region: RegionBox, fault_mode: str) -> RegionBox:
-    """Return a region in which the mode that faults lead to says so."""
+    """Return a region whose fault mode has an additional line."""
     boxes = tuple(
         dataclasses.replace(box, lines=("entered on a fault", *box.lines))
         if box.name == fault_mode
@@ -80,7 +81,7 @@ def _mark_fault_mode(region: RegionBox, fault_mode: str) -> RegionBox:
 
 
 def _apply_templates(owner: MappingNode, templates: MappingNode) -> MappingNode:
-    """Return a table whose modes, inner ones too, are laid over the templates that they name."""
+    """Return a mapping whose modes, at all depths, have their templates applied."""
     template = templates.get(node_text(owner.get("like")))
     if isinstance(template, MappingNode):
         owner = apply_overlay(template, without_keys(owner, "like"), Problems(), template=True)
@@ -98,7 +99,7 @@ def _apply_templates(owner: MappingNode, templates: MappingNode) -> MappingNode:
 
 
 def _region_boxes(owner: MappingNode, path: ModePath) -> list[RegionBox]:
-    """Return the regions of the automaton or of a mode: its `modes`, then its `regions`."""
+    """Return the regions of the automaton or of a mode: first its `modes`, then its `regions`."""
     boxes = []
     modes, regions = owner.get("modes"), owner.get("regions")
     if isinstance(modes, MappingNode):
@@ -112,6 +113,7 @@ def _region_boxes(owner: MappingNode, path: ModePath) -> list[RegionBox]:
 
 
 def _region_box(name: str, owner: MappingNode, modes: MappingNode, path: ModePath) -> RegionBox:
+    """Return a region with its modes; the initial mode defaults to the first one."""
     boxes = [
         ModeBox(
             (*path, entry.key),
@@ -128,7 +130,7 @@ def _region_box(name: str, owner: MappingNode, modes: MappingNode, path: ModePat
 
 
 def _iter_modes(owner: MappingNode, path: ModePath) -> Iterator[tuple[ModePath, MappingNode]]:
-    """Yield every mode with its path, outer ones first."""
+    """Yield path and node of each mode, outer modes first."""
     regions = owner.get("regions")
     owners = [(path, owner)]
     if isinstance(regions, MappingNode):
@@ -142,6 +144,7 @@ def _iter_modes(owner: MappingNode, path: ModePath) -> Iterator[tuple[ModePath, 
 
 
 def _iter_mode_paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterator[ModePath]:
+    """Yield the path of each mode, outer modes first."""
     for region in regions:
         for mode in region.modes:
             yield mode.path
@@ -149,6 +152,10 @@ def _iter_mode_paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterat
 
 
 def _transition_arrows(path: ModePath, mode: MappingNode, known: set[ModePath]) -> Iterator[Arrow]:
+    """Yield the arrows of the transitions of a mode; one for each target.
+
+    An internal transition gives an arrow from the mode to itself.
+    """
     transitions = mode.get("transitions")
     for entry in transitions if isinstance(transitions, MappingNode) else ():
         if isinstance(entry.node, MappingNode):
@@ -163,14 +170,17 @@ def _transition_arrows(path: ModePath, mode: MappingNode, known: set[ModePath]) 
 
 
 def _target_names(to: YamlNode | None, key: str) -> list[str]:
-    """Return the targets of a transition: those of a list, the only one, or its key."""
+    """Return the target names of a transition: the list or scalar `to`, or its key."""
     if isinstance(to, SequenceNode):
         return [node_text(item) for item in to.nodes]
     return [node_text(to) or key]
 
 
 def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> ModePath | None:
-    """Return the mode that a name means: among the siblings first, then those of the parents."""
+    """Return the path of the mode that a name denotes; None if there is none.
+
+    Siblings take precedence over modes of enclosing regions.
+    """
     for depth in range(len(path) - 1, -1, -1):
         if (*path[:depth], *name) in known:
             return (*path[:depth], *name)

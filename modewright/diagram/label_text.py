@@ -1,4 +1,4 @@
-"""Label: the lines that stand at an arrow and in a box of a diagram, as the spec writes them."""
+"""Label text: format the labels of transitions and modes in a diagram."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNo
 from language.text.sanitise import escape_invisible, truncate
 
 MAX_TEXT_LENGTH = 1000
-"""Characters of a label; expressions are shorter, other texts are cut."""
+"""Longest text of a label [characters]; longer ones are truncated."""
 LABEL_WIDTH = 36
 """Longest line of a label [characters]."""
 MAX_MODE_LINES = 6
-"""Most lines of equations shown in a mode."""
+"""Largest number of lines in a mode."""
 ModeKind = Literal["", "final", "history"]
-"""What a mode is: most are plain; one that nothing leaves; a place that enters another mode."""
+"""The kind of a mode: normal, final (no transition leaves it) or history."""
 
 
 def mode_kind_of(mode: MappingNode) -> ModeKind:
-    """Return what a mode is, as its keys say."""
+    """Return the kind of a mode according to its keys."""
     if mode.get("history") is not None:
         return "history"
     return "final" if node_text(mode.get("final")) == "true" else ""
 
 
 def label_lines(transition: MappingNode) -> Iterator[str]:
-    """Yield the lines of a label: priority, event, guard, wait, resets and what else is said."""
+    """Yield the lines of a transition's label: priority, event, guard, wait, resets, other keys."""
     when, event = node_text(transition.get("when")), node_text(transition.get("event"))
     priority = node_text(transition.get("priority"))
     start = f"({priority}) " if priority else ""
@@ -47,7 +47,10 @@ def label_lines(transition: MappingNode) -> Iterator[str]:
 
 
 def mode_lines(node: YamlNode) -> list[str]:
-    """Return what holds in a mode: its equations, flow, updates and observer, shortened."""
+    """Return the lines of a mode: equations, updates, entry, exit, flow, observer; truncated.
+
+    Return an empty list for other nodes.
+    """
     if not isinstance(node, MappingNode):
         return []
     lines = _pseudostate_lines(node)
@@ -68,7 +71,7 @@ def mode_lines(node: YamlNode) -> list[str]:
 
 
 def _pseudostate_lines(mode: MappingNode) -> list[str]:
-    """Return what a mode is where it is no plain one, as a line."""
+    """Return the line of a history or final mode; empty for normal modes."""
     history, first = node_text(mode.get("history")), node_text(mode.get("initial"))
     if history:
         return _wrap_text(f"{history} history" + (f", else {first}" if first else ""))
@@ -76,7 +79,7 @@ def _pseudostate_lines(mode: MappingNode) -> list[str]:
 
 
 def _wrap_text(text: str) -> list[str]:
-    """Return a text in lines, parted before `and` and `or` where that is enough."""
+    """Return a text in lines of LABEL_WIDTH, broken before `and` and `or` if possible."""
     lines: list[str] = []
     visible_text = escape_invisible(truncate(" ".join(text.split()), MAX_TEXT_LENGTH))
     for piece in re.split(r" (?=(?:and|or) )", visible_text):
@@ -91,7 +94,7 @@ def _wrap_text(text: str) -> list[str]:
 
 
 def node_text(node: YamlNode | None) -> str:
-    """Return a node as text in one line; empty where there is none."""
+    """Return a node as one line of text; empty for None."""
     if isinstance(node, ScalarNode):
         return escape_invisible(" ".join(node.text.split()))
     if isinstance(node, MappingNode):

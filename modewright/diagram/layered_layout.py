@@ -1,7 +1,8 @@
-"""Layers: boxes and labelled arrows placed in columns, left to right, with few crossings.
+"""Layered layout: place boxes and labelled edges in columns from left to right with few crossings.
 
-Sugiyama, Tagawa and Toda 1981: break cycles, give ranks, order by barycentres, place. A label is an
-item of its own between the columns of its ends, so that no label ever lies on another.
+The method of Sugiyama, Tagawa and Toda (1981): break cycles, assign ranks, order by barycentres,
+place. The label of an edge is an item between the columns of its ends, so that labels never
+overlap.
 """
 
 from __future__ import annotations
@@ -14,16 +15,16 @@ Size = tuple[float, float]
 Point = tuple[float, float]
 
 COLUMN_GAP = 34.0
-"""Room between columns, in which lines bend [px]."""
+"""Distance of columns [px], in which the lines bend."""
 ITEM_SPACING = 12.0
-"""Least distance of items of one column [px]."""
+"""Smallest distance of the items of a column [px]."""
 SWEEPS = 16
-"""Passes over the columns; more change nothing in diagrams of 20 modes."""
+"""Passes over the columns; more do not improve diagrams of 20 modes."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """An arrow from one box to another, with the size of its label."""
+    """An edge between two boxes (by index) with the size of its label [px]."""
 
     source: int
     target: int
@@ -32,7 +33,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Route:
-    """Where an arrow runs: pieces of line, and the corner of its label (the first point left)."""
+    """The path of an edge: polylines, and the upper left corner of its label."""
 
     pieces: tuple[tuple[Point, ...], ...]
     label: Point
@@ -40,7 +41,9 @@ class Route:
 
 @dataclass(frozen=True)
 class Layout:
-    """Upper left corners of boxes, routes of edges in their order, and the size of all."""
+    """Upper left corners of the boxes, routes of the edges in their order, and the total size
+    [px].
+    """
 
     boxes: tuple[Point, ...]
     routes: tuple[Route, ...]
@@ -49,7 +52,7 @@ class Layout:
 
 @dataclass
 class _Item:
-    """Something in a column: a box, a label, or the passage of an arrow."""
+    """An item of a column: a box, a label, or a point through which an edge passes."""
 
     size: Size
     column: int
@@ -62,9 +65,9 @@ class _Item:
 def compute_layout(
     boxes: Sequence[Size], edges: Sequence[Edge], top_margins: Sequence[float] = ()
 ) -> Layout:
-    """Place boxes (the first is where to start) and edges between different boxes.
+    """Return the layout of boxes and of edges between different boxes; the first box is the start.
 
-    No edge meets a box in its upper `top_margins` [px].
+    `boxes` are sizes [px]. Edges do not end in the upper `top_margins` [px] of a box.
     """
     backward = _find_backward_edges(len(boxes), edges)
     ranks = _assign_ranks(len(boxes), edges, backward)
@@ -87,9 +90,10 @@ def compute_layout(
 
 
 def _find_backward_edges(count: int, edges: Sequence[Edge]) -> set[int]:
-    """Return the edges that do not lead away from the first box, counted in steps from it.
+    """Return the indices of the edges against the breadth-first order from the first box.
 
-    Boxes near the start stay left; a walk in depth breaks fewer edges but makes long rows.
+    Breadth-first order keeps boxes near the start on the left. Depth-first order would break fewer
+    edges, but give long rows.
     """
     order: list[int] = []
     for start in range(count):
@@ -103,7 +107,7 @@ def _find_backward_edges(count: int, edges: Sequence[Edge]) -> set[int]:
 
 
 def _assign_ranks(count: int, edges: Sequence[Edge], backward: set[int]) -> list[int]:
-    """Return for each box the length of the longest path that leads to it."""
+    """Return the rank of each box: the length of the longest path to it without backward edges."""
     ends = [
         (e.target, e.source) if k in backward else (e.source, e.target) for k, e in enumerate(edges)
     ]
@@ -115,7 +119,7 @@ def _assign_ranks(count: int, edges: Sequence[Edge], backward: set[int]) -> list
 
 
 def _insert_dummies(edge: Edge, reversed_: bool, items: Sequence[_Item]) -> list[_Item]:
-    """Return the label and the passages of an edge, from left to right, linked to its boxes."""
+    """Return the label and the passages of an edge from left to right, linked to its boxes."""
     left, right = items[edge.source], items[edge.target]
     if reversed_:
         left, right = right, left
@@ -129,6 +133,7 @@ def _insert_dummies(edge: Edge, reversed_: bool, items: Sequence[_Item]) -> list
 
 
 def _group_columns(items: Sequence[_Item], chains: Sequence[Sequence[_Item]]) -> list[list[_Item]]:
+    """Return the items of each column."""
     everything = [*items, *(item for chain in chains for item in chain)]
     columns: list[list[_Item]] = [[] for _ in range(max((i.column for i in items), default=-1) + 1)]
     for item in everything:
@@ -137,6 +142,7 @@ def _group_columns(items: Sequence[_Item], chains: Sequence[Sequence[_Item]]) ->
 
 
 def _reduce_crossings(columns: list[list[_Item]]) -> None:
+    """Order the items of each column by barycentres in sweeps; keep the best order."""
     best, fewest = [list(column) for column in columns], _count_crossings(columns)
     for sweep in range(SWEEPS):
         forward = sweep % 2 == 0
@@ -155,6 +161,7 @@ def _reduce_crossings(columns: list[list[_Item]]) -> None:
 
 
 def _count_crossings(columns: Sequence[Sequence[_Item]]) -> int:
+    """Return the number of crossings of edges between neighbouring columns."""
     place = {id(item): k for column in columns for k, item in enumerate(column)}
     total = 0
     for column in columns:
@@ -165,7 +172,9 @@ def _count_crossings(columns: Sequence[Sequence[_Item]]) -> int:
 
 
 def _assign_heights(columns: Sequence[Sequence[_Item]]) -> None:
-    """Give every item its height: near its neighbours, the order and the room kept."""
+    """Set the height of each item near the mean of its neighbours, without change of order or
+    overlap.
+    """
     for column in columns:
         _resolve_overlaps(column, [0.0] * len(column))
     for sweep in range(2 * SWEEPS):
@@ -182,9 +191,9 @@ def _assign_heights(columns: Sequence[Sequence[_Item]]) -> None:
 
 
 def _resolve_overlaps(column: Sequence[_Item], desired: Sequence[float]) -> None:
-    """Set the heights that are nearest to those wanted, in least squares, without overlap.
+    """Set the heights of a column nearest to the desired ones (least squares) without overlap.
 
-    With the distances taken off this is isotonic regression (pool adjacent violators).
+    After subtraction of the distances this is isotonic regression (pool adjacent violators).
     """
     offsets = [0.0]
     for above, below in itertools.pairwise(column):
@@ -202,6 +211,7 @@ def _resolve_overlaps(column: Sequence[_Item], desired: Sequence[float]) -> None
 
 
 def _column_extents(columns: Sequence[Sequence[_Item]]) -> tuple[list[float], list[float]]:
+    """Return left ends and widths of the columns [px]."""
     widths = [max(item.size[0] for item in column) for column in columns]
     lefts: list[float] = []
     for k, _ in enumerate(widths):
@@ -217,6 +227,7 @@ def _route_edges(
     lefts: Sequence[float],
     widths: Sequence[float],
 ) -> tuple[Route, ...]:
+    """Return the routes of all edges in their order."""
     ports = _port_heights(edges, backward, items, chains)
     routes = []
     for k, (edge, chain) in enumerate(zip(edges, chains, strict=True)):
@@ -250,7 +261,10 @@ def _port_heights(
     items: Sequence[_Item],
     chains: Sequence[Sequence[_Item]],
 ) -> list[list[float]]:
-    """Return the heights at which each edge meets its left and its right box, in their order."""
+    """Return the heights [px] at which each edge meets its left and its right box.
+
+    The edges at one side of a box are distributed in the order of their neighbours.
+    """
     ports = [[0.0, 0.0] for _ in edges]
     for node, item in enumerate(items):
         for side in (0, 1):

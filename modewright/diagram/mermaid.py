@@ -1,4 +1,4 @@
-"""Mermaid: a diagram as `stateDiagram-v2` text, read in review and drawn by Git hosts."""
+"""Mermaid: render a diagram as `stateDiagram-v2` text, which Git hosts display."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from language.text.sanitise import escape_invisible
 from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox, lift_arrow
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
+"""Words of Mermaid that cannot be identifiers."""
 
 KIND_MARKS = {"history": "(H) "}
-"""What stands before the name of a mode that is no plain one."""
+"""Marks before the names of special modes."""
 
 
 def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...]) -> str:
-    """Return regions as Mermaid text; a transition stands where both its modes are inside."""
+    """Return regions as Mermaid text; a transition appears in the region that contains both
+    ends.
+    """
     lines = ["stateDiagram-v2", "    direction LR"]
     if len(regions) == 1:
         lines += _region_lines(regions[0], arrows, 1)
@@ -27,7 +30,7 @@ def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arro
 
 
 def identifier_of(path: ModePath) -> str:
-    """Return the identifier of a mode: its path, not a word of Mermaid."""
+    """Return the Mermaid identifier of a mode, made of its path."""
     name = re.sub(r"\W", "_", "__".join(path), flags=re.ASCII)
     return name + "_" if name in RESERVED else name
 
@@ -35,6 +38,7 @@ def identifier_of(path: ModePath) -> str:
 def _parallel_lines(
     regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...], depth: int
 ) -> Iterator[str]:
+    """Yield the lines of parallel regions with separators."""
     for k, region in enumerate(regions):
         if k:
             yield "    " * depth + "--"
@@ -42,6 +46,7 @@ def _parallel_lines(
 
 
 def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    """Yield the lines of a region: initial mode, modes, final modes, transitions."""
     indent = "    " * depth
     for mode in region.modes:
         if mode.name == region.initial:
@@ -58,6 +63,7 @@ def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> I
 
 
 def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    """Yield the lines of a mode and its inner regions."""
     indent = "    " * depth
     text = "<br/>".join(
         map(_escape_label, (KIND_MARKS.get(mode.kind, "") + mode.name, *mode.lines))
@@ -72,6 +78,8 @@ def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterato
 
 
 def _escape_label(text: str) -> str:
-    """Return a text without what ends a label in some version of Mermaid, or is HTML."""
+    """Return a text with the characters escaped that end a label in some version of Mermaid or are
+    HTML.
+    """
     plain = escape_invisible(text).replace('"', "'")
     return re.sub(r"[#;:]|<(?=[A-Za-z/!?])", lambda match: f"#{ord(match[0])};", plain)

@@ -1,4 +1,4 @@
-"""Diagram SVG: modes as boxes from left to right, every transition with its label on it."""
+"""SVG: render a diagram with modes as boxes from left to right and labelled transitions."""
 
 from __future__ import annotations
 
@@ -14,13 +14,19 @@ from modewright.diagram.layered_layout import Edge, Layout, Point, Size, compute
 CHARACTER_WIDTH, LINE_HEIGHT, TITLE_HEIGHT = 7.0, 14.0, 20.0
 """Width of a character, height of a line, height of a title [px]: monospace at 11 px."""
 PADDING = 9.0
+"""Padding inside boxes [px]."""
 DASH_STYLE = ' stroke-dasharray="4 3"'
+"""SVG attribute of dashed lines."""
 INITIAL_DOT_WIDTH = 30.0
-"""Room for the dot before the initial mode [px]."""
+"""Width of the dot before the initial mode [px]."""
 MODE_COLOURS = ("#33608c", "#b03a4a", "#1d6f2b", "#8a7410", "#257a8f", "#8a2b63", "#555555")
+"""Colours that distinguish modes."""
 SHADE_COLOURS = {"covered": "#1d7a33", "part": "#9a6700", "missed": "#b3261e"}
+"""Colours of test coverage."""
 PALETTE = (*MODE_COLOURS, *SHADE_COLOURS.values())
+"""All colours, to which arrow markers refer by index."""
 SHADE_LABELS = {"covered": "reached by tests", "part": "reached in part", "missed": "not reached"}
+"""Texts of the legend of test coverage."""
 STYLE = (
     "text{font:11px 'DejaVu Sans Mono',Menlo,Consolas,monospace;fill:#222}"
     ".n{font-weight:bold;font-size:13px}.a{fill:#555}"
@@ -29,17 +35,19 @@ STYLE = (
 
 @dataclass(frozen=True)
 class _Drawing:
-    """A laid-out part: its size, what draws it, and the height above it that is not its box."""
+    """A drawn part: its size [px], its SVG elements with offsets, and the height above its box."""
 
     size: Size
     parts: tuple[tuple[Point, str], ...]
     top_margin: float = 0.0
 
     def translate(self, x: float, y: float) -> tuple[tuple[Point, str], ...]:
+        """Return the elements moved by (x, y)."""
         return tuple(((x + dx, y + dy), text) for (dx, dy), text in self.parts)
 
 
 def _escape_xml(text: str) -> str:
+    """Return a text escaped for XML."""
     return escape(escape_invisible(text))
 
 
@@ -70,16 +78,17 @@ def render_svg(name: str, regions: Sequence[RegionBox], arrows: Sequence[Arrow])
 
 
 def _draw_legend(x: float) -> str:
-    """What the shades mean, beside the title."""
+    """Return the legend of test coverage, to the right of the title."""
     texts = ""
     for shade, note in SHADE_LABELS.items():
-        texts += f'<text x="{x:.1f}" y="{PADDING + 10}" style="fill:{SHADE_COLOURS[shade]}">{note}</text>'
+        style = f"fill:{SHADE_COLOURS[shade]}"
+        texts += f'<text x="{x:.1f}" y="{PADDING + 10}" style="{style}">{note}</text>'
         x += CHARACTER_WIDTH * (len(note) + 3)
     return texts
 
 
 def _draw_regions(regions: Sequence[RegionBox], arrows: Sequence[Arrow]) -> _Drawing:
-    """Return regions over each other; several are framed and named, for they run in parallel."""
+    """Return regions below each other; parallel regions have a frame with their name."""
     width, y = 0.0, 0.0
     parts: list[tuple[Point, str]] = []
     drawn = [_draw_region(region, arrows) for region in regions]
@@ -95,7 +104,7 @@ def _draw_regions(regions: Sequence[RegionBox], arrows: Sequence[Arrow]) -> _Dra
 
 
 def _draw_region(region: RegionBox, arrows: Sequence[Arrow]) -> _Drawing:
-    """Return the modes of one region, the initial one first, with the transitions among them."""
+    """Return the modes of a region, the initial one first, with the transitions between them."""
     modes = sorted(region.modes, key=lambda mode: mode.name != region.initial)
     numbers = {mode.path: k for k, mode in enumerate(modes)}
     lifted_arrows = [lift_arrow(arrow) for arrow in arrows]
@@ -124,6 +133,7 @@ def _draw_region(region: RegionBox, arrows: Sequence[Arrow]) -> _Drawing:
 def _draw_arrows(
     arrows: Sequence[Arrow], edges: Sequence[Edge], placed: Layout
 ) -> list[tuple[Point, str]]:
+    """Return the lines and labels of transitions."""
     parts: list[tuple[Point, str]] = []
     for arrow, edge, route in zip(arrows, edges, placed.routes, strict=True):
         colour_index = _colour_index_of(arrow.shade, edge.source)
@@ -143,7 +153,9 @@ def _draw_arrows(
 def _draw_mode(
     mode: ModeBox, loops: Sequence[Arrow], arrows: Sequence[Arrow], colour_index: int
 ) -> _Drawing:
-    """Return a mode: its name, what holds in it, its inner regions; self-transitions above."""
+    """Return a mode with its name, lines and inner regions; internal transitions are above the
+    box.
+    """
     inner = _draw_regions(mode.regions, arrows) if mode.regions else _Drawing((0.0, 0.0), ())
     longest = max(
         [CHARACTER_WIDTH * 1.22 * len(mode.name), *(CHARACTER_WIDTH * len(n) for n in mode.lines)]
@@ -175,11 +187,13 @@ def _draw_mode(
 
 
 def _label_size(arrow: Arrow) -> Size:
+    """Return the size of a label [px]."""
     longest = max((len(line) for line in arrow.lines), default=0)
     return (CHARACTER_WIDTH * longest + 10.0, LINE_HEIGHT * len(arrow.lines) + 6.0)
 
 
 def _draw_label(arrow: Arrow, colour_index: int) -> str:
+    """Return the label of a transition in a frame."""
     width, height = _label_size(arrow)
     frame = f'<rect width="{width:.1f}" height="{height:.1f}" rx="3" fill="white"'
     return (
@@ -190,6 +204,7 @@ def _draw_label(arrow: Arrow, colour_index: int) -> str:
 
 
 def _draw_lines(lines: Sequence[str], x: float, y: float, name: str = "") -> str:
+    """Return lines of text; their indentation is preserved."""
     kind = f' class="{name}"' if name else ""
     texts = ""
     for k, line in enumerate(lines):
@@ -201,7 +216,7 @@ def _draw_lines(lines: Sequence[str], x: float, y: float, name: str = "") -> str
 
 
 def _colour_index_of(shade: str, number: int) -> int:
-    """Return the place of a colour: that of a shade, else one of those that tell modes apart."""
+    """Return the palette index of a shade; without a shade the colour of the mode's number."""
     return (
         len(MODE_COLOURS) + list(SHADE_COLOURS).index(shade)
         if shade
@@ -210,6 +225,7 @@ def _colour_index_of(shade: str, number: int) -> int:
 
 
 def _draw_curve(points: Sequence[Point], colour_index: int, head: bool, dashed: bool) -> str:
+    """Return a smooth curve through points, with an arrow head and dashes if requested."""
     path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
     for (x, y), (u, v) in itertools.pairwise(points):
         bend = (u - x) / 2
@@ -222,6 +238,7 @@ def _draw_curve(points: Sequence[Point], colour_index: int, head: bool, dashed: 
 
 
 def _draw_loop(size: Size, colour_index: int) -> str:
+    """Return the curve of an internal transition around its label."""
     bottom = size[1] + 24.0
     path = f"M16 {bottom} C16 {size[1] / 2} 16 {size[1] / 2} 30 {size[1] / 2}"
     right = size[0] + 30.0
@@ -234,6 +251,7 @@ def _draw_loop(size: Size, colour_index: int) -> str:
 
 
 def _draw_initial_dot() -> str:
+    """Return the dot and the arrow before the initial mode."""
     return (
         '<circle cx="-24" cy="0" r="4.5" fill="#222"/>'
         '<path d="M-20 0 H0" stroke="#222" stroke-width="1.3" marker-end="url(#h6)"/>'
@@ -241,6 +259,7 @@ def _draw_initial_dot() -> str:
 
 
 def _draw_frame(width: float, height: float, name: str) -> str:
+    """Return the dashed frame of a parallel region."""
     return (
         f'<rect width="{width:.1f}" height="{height:.1f}" rx="4" fill="none" stroke="#888"'
         f' stroke-dasharray="5 4"/><text class="n" x="{PADDING}" y="15">{_escape_xml(name)}</text>'
@@ -248,6 +267,7 @@ def _draw_frame(width: float, height: float, name: str) -> str:
 
 
 def _arrow_marker(number: int, colour: str) -> str:
+    """Return the definition of an arrow head in a colour."""
     return (
         f'<marker id="h{number}" viewBox="0 0 8 8" refX="7.5" refY="4" markerWidth="7"'
         f' markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="{colour}"/></marker>'

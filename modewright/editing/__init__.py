@@ -1,1 +1,1 @@
-"""Editing: what may stand where in a spec, its JSON Schema, its layout, what differs."""
+"""Editing: shapes of keys, JSON Schema, formatter and semantic differences of specs."""

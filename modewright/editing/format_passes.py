@@ -1,4 +1,4 @@
-"""Layout: what formatting does, pass by pass; each takes a text and returns one laid out more."""
+"""Format passes: functions from a YAML text to a text with improved layout."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from modewright.editing.tokenised_text import (
 )
 
 INDENTATION = 2
+"""Blanks for each level of blocks."""
 COMMENT_GAP = 2
-"""Least blanks between a value and the comment behind it."""
+"""Smallest number of blanks between a value and a comment behind it."""
 
 
 def strip_blanks(text: str) -> str:
-    """Return a text without blanks at the ends of its lines, with single blank lines."""
+    """Return a text without trailing blanks and without consecutive blank lines.
+
+    Lines inside multi-line values do not change.
+    """
     tokenised = tokenise(text)
     result: list[str] = []
     for number, line in enumerate(tokenised.lines):
@@ -35,9 +39,9 @@ def strip_blanks(text: str) -> str:
 
 
 def indent_blocks(text: str) -> str:
-    """Return a text with two blanks for each level of its blocks.
+    """Return a text whose blocks are indented by two blanks for each level.
 
-    What goes on over several lines moves with the line on which it starts.
+    Continuation lines move with the line on which their value starts.
     """
     tokenised = tokenise(text)
     shifts = _line_shifts(tokenised)
@@ -50,7 +54,7 @@ def indent_blocks(text: str) -> str:
 
 
 def _line_shifts(tokenised: TokenisedText) -> dict[int, int]:
-    """Return by how many columns each line moves."""
+    """Return the shift of each line in columns."""
     first = tokenised.first_tokens
     shifts: dict[int, int] = {}
     shift = 0
@@ -67,7 +71,9 @@ def _line_shifts(tokenised: TokenisedText) -> dict[int, int]:
 
 
 def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]) -> int:
-    """A line that is all comment moves with the line below, or above where it is indented more."""
+    """Return the shift of a comment line: that of the next line, or of the previous one if indented
+    more.
+    """
     below = next(
         (k for k in range(number + 1, len(tokenised.lines)) if tokenised.lines[k].strip()), None
     )
@@ -80,7 +86,10 @@ def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]
 
 
 def space_tokens(text: str) -> str:
-    """Return a text with its blanks inside brackets and behind the dashes of lists."""
+    """Return a text with normalised blanks inside brackets and after the dashes of lists.
+
+    Columns of tables are preserved.
+    """
     tokenised = tokenise(text)
     lines = list(tokenised.lines)
     starts = {(token.line, token.start_column) for token in tokenised.tokens}
@@ -99,7 +108,7 @@ def space_tokens(text: str) -> str:
 
 
 def _separator_of(left: Token, right: Token) -> str | None:
-    """Return what stands between two tokens of a line; None where that is left as it is."""
+    """Return the blanks between two tokens of a line; None to leave them."""
     if left.kind in OPENING or right.kind in CLOSING:
         return ""
     if right.kind in (yaml.FlowEntryToken, yaml.ValueToken):
@@ -110,13 +119,13 @@ def _separator_of(left: Token, right: Token) -> str | None:
 
 
 def _is_in_column(left: Token, right: Token, starts: set[tuple[int, int]]) -> bool:
-    """Tell whether blanks behind a comma put a part below or above another one: a table."""
+    """Return whether blanks after a comma align an item with the line above or below."""
     beside = {(right.line - 1, right.start_column), (right.line + 1, right.start_column)}
     return right.start_column > left.end_column + 1 and not beside.isdisjoint(starts)
 
 
 def align_values(text: str) -> str:
-    """Return a text whose values are aligned where an author did so, comments behind them."""
+    """Return a text whose values are aligned where the author aligned some of them."""
     tokenised = tokenise(text)
     lines = list(tokenised.lines)
     for group in _iter_entry_groups(tokenised):
@@ -129,10 +138,10 @@ def align_values(text: str) -> str:
 
 
 def _value_column(group: list[tuple[Token, Token]]) -> int:
-    """Return where aligned values start: where they do, else behind the longest key of them.
+    """Return the common column of the values of consecutive lines; 0 if they are not aligned.
 
-    Values are aligned where two of them start in one column and not for want of blanks; a key that
-    reaches beyond that column is left alone.
+    Values are aligned if two of them start in the same column after more than one blank. Keys
+    beyond this column are not aligned.
     """
     columns = [value.start_column for _, value in group]
     spread = [
@@ -146,7 +155,7 @@ def _value_column(group: list[tuple[Token, Token]]) -> int:
 
 
 def _iter_entry_groups(tokenised: TokenisedText) -> Iterator[list[tuple[Token, Token]]]:
-    """Yield the entries, as colon and value, of lines that follow each other at one level."""
+    """Yield the entries (colon and value) of consecutive lines at the same level."""
     group: list[tuple[Token, Token]] = []
     first = tokenised.first_tokens
     for before, colon, value in zip(
@@ -166,7 +175,7 @@ def _iter_entry_groups(tokenised: TokenisedText) -> Iterator[list[tuple[Token, T
 
 
 def _restore_comments(tokenised: TokenisedText, lines: list[str]) -> list[str]:
-    """Return lines whose comments stand where they stood, or behind what has become longer."""
+    """Return lines whose comments keep their columns, or follow a longer content."""
     result = []
     for number, (old, new) in enumerate(zip(tokenised.lines, lines, strict=True)):
         column = tokenised.comment_columns.get(number)

@@ -1,9 +1,9 @@
-"""Format: a spec laid out by rules, its comments and quotes kept, its meaning unchanged.
+"""Formatter: format the layout of a spec without change of comments, quotes and meaning.
 
-A level is indented by two blanks, lines end without blanks, at most one blank line separates;
-`{a: 1, b: [2, 3]}` has its blanks there, but for columns of a table. Values of lines that follow
-each other are aligned where the author aligned some of them; a key that is longer stands out. A
-comment keeps its column as long as two blanks fit before it.
+Blocks are indented by two blanks; lines have no trailing blanks; blank lines are single. Flow
+collections look like `{a: 1, b: [2, 3]}`, except for columns of tables. Values of consecutive lines
+are aligned where the author aligned some of them. A comment keeps its column if two blanks fit
+before it.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from modewright.editing.format_passes import align_values, indent_blocks, space_
 from modewright.editing.tokenised_text import tokenise
 
 PASSES = (strip_blanks, indent_blocks, space_tokens, align_values, strip_blanks)
+"""The format passes in their order."""
 MAX_ROUNDS = 8
-"""Rounds of the passes: what one has moved may take another out of a column."""
+"""Largest number of rounds; a pass may undo the alignment of another one."""
 BYTE_ORDER_MARK = "\ufeff"
-"""A mark of UTF-8 that some editors put before a text."""
+"""The byte order mark that some editors write at the start of a file."""
 
 
 def format_text(text: str, name: str = "") -> str:
-    """Return the text of a spec laid out. Raises SpecError where it is no YAML of ours.
+    """Return the formatted text of a spec. Raises SpecError if it is no valid YAML of the language.
 
-    A pass that would change what is said, in a text that no rule here foresees, is left out. A mark
-    before the text stays, and all lines end as the first one does.
+    A pass that would change the content is skipped. Byte order mark and line ends (of the first
+    line) are preserved.
     """
     result = _run_passes(text.removeprefix(BYTE_ORDER_MARK).replace("\r\n", "\n"), name)
     if text.partition("\n")[0].endswith("\r"):
@@ -34,6 +35,7 @@ def format_text(text: str, name: str = "") -> str:
 
 
 def _run_passes(text: str, name: str) -> str:
+    """Return the text after the passes, repeated until it does not change."""
     content = _content_of(text, name)
     for _ in range(MAX_ROUNDS):
         before = text
@@ -47,7 +49,7 @@ def _run_passes(text: str, name: str) -> str:
 
 
 def _content_of(text: str, name: str) -> tuple[object, list[str]]:
-    """Return what a text says - keys, values, quotes - and its comments."""
+    """Return the content of a text (keys, values, quotes) and its comments."""
     root = parse_yaml(Source(name, lines_of(text)), text)
     tokenised = tokenise(text)
     comments = [
@@ -58,6 +60,7 @@ def _content_of(text: str, name: str) -> tuple[object, list[str]]:
 
 
 def _to_plain_data(node: YamlNode) -> object:
+    """Return a node as nested lists and tuples."""
     match node:
         case ScalarNode(text, _, quoted):
             return text, quoted

@@ -1,4 +1,4 @@
-"""Schema: the shapes as a JSON Schema (draft-07), from which editors complete and explain keys."""
+"""JSON Schema: convert the shapes of keys to a schema (draft-07) for editors."""
 
 from __future__ import annotations
 
@@ -23,25 +23,30 @@ from modewright.editing.key_shape import (
 )
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
+"""The identifier of the draft."""
 SCALAR_TYPES = ["string", "number", "boolean"]
-"""How a single value of a spec looks to YAML; what it is, the checker decides from its text."""
+"""JSON types of a scalar; the checker decides the type of its text."""
 JSON_TYPES: Mapping[str, object] = {
     "whole": "integer",
     "truth": "boolean",
     "name": "string",
     "unit": ["string", "number"],
 }
+"""JSON types of special scalars."""
 NAME_PATTERN = "^\\$?[A-Za-z][A-Za-z0-9_]{0,30}$"
-"""A new name; in an effect a hole may stand for one."""
+"""The form of a new name; an effect may have a placeholder."""
 OVERLAY_PREFIX = "laid_"
-"""How the shapes of a variant begin: nothing is needed in them, everything may be removed."""
+"""Prefix of the definitions for overlays, in which no key is required and each may be removed."""
 REMOVAL_DEFINITION = "removal"
+"""The name of the definition of `{remove: true}`."""
 
 JsonSchema = dict[str, Any]
 
 
 def json_schema(kind: str | None = None) -> JsonSchema:
-    """Return the JSON Schema of one kind of file, or of all. Raises ValueError for others."""
+    """Return the JSON Schema of one kind of file, or of all. Raises ValueError for unknown
+    kinds.
+    """
     if kind is not None and kind not in DOCUMENT_KINDS:
         raise ValueError(f"`{kind}` is not one of {', '.join(DOCUMENT_KINDS)}")
     head: JsonSchema = {
@@ -67,18 +72,18 @@ def json_schema(kind: str | None = None) -> JsonSchema:
 
 
 def _kind_condition(name: str) -> JsonSchema:
-    """What tells that a file is of a kind, whose name may be a key of other kinds, too."""
+    """Return the condition that a file is of a kind; its name may be a key of other kinds."""
     others = [{"required": [kind]} for kind, keys in NON_HEAD_KEYS.items() if name in keys]
     return {"required": [name], **({"not": {"anyOf": others}} if others else {})}
 
 
 def schema_text(kind: str | None = None) -> str:
-    """Return the JSON Schema as text, with a line feed at its end."""
+    """Return the JSON Schema as text with a final line feed."""
     return json.dumps(json_schema(kind), indent=1) + "\n"
 
 
 def _definitions(kind: str | None) -> JsonSchema:
-    """Return what the schema of a kind refers to, directly or not."""
+    """Return all definitions to which the schema of a kind refers, directly or indirectly."""
     found: JsonSchema = {}
     waiting = [kind] if kind else list(DOCUMENT_KINDS)
     while waiting:
@@ -91,6 +96,7 @@ def _definitions(kind: str | None) -> JsonSchema:
 
 
 def _definition(name: str) -> JsonSchema:
+    """Return the schema of one definition."""
     if name == REMOVAL_DEFINITION:
         return {
             "type": "object",
@@ -112,6 +118,7 @@ def _definition(name: str) -> JsonSchema:
 
 
 def _object_schema(shape: Shape, is_overlay: bool) -> JsonSchema:
+    """Return the schema of a mapping with known keys."""
     keys = dict(shape.keys)
     is_file = shape.name in DOCUMENT_KINDS
     if is_overlay and is_file:
@@ -132,17 +139,20 @@ def _object_schema(shape: Shape, is_overlay: bool) -> JsonSchema:
 
 
 def _required_keys(shape: Shape) -> list[str]:
+    """Return the required keys of a shape."""
     head = ["language", shape.name] if shape.name in DOCUMENT_KINDS else []
     return [*head, *(word for word, _ in shape.discriminators), *shape.required]
 
 
 def _property_schema(key: Key, is_overlay: bool) -> JsonSchema:
+    """Return the schema of the value of a key, with its description."""
     if key.name == "language":
         return {"const": 1, "description": key.about}
     return {**_value_schema(key.kind, is_overlay), "description": key.about}
 
 
 def _value_schema(kind: ValueKind, is_overlay: bool) -> JsonSchema:
+    """Return the schema of a kind of value; in overlays it may be removed."""
     match kind:
         case Either():
             options = [_alternative_schema(each, is_overlay) for each in alternatives_of(kind)]
@@ -154,6 +164,7 @@ def _value_schema(kind: ValueKind, is_overlay: bool) -> JsonSchema:
 
 
 def _alternative_schema(kind: ValueKind, is_overlay: bool) -> JsonSchema:
+    """Return the schema of one alternative of a kind."""
     match kind:
         case Value(word, _):
             return {"type": JSON_TYPES.get(word, SCALAR_TYPES)}
@@ -174,4 +185,5 @@ def _alternative_schema(kind: ValueKind, is_overlay: bool) -> JsonSchema:
 
 
 def _reference(name: str, is_overlay: bool = False) -> JsonSchema:
+    """Return the reference to a definition."""
     return {"$ref": f"#/definitions/{OVERLAY_PREFIX if is_overlay else ''}{name}"}

@@ -1,6 +1,7 @@
-"""Shape: what keys a mapping of a spec may have, what each holds and means; read from shapes/.
+"""Key shapes: the keys that a mapping of a spec may have, with types and descriptions.
 
-The readers of the language name the keys that they know themselves; a test holds both equal.
+The shapes are read from `key_shapes/*.yaml`. The readers of the language define their keys
+independently; a test compares both.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from language.text.node_edit import entries
 from language.text.yaml_parser import parse_yaml
 
 VALUE_TYPES = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
-"""What a single value may be."""
+"""The types of scalars."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """A single value: one of WORDS; of a name, what it names (`mode`), empty for a new name."""
+    """A scalar of one of VALUE_TYPES; `target` is what a name refers to, empty for a new name."""
 
     type: str
     target: str = ""
@@ -29,21 +30,21 @@ class Value:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some words."""
+    """One of several words."""
 
     words: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class ListOf:
-    """A list."""
+    """A list of items."""
 
     item: ValueKind
 
 
 @dataclass(frozen=True)
 class MappingOf:
-    """A mapping with free keys: new names (`named`), or names of something else, times ..."""
+    """A mapping with free keys: new names if `has_new_names`, else existing names, times, etc."""
 
     item: ValueKind
     has_new_names: bool
@@ -51,14 +52,14 @@ class MappingOf:
 
 @dataclass(frozen=True)
 class ShapeRef:
-    """A mapping with known keys: the name of its shape."""
+    """A mapping with known keys, by the name of its shape."""
 
     shape: str
 
 
 @dataclass(frozen=True)
 class Either:
-    """One of several."""
+    """One of several kinds."""
 
     kinds: tuple[ValueKind, ...]
 
@@ -68,7 +69,7 @@ ValueKind = Value | Choice | ListOf | MappingOf | ShapeRef | Either
 
 @dataclass(frozen=True)
 class Key:
-    """A key: what it holds and what it means."""
+    """A key with the kind of its value and a description."""
 
     name: str
     kind: ValueKind
@@ -77,10 +78,10 @@ class Key:
 
 @dataclass(frozen=True)
 class Shape:
-    """A mapping with known keys, or (`either`) one of several others.
+    """A mapping with known keys, or one of several `alternatives`.
 
-    `needs` must be there, `when` says by which words it is told from others, `over` are the kinds
-    of files whose keys it may have too.
+    `required` keys must be present. `discriminators` are pairs of key and word that identify the
+    shape. `overlay_kinds` are the kinds of files whose keys it may have.
     """
 
     name: str
@@ -96,12 +97,12 @@ COMMON_KEYS = (
     Key("about", Value("text"), "what this is, in words"),
     Key("req", Either((Value("text"), ListOf(Value("text")))), "the requirements that it meets"),
 )
-"""Keys that go on anything and have no influence."""
+"""Keys that all mappings may have and that do not influence results."""
 
 
 @cache
 def shapes() -> Mapping[str, Shape]:
-    """Return all shapes by name; that of a kind of file has its name."""
+    """Return all shapes by name; the shape of a kind of file has the name of the kind."""
     folder = files("modewright.editing") / "key_shapes"
     found: dict[str, Shape] = {}
     for file in sorted(folder.iterdir(), key=lambda file: file.name):
@@ -114,6 +115,7 @@ def shapes() -> Mapping[str, Shape]:
 
 
 def _read_shape(name: str, body: MappingNode) -> Shape:
+    """Return the shape of an entry of a shape file."""
     keys = [_parse_key(key, text) for key, text in _read_texts(body, "keys")]
     about = body.get("about")
     return Shape(
@@ -128,40 +130,46 @@ def _read_shape(name: str, body: MappingNode) -> Shape:
 
 
 def _read_texts(body: MappingNode, key: str) -> Iterator[tuple[str, str]]:
+    """Yield key and text of the scalar entries of a section."""
     for entry in entries(body.get(key)):
         if isinstance(entry.node, ScalarNode):
             yield entry.key, entry.node.text
 
 
 def _read_words(body: MappingNode, key: str) -> tuple[str, ...]:
+    """Return the scalars of a list; empty if the key is absent."""
     node = body.get(key)
     items = node.nodes if isinstance(node, SequenceNode) else ()
     return tuple(item.text for item in items if isinstance(item, ScalarNode))
 
 
 def _parse_key(name: str, text: str) -> Key:
+    """Return the key of a text `kind -- description`."""
     kind, _, about = text.partition(" -- ")
     return Key(name, parse_kind(kind), about)
 
 
 def parse_kind(text: str) -> ValueKind:
-    """Return the kind that a text like `list of name of mode | any literal or course` says.
+    """Return the kind of a text such as `list of name of mode | any literal or course`.
 
-    What `or` joins are the items of a list or mapping; ` | ` joins whole alternatives.
+    `or` separates the alternatives of items, ` | ` those of the whole value. Raises ValueError.
     """
     return _parse_alternatives(text.split(" | "))
 
 
 def _parse_alternatives(options: list[str]) -> ValueKind:
+    """Return the kind of one or several options."""
     kinds = tuple(_parse_single_kind(option.split(" ")) for option in options)
     return kinds[0] if len(kinds) == 1 else Either(kinds)
 
 
 def _parse_items(words: list[str]) -> ValueKind:
+    """Return the kind of the items of a list or mapping."""
     return _parse_alternatives(" ".join(words).split(" or "))
 
 
 def _parse_single_kind(words: list[str]) -> ValueKind:
+    """Return the kind of a list of words. Raises ValueError."""
     match words:
         case ["one", "of", *rest]:
             return Choice(tuple(" ".join(rest).split(", ")))
@@ -179,7 +187,7 @@ def _parse_single_kind(words: list[str]) -> ValueKind:
 
 
 def alternatives_of(kind: ValueKind) -> Iterator[ValueKind]:
-    """Iterate over the alternatives of a kind."""
+    """Yield the alternatives of a kind, without nested alternatives."""
     if isinstance(kind, Either):
         for each in kind.kinds:
             yield from alternatives_of(each)

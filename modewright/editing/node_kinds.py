@@ -1,4 +1,4 @@
-"""Guide: which shape stands at a place of a document, so that an editor knows what fits there."""
+"""Node kinds: assign to each node of a document the kind of value that is expected there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from modewright.editing.key_shape import (
 
 @dataclass(frozen=True)
 class Place:
-    """A node, the keys that lead to it, and what it is meant to be."""
+    """A node with the keys that lead to it and the expected kind."""
 
     path: tuple[str, ...]
     node: YamlNode
@@ -30,17 +30,17 @@ class Place:
 
     @property
     def section(self) -> str:
-        """The last key on the way, empty for the whole file."""
+        """The last key of the path; empty for the root."""
         return self.path[-1] if self.path else ""
 
 
 def kind_of_file(root: MappingNode) -> str:
-    """Return the kind of a document by its keys; empty where it does not say."""
+    """Return the kind of a document according to its keys; empty if there is none."""
     return next((entry.key for entry in root if entry.key in DOCUMENT_KINDS), "")
 
 
 def root_shape(kind: str) -> Shape | None:
-    """Return the shape of a whole file; a variant has the keys of all that it may lie over."""
+    """Return the shape of a whole file; a variant has the keys of all kinds that it may overlay."""
     shape = shapes().get(kind)
     if shape is None or not shape.overlay_kinds:
         return shape
@@ -53,9 +53,9 @@ def root_shape(kind: str) -> Shape | None:
 
 
 def places(root: MappingNode, base: str = "") -> Iterator[Place]:
-    """Iterate over all nodes of a document with what they are meant to be, parents first.
+    """Yield all nodes of a document with their expected kinds, parents first.
 
-    `base` is the kind of what a variant is laid over, if that is known.
+    `base` is the kind of the base of a variant, if known.
     """
     kind = kind_of_file(root)
     shape = root_shape(kind)
@@ -71,6 +71,7 @@ def places(root: MappingNode, base: str = "") -> Iterator[Place]:
 
 
 def _iter_below(path: tuple[str, ...], node: YamlNode, kind: ValueKind) -> Iterator[Place]:
+    """Yield a node and the nodes below it."""
     kind = select_alternative(node, kind)
     yield Place(path, node, kind)
     match node, kind:
@@ -88,13 +89,13 @@ def _iter_below(path: tuple[str, ...], node: YamlNode, kind: ValueKind) -> Itera
 
 
 def select_alternative(node: YamlNode, kind: ValueKind) -> ValueKind:
-    """Return the alternative of a kind that a node looks like most; the first where none does."""
+    """Return the alternative of a kind that fits a node best; the first one in case of a tie."""
     options = list(alternatives_of(kind))
     return max(options, key=lambda option: _match_score(node, option))
 
 
 def _match_score(node: YamlNode, kind: ValueKind) -> float:
-    """Return how much a node looks like a kind: 0 not at all, more where known keys stand."""
+    """Return how well a node fits a kind: 0 for not at all, larger with more known keys."""
     match node, kind:
         case ScalarNode(), (ListOf() | MappingOf() | ShapeRef()):
             return 0.0
@@ -116,7 +117,7 @@ def _match_score(node: YamlNode, kind: ValueKind) -> float:
 
 
 def _known_key_share(node: MappingNode, shape: Shape) -> float:
-    """Return the share of keys that a shape knows; below zero where its words say otherwise."""
+    """Return the fraction of keys that a shape knows; -0.9 if a discriminator differs."""
     expected_words: Mapping[str, str] = dict(shape.discriminators)
     for key, word in expected_words.items():
         value = node.get(key)

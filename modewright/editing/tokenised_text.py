@@ -1,4 +1,4 @@
-"""Page: the lines of a YAML text with its tokens and comments, for layout without new meaning."""
+"""Tokenised text: the lines of a YAML text with tokens and comments, the input of format passes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ BLOCKS = (yaml.BlockMappingStartToken, yaml.BlockSequenceStartToken)
 
 @dataclass(frozen=True)
 class Token:
-    """A part of a text with its first and last line and column, from 0.
+    """A token with its first and last line and column (from 0).
 
-    `depth` counts the brackets around it, `level` the blocks.
+    `depth` is the number of enclosing brackets, `level` the number of enclosing blocks.
     """
 
     kind: type[yaml.Token]
@@ -33,7 +33,11 @@ class Token:
 
 @dataclass(frozen=True)
 class TokenisedText:
-    """A text as lines; `inside` are those within a value of several lines, `comments` columns."""
+    """A text as lines and tokens.
+
+    `continuation_lines` are the lines of multi-line tokens, `comment_columns` the columns of
+    comments by line.
+    """
 
     lines: tuple[str, ...]
     tokens: tuple[Token, ...]
@@ -42,7 +46,7 @@ class TokenisedText:
 
     @property
     def first_tokens(self) -> dict[int, Token]:
-        """The first token of each line that begins with one."""
+        """The first token of each line at which one starts."""
         tokens: dict[int, Token] = {}
         for token in self.tokens:
             tokens.setdefault(token.line, token)
@@ -51,7 +55,7 @@ class TokenisedText:
 
 @lru_cache(maxsize=4)
 def tokenise(text: str) -> TokenisedText:
-    """Return the page of a text that is YAML."""
+    """Return the tokenised form of a YAML text; the last four are cached."""
     lines = lines_of(text)
     tokens = tuple(_scan_tokens(text))
     inside = frozenset(
@@ -72,6 +76,7 @@ def tokenise(text: str) -> TokenisedText:
 
 
 def _scan_tokens(text: str) -> Iterable[Token]:
+    """Yield the tokens with text, with depth and level."""
     depth = level = 0
     for token in yaml.scan(text, Loader=yaml.CSafeLoader):
         start, end = token.start_mark, token.end_mark
@@ -90,5 +95,5 @@ def _scan_tokens(text: str) -> Iterable[Token]:
 
 
 def join_lines(lines: Iterable[str]) -> str:
-    """Return lines as a text that ends with one line feed."""
+    """Return lines as a text with a final line feed."""
     return "\n".join(lines) + "\n"

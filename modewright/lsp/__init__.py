@@ -1,1 +1,1 @@
-"""Language server: what an editor asks about specs while they are written."""
+"""Language server: diagnostics, completion, hover, navigation and rename for specs in editors."""

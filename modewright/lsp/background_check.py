@@ -1,6 +1,6 @@
-"""Proving: what takes seconds to find of a text, in a process that ends when the text changes.
+"""Background check: run the slow checks of a text in a process that is killed if the text changes.
 
-Read from stdin is which file, with the texts of the editor; written are its diagnostics.
+The process reads a request with file and texts from stdin and writes diagnostics to stdout.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from modewright.lsp.workspace import Workspace
 
 
 async def run_background_check(workspace: Workspace, path: Path) -> list[types.Diagnostic] | None:
-    """Return all problems of a file, None where they were not found; cancelled, nothing runs on."""
+    """Return all problems of a file; None if the process failed. Cancellation kills the process."""
     request = {
         "path": str(path),
         "root": str(workspace.root),
@@ -43,7 +43,7 @@ async def run_background_check(workspace: Workspace, path: Path) -> list[types.D
 
 
 def main() -> None:
-    """Answer one question."""
+    """Answer one request."""
     request = json.loads(sys.stdin.read())
     texts = {Path(file): text for file, text in request["texts"].items()}
     path = Path(request["path"])

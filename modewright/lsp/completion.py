@@ -1,4 +1,4 @@
-"""Completion: the keys, names, words and units that fit at a place of a text being written."""
+"""Completion: propose keys, names, words and units at a position of an incomplete text."""
 
 from __future__ import annotations
 
@@ -29,20 +29,23 @@ from modewright.lsp.symbol_table import Symbol, SymbolTable, build_symbol_table
 from modewright.lsp.workspace import Workspace
 
 CURSOR_MARK = "zzCURSORzz"
-"""Stands in the text for what is being written; no name of a spec looks like it."""
+"""Replaces the word at the cursor; no name of a spec contains it."""
 CLOSING_OF = {"{": "}", "[": "]"}
+"""The closing bracket of each opening one."""
 COMPOUND_UNITS = (
     *("N*m", "rad/s", "rad/s^2", "kg*m^2", "N*m/rad", "N*m*s/rad", "m/s", "m/s^2", "km/h"),
     *("N/m", "N*s/m", "1/s", "rad^2/s"),
 )
-"""Combined units that are often needed; others are put together from symbols."""
+"""Frequent compound units."""
 WRITABLE_KINDS = ("state", "discrete variable")
+"""Kinds of symbols that actions can assign."""
 NAME_GROUPS = {
     "mode": ("mode",),
     "template": ("template",),
     "fault": ("fault",),
     "event": ("event", "mode"),
 }
+"""Groups of symbols to which names of each target belong."""
 SPEC_KINDS = {
     "automaton": ("automaton", "variant"),
     "system": ("system", "automaton", "variant"),
@@ -51,12 +54,13 @@ SPEC_KINDS = {
     "calibration": ("calibration",),
     "spec": DOCUMENT_KINDS,
 }
+"""Kinds of files to which names of specs may refer."""
 Item = types.CompletionItem
 K = types.CompletionItemKind
 
 
 def complete(workspace: Workspace, path: Path, text: str, position: types.Position) -> list[Item]:
-    """Return what may be written at a position, whatever stands before it of the word."""
+    """Return the completions at a position, independent of the part of the word already written."""
     marked_document = _insert_mark(path, text, position, workspace.encoding)
     if marked_document is None:
         return _root_items()
@@ -77,7 +81,7 @@ def complete(workspace: Workspace, path: Path, text: str, position: types.Positi
 def _value_items(
     workspace: Workspace, symbols: SymbolTable, place: Place, before: str
 ) -> Iterator[Item]:
-    """What a value may be: what alone fits, where one thing is asked for, else all it may read."""
+    """Yield the completions of a value: the expected symbols if they are restricted, else all."""
     expected = None if _is_after_number(before) else expected_symbols(symbols, place, before)
     if expected is not None:
         for name, each in expected:
@@ -90,7 +94,10 @@ def _value_items(
 
 
 def _dotted_name_range(text: str, position: types.Position, encoding: str) -> types.Range | None:
-    """Return the place of a dotted name that is being written: editors see its last part alone."""
+    """Return the range of a dotted name at the cursor; None for names without dot.
+
+    Editors regard its last part as the word.
+    """
     at, line, start, column = _word_at(text, position, encoding)
     if "." not in line[start:column]:
         return None
@@ -99,12 +106,13 @@ def _dotted_name_range(text: str, position: types.Position, encoding: str) -> ty
 
 
 def _replace_range(item: Item, place: types.Range) -> Item:
-    """Return an item that takes a place as a whole."""
+    """Return an item that replaces a range as a whole."""
     item.text_edit = types.TextEdit(place, item.insert_text or item.label)
     return item
 
 
 def _root_items() -> list[Item]:
+    """Return the completions of an empty file: `language` and the kinds of files."""
     heads = [
         Item(kind, kind=K.Class, documentation=shapes()[kind].about) for kind in DOCUMENT_KINDS
     ]
@@ -114,9 +122,10 @@ def _root_items() -> list[Item]:
 def _insert_mark(
     path: Path, text: str, position: types.Position, encoding: str
 ) -> tuple[Document, str] | None:
-    """Return the document with a mark in place of the word at a position, and what is before it.
+    """Return the document with a mark in place of the word, and the text before it; None on
+    failure.
 
-    What is being written is seldom YAML: a colon, or the ends of brackets, may be missing.
+    Incomplete text is seldom valid YAML, so missing colons and brackets are tried.
     """
     lines = [*(text.splitlines() or [""]), ""]
     at, line, start, column = _word_at(text, position, encoding)
@@ -134,7 +143,7 @@ def _insert_mark(
 
 
 def _word_at(text: str, position: types.Position, encoding: str) -> tuple[int, str, int, int]:
-    """Return the number of a line, its text, and from where to where a word is written there."""
+    """Return line number, line, and start and end column of the word before a position."""
     lines = [*(text.splitlines() or [""]), ""]
     at = min(position.line, len(lines) - 1)
     column = column_of(lines[at], position, encoding)
@@ -144,7 +153,7 @@ def _word_at(text: str, position: types.Position, encoding: str) -> tuple[int, s
 
 
 def _closing_brackets(text: str) -> str:
-    """Return the brackets that end what is open at the end of a line."""
+    """Return the quotes and brackets that close those open at the end of a text."""
     opened: list[str] = []
     quote = ""
     for character in text:
@@ -160,7 +169,7 @@ def _closing_brackets(text: str) -> str:
 
 
 def _marked_place(document: Document) -> tuple[Place, bool] | None:
-    """Return the place of the mark, and whether it stands for a key of that place."""
+    """Return the place of the mark, and whether it stands for a key there; None if not found."""
     for place in places(document.root):
         match place.node, place.kind:
             case MappingNode() as node, _ if any(CURSOR_MARK in key for key in node.entries):
@@ -177,10 +186,12 @@ def _marked_place(document: Document) -> tuple[Place, bool] | None:
 
 
 def _holds_mark(items: SequenceNode) -> bool:
+    """Return whether a list contains the mark."""
     return any(isinstance(node, ScalarNode) and CURSOR_MARK in node.text for node in items.nodes)
 
 
 def _key_items(symbols: SymbolTable, place: Place) -> Iterator[Item]:
+    """Yield the keys that may be added to a mapping."""
     present: set[str] = set(place.node.entries) if isinstance(place.node, MappingNode) else set()
     for kind in alternatives_of(place.kind):
         if isinstance(kind, ShapeRef):
@@ -201,7 +212,9 @@ def _key_items(symbols: SymbolTable, place: Place) -> Iterator[Item]:
 
 
 def _free_key_items(symbols: SymbolTable, place: Place, present: set[str]) -> Iterator[Item]:
-    """What the keys of a mapping may be: targets, balanced states, what is written."""
+    """Yield the existing names that may be keys of a mapping: targets, states, assigned
+    variables.
+    """
     section = place.section
     if section == "transitions":
         items = [
@@ -220,6 +233,7 @@ def _free_key_items(symbols: SymbolTable, place: Place, present: set[str]) -> It
 
 
 def _instance_symbols(symbols: SymbolTable, place: Place) -> SymbolTable:
+    """Return the symbols of the instance whose values are set; else all symbols."""
     if place.section == "values" and len(place.path) > 1:
         return symbols.instances.get(place.path[-2], symbols)
     return symbols
@@ -228,6 +242,7 @@ def _instance_symbols(symbols: SymbolTable, place: Place) -> SymbolTable:
 def _kind_items(
     workspace: Workspace, symbols: SymbolTable, kind: ValueKind, before: str
 ) -> Iterator[Item]:
+    """Yield the completions of a kind of value."""
     match kind:
         case Choice(words):
             yield from (Item(word, kind=K.EnumMember) for word in words)
@@ -255,16 +270,18 @@ def _kind_items(
 
 
 def _is_after_number(before: str) -> bool:
+    """Return whether the text ends with a number and a blank, so that a unit follows."""
     return re.search(r"(^|[^\w.])\d[\d.]*(e[-+]?\d+)? $", before) is not None
 
 
 def _expression_items(symbols: SymbolTable) -> Iterator[Item]:
-    """What an expression may read."""
+    """Yield the names that an expression may contain."""
     yield from (_symbol_item(each) for each in symbols.in_groups("value"))
     yield from _instance_items(symbols, ())
 
 
 def _instance_items(symbols: SymbolTable, kinds: tuple[str, ...]) -> Iterator[Item]:
+    """Yield the symbols of instances with their prefixes, optionally of some kinds only."""
     for name, inner in symbols.instances.items():
         for each in inner.in_groups("value"):
             if not kinds or each.kind in kinds:
@@ -272,6 +289,7 @@ def _instance_items(symbols: SymbolTable, kinds: tuple[str, ...]) -> Iterator[It
 
 
 def _symbol_item(symbol: Symbol, label: str = "") -> Item:
+    """Return the completion of a symbol with unit and description."""
     node = symbol.node
     unit: YamlNode | None = node.get("unit") if isinstance(node, MappingNode) else None
     detail = f"{symbol.kind} [{unit.text}]" if isinstance(unit, ScalarNode) else symbol.kind
@@ -282,10 +300,12 @@ def _symbol_item(symbol: Symbol, label: str = "") -> Item:
 
 
 def _unit_items() -> Iterator[Item]:
+    """Yield the units."""
     return (Item(unit, kind=K.Unit) for unit in dict.fromkeys((*COMPOUND_UNITS, *SYMBOLS)))
 
 
 def _spec_items(workspace: Workspace, kinds: tuple[str, ...]) -> Iterator[Item]:
+    """Yield the specs of the project of some kinds, except effects."""
     project = workspace.project()
     for name, files in sorted(project.index.items()):
         document = workspace.document(files[0])
@@ -294,7 +314,7 @@ def _spec_items(workspace: Workspace, kinds: tuple[str, ...]) -> Iterator[Item]:
 
 
 def _describe_kind(kind: ValueKind) -> str:
-    """Return what a key holds, in a few words."""
+    """Return a short description of a kind of value."""
     texts = []
     for each in alternatives_of(kind):
         match each:

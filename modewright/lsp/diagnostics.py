@@ -1,4 +1,4 @@
-"""Problems: what `check` says of a text in an editor, as its diagnostics."""
+"""Diagnostics: convert the problems of a check to diagnostics of the protocol."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from modewright.lsp.positions import range_of, uri_of
 from modewright.lsp.workspace import Workspace
 
 SOURCE = "modewright"
+"""The source of diagnostics."""
 SEVERITIES = {
     "error": types.DiagnosticSeverity.Error,
     "warning": types.DiagnosticSeverity.Warning,
 }
+"""Severities of the protocol."""
 FILE_START = types.Range(types.Position(0, 0), types.Position(0, 0))
+"""The range at the start of a file."""
 
 
 def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
-    """Return the problems of a file without what takes long to prove.
+    """Return the problems of a file without slow checks.
 
-    One that lies in another file is told at the start of this; so is a defect of ours, with which
-    the other files are checked nevertheless.
+    Problems in other files are shown at the start of this one. An internal error becomes a
+    diagnostic, so that other files are still checked.
     """
     try:
         found = check_without_proofs(str(path), workspace.root, dict(workspace.texts))
@@ -35,11 +38,12 @@ def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
 
 
 def to_diagnostics(result: CheckResult, path: Path, encoding: str) -> list[types.Diagnostic]:
-    """Return what was found in a file as diagnostics."""
+    """Return the problems of a check as diagnostics of a file."""
     return [_to_diagnostic(problem, path.resolve(), encoding) for problem in result.problems]
 
 
 def _to_diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:
+    """Return a problem as a diagnostic; one in another file gets a related location."""
     message = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
     place = Path(problem.span.source.name).resolve()
     related = None

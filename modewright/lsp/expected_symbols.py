@@ -1,4 +1,7 @@
-"""Asked: what alone fits where one sort of name is asked for, be it words of an enum or modes."""
+"""Expected symbols: determine the names that fit where a certain sort of name is required.
+
+Examples are modes after `est.mode ==` and words after an enumeration.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,17 @@ from modewright.lsp.reference import region_of
 from modewright.lsp.symbol_table import Symbol, SymbolTable
 
 DECLARING_SECTIONS = ("inputs", "discrete", "parameters")
-"""Sections in which keys below a name hold its value, too."""
+"""Sections whose entries contain values of the declared name."""
 VALUE_KEYS = ("initial", "default", "value", "start")
-"""Those keys; so do the times of `steps`."""
+"""The keys of these values, besides the times of `steps`."""
 NamedSymbol = tuple[str, Symbol]
-"""What is offered, and what it is of."""
+"""A proposed name and its symbol."""
 
 
 def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[NamedSymbol] | None:
-    """Return what alone fits; None where nothing of that kind is asked for.
+    """Return the symbols that fit at a place; None if any name is possible.
 
-    `before` is what stands on the line before the word that is being written.
+    `before` is the text of the line before the word.
     """
     query = re.search(r"\b(in|fault)\(\s*$", before)
     if query:
@@ -47,7 +50,7 @@ def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[Na
 
 
 def all_modes(symbols: SymbolTable) -> Iterator[NamedSymbol]:
-    """Yield the modes by their paths, those of instances and of the model by theirs."""
+    """Yield the modes by path, including those of instances and of the model with prefixes."""
     yield from _qualified_symbols(symbols, ("mode",))
     if symbols.model:
         for each in symbols.model.in_groups("mode"):
@@ -55,13 +58,14 @@ def all_modes(symbols: SymbolTable) -> Iterator[NamedSymbol]:
 
 
 def _qualified_symbols(symbols: SymbolTable, groups: tuple[str, ...]) -> Iterator[NamedSymbol]:
+    """Yield the symbols of groups, including those of instances with prefixes."""
     yield from ((each.name, each) for each in symbols.in_groups(*groups))
     for name, inner in symbols.instances.items():
         yield from ((f"{name}.{each.name}", each) for each in inner.in_groups(*groups))
 
 
 def _comparable_symbols(symbols: SymbolTable, path: str) -> list[NamedSymbol] | None:
-    """Return the modes of a region, named beside it, or the words of an enum."""
+    """Return the modes of a region, or the words of an enumeration; None for other names."""
     region = region_of(symbols, path)
     if region is None:
         return _enum_symbols(symbols, path)
@@ -79,7 +83,7 @@ def _comparable_symbols(symbols: SymbolTable, path: str) -> list[NamedSymbol] | 
 
 
 def _testable_modes(symbols: SymbolTable, path: tuple[str, ...]) -> list[NamedSymbol] | None:
-    """Return the innermost modes of the region beside which a test lists them."""
+    """Return the leaf modes of the region of an expectation."""
     expected = symbols.document.root.get("expect")
     own = expected.get(path[1]) if isinstance(expected, MappingNode) else None
     of = own.get("of") if isinstance(own, MappingNode) else None
@@ -94,14 +98,14 @@ def _testable_modes(symbols: SymbolTable, path: tuple[str, ...]) -> list[NamedSy
 
 
 def _assigned_name_of(path: tuple[str, ...]) -> str:
-    """Return the name whose value stands at a path, if it is one."""
+    """Return the name whose value is at a path; empty if there is none."""
     if len(path) > 2 and path[0] in DECLARING_SECTIONS:
         return path[1] if path[2] in VALUE_KEYS or path[2:3] == ("steps",) else ""
     return path[-1] if path else ""
 
 
 def _enum_symbols(symbols: SymbolTable, path: str) -> list[NamedSymbol] | None:
-    """Return the words of an enum, then what else has the same words; None for what is none."""
+    """Return the words of an enumeration and the symbols with the same words; None for others."""
     values = list(_qualified_symbols(symbols, ("value",)))
     of = next((each for name, each in values if name == path and _enum_words(each)), None)
     if of is None:
@@ -113,18 +117,20 @@ def _enum_symbols(symbols: SymbolTable, path: str) -> list[NamedSymbol] | None:
 
 
 def _enum_words(symbol: Symbol) -> list[str]:
+    """Return the words of an enumeration; empty for other symbols."""
     values = symbol.node.get("values") if isinstance(symbol.node, MappingNode) else None
     nodes = values.nodes if isinstance(values, SequenceNode) else ()
     return [node.text for node in nodes if isinstance(node, ScalarNode)]
 
 
 def _is_input_event(event: Symbol) -> bool:
+    """Return whether an event comes from an input."""
     given = event.node.get("from") if isinstance(event.node, MappingNode) else None
     return isinstance(given, ScalarNode) and given.text == "input"
 
 
 def _is_time(symbol: Symbol) -> bool:
-    """Tell whether this is a parameter that is a time, by its unit or its value."""
+    """Return whether a symbol is a parameter that is a time, by its unit or value."""
     if symbol.kind != "parameter" or not isinstance(symbol.node, MappingNode):
         return False
     unit, value = symbol.node.get("unit"), symbol.node.get("value")

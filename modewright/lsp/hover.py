@@ -1,4 +1,4 @@
-"""Hover: what a name or a key means - unit, value, range, text, and who reads it."""
+"""Hover: describe the name or key at a position - unit, value, range, text and references."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from modewright.lsp.symbol_table import Symbol
 from modewright.lsp.workspace import Workspace
 
 SHOWN_KEYS = ("unit", "value", "derived", "default", "initial", "range", "tunable", "type", "of")
-"""Keys of a declaration that tell what it is, in this order."""
+"""Keys of a declaration that are shown, in this order."""
 MAX_READERS = 12
+"""Largest number of references that are listed."""
 
 
 def reference_at(workspace: Workspace, path: Path, position: types.Position) -> Reference | None:
-    """Return what is named at a position; of parts that touch there the last one."""
+    """Return the reference at a position; the last one if parts of a name meet there."""
     found = [
         each
         for each in find_references(workspace, path)
@@ -35,7 +36,7 @@ def reference_at(workspace: Workspace, path: Path, position: types.Position) -> 
 
 
 def hover(workspace: Workspace, path: Path, position: types.Position) -> types.Hover | None:
-    """Return what is told of the name or key at a position."""
+    """Return the description of the name or key at a position; None if there is none."""
     reference = reference_at(workspace, path, position)
     if reference:
         return _make_hover(workspace, _describe_symbol(workspace, reference.symbol), reference.span)
@@ -48,6 +49,7 @@ def hover(workspace: Workspace, path: Path, position: types.Position) -> types.H
 
 
 def _make_hover(workspace: Workspace, text: str, span: Span) -> types.Hover:
+    """Return Markdown text for a span."""
     content = types.MarkupContent(types.MarkupKind.Markdown, text)
     return types.Hover(content, range_of(span, workspace.encoding))
 
@@ -55,6 +57,7 @@ def _make_hover(workspace: Workspace, text: str, span: Span) -> types.Hover:
 def _key_at(
     document: Document, position: types.Position, encoding: str
 ) -> tuple[Entry, Key] | None:
+    """Return the entry and the key at a position; None if there is none."""
     for place in places(document.root):
         if isinstance(place.node, MappingNode) and isinstance(place.kind, ShapeRef):
             for entry in place.node:
@@ -65,6 +68,7 @@ def _key_at(
 
 
 def _describe_symbol(workspace: Workspace, symbol: Symbol) -> str:
+    """Return the description of a symbol in Markdown."""
     lines = [f"**{symbol.name}** - {symbol.kind}, {_format_place(symbol)}", ""]
     node = symbol.node.root if isinstance(symbol.node, Document) else symbol.node
     about = node.get("about") if isinstance(node, MappingNode) else None
@@ -84,11 +88,12 @@ def _describe_symbol(workspace: Workspace, symbol: Symbol) -> str:
 
 
 def _format_place(symbol: Symbol) -> str:
+    """Return `file:line` of a declaration."""
     return f"{display_path(symbol.file)}:{symbol.span.line}"
 
 
 def _entry_text(entry: Entry) -> str:
-    """Return what is written behind a key, on one line."""
+    """Return the text of a value on one line."""
     span = entry.node.span
     if isinstance(entry.node, ScalarNode):
         return entry.node.text
@@ -97,7 +102,7 @@ def _entry_text(entry: Entry) -> str:
 
 
 def _derived_value_lines(workspace: Workspace, symbol: Symbol) -> list[str]:
-    """The value of a derived parameter, where its automaton can be read."""
+    """Return the line with the value of a derived parameter; empty if it cannot be computed."""
     try:
         automaton = load_automaton(str(symbol.file), workspace.project())
         formula = automaton.parameters[symbol.name].derived
@@ -110,6 +115,7 @@ def _derived_value_lines(workspace: Workspace, symbol: Symbol) -> list[str]:
 
 
 def _reader_names(readers: list[Reference]) -> list[str]:
+    """Return the paths of references, limited to MAX_READERS."""
     paths = dict.fromkeys(f"`{_file_prefix(each)}{'.'.join(each.path)}`" for each in readers)
     shown_names = list(paths)[:MAX_READERS]
     return (
@@ -120,5 +126,5 @@ def _reader_names(readers: list[Reference]) -> list[str]:
 
 
 def _file_prefix(reference: Reference) -> str:
-    """The name of the file, where it is another one than that of the declaration."""
+    """Return the name of the file of a reference; empty if it declares the symbol."""
     return "" if reference.is_in_declaring_file else f"{Path(reference.span.source.name).stem} "

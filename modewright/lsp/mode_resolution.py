@@ -1,7 +1,7 @@
-"""Mode name: what each part of the name of a mode or region stands for, where it is written.
+"""Mode resolution: find the modes and regions that the parts of a name denote.
 
-As in `language/model/chart_paths.py`: a path from the root is exact, else a name is looked for outwards,
-a transition's beside its mode first and inside it last.
+The rules are those of `language/model/chart_paths.py`: a path from the root is exact, else the
+search goes outwards. A transition's target is searched beside its mode first and inside it last.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from language.ir.regions import CHART
 from modewright.lsp.symbol_table import Symbol, SymbolTable, mode_path
 
 NamePart = tuple[int, str]
-"""A part of a dotted name: where it begins, and its text."""
+"""A part of a dotted name: its offset and its text."""
 Resolution = Iterator[tuple[NamePart, Symbol | None]]
+"""Parts of a name with their symbols, None for unknown ones."""
 KeyPath = tuple[str, ...]
 
 
 def split_name(text: str) -> list[NamePart]:
-    """Return the parts of a dotted name."""
+    """Return the parts of a dotted name with their offsets."""
     parts, offset = [], 0
     for part in text.split("."):
         parts.append((offset, part))
@@ -29,9 +30,9 @@ def split_name(text: str) -> list[NamePart]:
 def resolve_mode_parts(
     symbols: SymbolTable, parts: Sequence[NamePart], path: KeyPath = ()
 ) -> Resolution:
-    """Yield the parts of a name of a mode with the modes and regions that they name.
+    """Yield the parts of the name of a mode with the modes and regions that they denote.
 
-    `path` are the keys that lead to where it is written.
+    `path` are the keys that lead to the name. Yields nothing if no part is known.
     """
     if len(parts) > 1 and parts[0][1] == CHART:
         yield parts[0], symbols.names.get(("region", CHART))
@@ -47,12 +48,13 @@ def resolve_mode_parts(
 
 
 def _find_mode(symbols: SymbolTable, scope: str, name: str) -> Symbol | None:
+    """Return the mode or region of a name in a scope; None if there is none."""
     name = f"{scope}.{name}" if scope else name
     return symbols.names.get(("mode", name)) or symbols.names.get(("region", name))
 
 
 def _lookup_scopes(path: KeyPath, is_dotted: bool) -> list[str]:
-    """Return the modes and regions in which a name is looked for, in this order."""
+    """Return the scopes in which a name is searched, in this order."""
     enclosing, last = mode_path(path).split("."), ""
     if "transition_table" in path:
         row = path[path.index("transition_table") + 2 :][:1]

@@ -1,4 +1,6 @@
-"""Name: every name that is written in a spec, with its place and how it is meant."""
+"""Name occurrences: find the names in a spec with their places and the sort of thing they
+denote.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,16 @@ FREE_KEY_SECTIONS = (
     *("points", "rows", "columns", "redirect", "steps", "table", "pages", "windows"),
     *("if", "invariant", "expect"),
 )
-"""Sections whose keys are no names of the spec."""
+"""Sections whose keys are not names of the spec."""
 QUERIED_KINDS = {"in": "asked_mode", "fault": "asked_fault"}
-"""What these functions are asked about."""
+"""Sorts of names that are arguments of these functions."""
 
 
 @dataclass(frozen=True)
 class NameOccurrence:
-    """A dotted name as it is written: where, by which keys, and what it is to name.
+    """A dotted name with its place, the keys that lead to it, and the sort of thing it denotes.
 
-    A mode may be that of an instance, or of a region of one, which `owner` names.
+    `owner` is the instance or region of a mode, if it is stated beside the name.
     """
 
     text: str
@@ -37,11 +39,12 @@ class NameOccurrence:
 
 
 def find_names(document: Document) -> tuple[NameOccurrence, ...]:
-    """Return the names that are written in a document, in its order."""
+    """Return the names in a document in its order."""
     return tuple(_iter_names(document))
 
 
 def _iter_names(document: Document) -> Iterator[NameOccurrence]:
+    """Yield the names in a document."""
     yield NameOccurrence(document.name, document.name_span, (document.kind,), "spec")
     for place in places(document.root):
         if place.kind == ShapeRef("expectation") and isinstance(place.node, MappingNode):
@@ -56,7 +59,7 @@ def _iter_names(document: Document) -> Iterator[NameOccurrence]:
 
 
 def _expected_modes(place: Place, table: MappingNode) -> Iterator[NameOccurrence]:
-    """Modes that a test expects are those of the instance beside them."""
+    """Yield the modes that a test expects; they belong to the instance `of`."""
     of, modes = table.get("of"), table.get("modes")
     owner = of.text if isinstance(of, ScalarNode) else ""
     for node in modes.nodes if isinstance(modes, SequenceNode) else ():
@@ -66,6 +69,7 @@ def _expected_modes(place: Place, table: MappingNode) -> Iterator[NameOccurrence
 
 
 def _names_in_key(place: Place, entry: Entry) -> Iterator[NameOccurrence]:
+    """Yield the names in a key of a mapping with free keys."""
     section, path = place.section, (*place.path, entry.key)
     if section == "modes":
         yield NameOccurrence(entry.key, entry.text_span, path, "mode", is_key=True)
@@ -91,6 +95,7 @@ def _names_in_key(place: Place, entry: Entry) -> Iterator[NameOccurrence]:
 
 
 def _names_in_scalar(place: Place, scalar: ScalarNode) -> Iterator[NameOccurrence]:
+    """Yield the names in a scalar according to its kind."""
     match place.kind:
         case Value("name", "event"):
             yield from _event_names(place, scalar)
@@ -103,7 +108,7 @@ def _names_in_scalar(place: Place, scalar: ScalarNode) -> Iterator[NameOccurrenc
 
 
 def _event_names(place: Place, scalar: ScalarNode) -> Iterator[NameOccurrence]:
-    """An event, or a transition from one mode to another."""
+    """Yield the name of an event, or both modes of a transition `a -> b`."""
     offset = 0
     for part in scalar.text.split("->"):
         text = part.strip()
@@ -113,9 +118,10 @@ def _event_names(place: Place, scalar: ScalarNode) -> Iterator[NameOccurrence]:
 
 
 def _names_in_expression(place: Place, scalar: ScalarNode, word: str) -> Iterator[NameOccurrence]:
-    """What stands beside `est.mode ==` is a mode of `est`, what `in(...)` asks for is a mode.
+    """Yield the names in an expression; invalid expressions yield none.
 
-    Beside another name it is one if that is a region, which is known where names have a meaning.
+    Names beside `==` get the other side as owner; arguments of `in` and `fault` are modes and
+    faults. Whether a compared name is a mode is decided when it is resolved.
     """
     try:
         trees = parse_balance(scalar) if word == "balance" else (parse_expression(scalar),)

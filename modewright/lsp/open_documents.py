@@ -1,4 +1,4 @@
-"""Desk: the open texts by project, and which of them are to be checked; one check at a time."""
+"""Open documents: track the texts of the editor and schedule their checks one after another."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ from modewright.lsp.positions import path_of
 from modewright.lsp.workspace import Workspace, project_root_of
 
 DEBOUNCE_SECONDS = 0.02
-"""How long nothing must be written before a text is checked: what is pasted comes in one go."""
+"""Time [s] without changes before a quick check."""
 PROOF_DELAY_SECONDS = 0.5
-"""How long nothing must be written before what takes long is looked for."""
+"""Time [s] without changes before the slow checks."""
 
 Publish = Callable[[str, int | None, list[types.Diagnostic]], None]
+"""A function that sends diagnostics: URI, version, diagnostics."""
 
 
 @dataclass(frozen=True)
 class ProofResult:
-    """What took long to find of a text, with its lines: it is shown on until it is found anew."""
+    """The result of the slow checks of a text; it remains visible until the next one."""
 
     lines: tuple[str, ...]
     diagnostics: tuple[types.Diagnostic, ...]
 
     def unchanged_diagnostics(self, lines: tuple[str, ...]) -> list[types.Diagnostic]:
-        """Return what lies on lines that are as they were."""
+        """Return the diagnostics on lines that did not change."""
         places = [(each, each.range.start.line) for each in self.diagnostics]
         return [each for each, k in places if lines[k : k + 1] == self.lines[k : k + 1]]
 
 
 @dataclass
 class OpenDocuments:
-    """What is open in the editor: worlds by folder, addresses and versions by file."""
+    """The open files with their workspaces, pending checks and results."""
 
     publish: Publish
     encoding: str = "utf-16"
@@ -51,7 +52,7 @@ class OpenDocuments:
     proof_task: asyncio.Task[None] | None = None
 
     def workspace_of(self, uri: str) -> tuple[Workspace, Path]:
-        """Return the project of a file, and its path."""
+        """Return the workspace of a file and its path."""
         path = path_of(uri)
         root = project_root_of(path)
         if root not in self.workspaces:
@@ -59,7 +60,9 @@ class OpenDocuments:
         return self.workspaces[root], path
 
     def update(self, uri: str, version: int | None, text: str | None) -> None:
-        """Take a new text of a file (None: it is closed); it is checked soon, others after it."""
+        """Store a new text (None: closed) and schedule checks, of this file first and then of the
+        others.
+        """
         workspace, path = self.workspace_of(uri)
         workspace.set_text(path, None if text is None else _replace_surrogates(text))
         if text is None:
@@ -77,7 +80,9 @@ class OpenDocuments:
             self.check_task = asyncio.get_running_loop().create_task(self._check())
 
     async def _check(self) -> None:
-        """Check what waits, what was changed last first; a text that changed meanwhile, again."""
+        """Run the pending quick checks, last change first.
+        A result is discarded if the text changed meanwhile. Slow checks follow at the end.
+        """
         while self.pending_checks:
             before = dict(self.open_files)
             await asyncio.sleep(DEBOUNCE_SECONDS)
@@ -98,11 +103,12 @@ class OpenDocuments:
         self.proof_task = asyncio.get_running_loop().create_task(self._prove())
 
     def _unchanged_diagnostics(self, path: Path, workspace: Workspace) -> list[types.Diagnostic]:
+        """Return the earlier results of slow checks on unchanged lines."""
         known = self.proof_results.get(path)
         return known.unchanged_diagnostics(lines_of(workspace.texts[path])) if known else []
 
     async def _prove(self) -> None:
-        """Look for what takes long in the texts without errors; the next change ends this."""
+        """Run the slow checks of texts without errors; the next change cancels this."""
         await asyncio.sleep(PROOF_DELAY_SECONDS)
         while self.pending_proofs:
             path, before = next(iter(self.pending_proofs.items()))
@@ -118,9 +124,10 @@ class OpenDocuments:
 
 
 def _replace_surrogates(text: str) -> str:
-    """Return a text with a sign in place of each half of a character, which no file can hold."""
+    """Return a text with unpaired surrogates replaced, which no file can contain."""
     return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def _has_no_error(diagnostics: list[types.Diagnostic]) -> bool:
+    """Return whether no diagnostic is an error."""
     return all(each.severity != types.DiagnosticSeverity.Error for each in diagnostics)

@@ -1,4 +1,4 @@
-"""Outline: what a spec declares, section by section, modes with what is inside them."""
+"""Outline: list the declarations of a spec by section, with nested modes."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ SECTION_KINDS = {
     "measures": K.Variable,
     "vary": K.Variable,
 }
-"""Sections whose keys are shown, and as what an editor draws them."""
+"""Sections whose keys are listed, with the kind of symbol."""
 KeyPath = tuple[str, ...]
 
 
 def outline(workspace: Workspace, path: Path) -> list[types.DocumentSymbol]:
-    """Return the spec with its sections, and in these what they declare."""
+    """Return the symbol of the document with sections and declarations as children."""
     document = workspace.document(path)
     if document is None:
         return []
@@ -74,7 +74,7 @@ def _add_symbol(
     kind: types.SymbolKind,
     encoding: str,
 ) -> None:
-    """Add a thing to the nearest that holds it."""
+    """Add a symbol as a child of the nearest enclosing symbol."""
     outer = next(path[:count] for count in range(len(path) - 1, -1, -1) if path[:count] in symbols)
     symbols[path] = _document_symbol(entry.key, kind, entry.span, entry.node, encoding)
     inner = symbols[outer].children
@@ -84,6 +84,7 @@ def _add_symbol(
 def _document_symbol(
     name: str, kind: types.SymbolKind, span: Span, node: YamlNode, encoding: str
 ) -> types.DocumentSymbol:
+    """Return a symbol whose range covers its key and all of its value."""
     own = range_of(span, encoding)
     last = max(_spans(node), key=lambda each: (each.line, each.column + each.width))
     end = max(own.end, range_of(last, encoding).end)
@@ -91,7 +92,7 @@ def _document_symbol(
 
 
 def _spans(node: YamlNode) -> Iterator[Span]:
-    """Yield the places of all keys and values of a node."""
+    """Yield the spans of all keys and values of a node."""
     yield node.span
     match node:
         case MappingNode():

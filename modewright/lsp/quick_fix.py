@@ -1,4 +1,4 @@
-"""Repair: the changes that the help of a problem names, offered where the problem is shown."""
+"""Quick fixes: offer the replacements that the help of a problem contains."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ REPLACEMENT_PATTERNS = (
     re.compile(r"^help: did you mean `(.+?)`\?", re.MULTILINE),
     re.compile(r"^help: write `(\S+?)`:", re.MULTILINE),
 )
-"""Helps that give the very text to write at the place of the problem."""
+"""Forms of help texts that contain the replacement for the span of the problem."""
 
 
 def quick_fixes(uri: str, diagnostics: Sequence[types.Diagnostic]) -> Iterator[types.CodeAction]:
-    """Yield the change that each problem's help names, if it names one."""
+    """Yield an edit for each problem of this server whose help contains a replacement."""
     for problem in diagnostics:
         found = [match for each in REPLACEMENT_PATTERNS if (match := each.search(problem.message))]
         if not found or problem.source != SOURCE or problem.related_information:

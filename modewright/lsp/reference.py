@@ -1,4 +1,4 @@
-"""Mention: every place of a spec that names something, and what it names."""
+"""References: find the places of a spec that refer to a symbol."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ from modewright.lsp.symbol_table import (
 from modewright.lsp.workspace import Workspace
 
 STUDY_PREFIXES = ("initial", "inputs")
-"""What stands before names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
+"""Prefixes of names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
 SPEC_LOCAL_KINDS = ("template", "fault")
-"""What is named inside one spec only; an event of a study is a mode that is entered."""
+"""Sorts of names that are local to a spec; the event of a study is a mode."""
 INSTANCE_SECTIONS = (("values",), ("inputs",))
-"""Sections of an instance whose keys are its names, not ours."""
+"""Sections of an instance whose keys are names of the instance."""
 SPEC_TARGETS = ("automaton", "system", "scenario", "map", "calibration", "spec", "effect")
+"""Sorts of names that denote files."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A part of a name that stands for something; `path` are the keys that lead to it."""
+    """A part of a name that refers to a symbol; `path` are the keys that lead to it."""
 
     symbol: Symbol
     span: Span
@@ -39,18 +40,20 @@ class Reference:
 
     @property
     def is_declaration(self) -> bool:
-        """Whether this is where the thing gets its name; an equation does so in several modes."""
+        """Whether this declares the symbol; an equation is declared in each mode that defines
+        it.
+        """
         is_equation = self.is_key and self.path[-2:-1] == ("equations",)
         return self.span == self.symbol.span or (is_equation and self.is_in_declaring_file)
 
     @property
     def is_in_declaring_file(self) -> bool:
-        """Whether this stands in the file that declares the thing."""
+        """Whether this is in the file that declares the symbol."""
         return Path(self.span.source.name).resolve() == self.symbol.file
 
 
 def find_references(workspace: Workspace, path: Path) -> list[Reference]:
-    """Return what a spec names, in the order of the file."""
+    """Return the references in a spec in the order of the file; empty if it cannot be read."""
     symbols = load_symbol_table(workspace, path)
     result = []
     for name in workspace.names(path) if symbols else ():
@@ -63,7 +66,7 @@ def find_references(workspace: Workspace, path: Path) -> list[Reference]:
 
 
 def references_to(workspace: Workspace, symbol: Symbol) -> list[Reference]:
-    """Return where something is named, in the whole project and in the file that declares it."""
+    """Return all references to a symbol in the project and in the file that declares it."""
     files = dict.fromkeys((symbol.file, *(path for path, _ in workspace.documents())))
     return [
         reference
@@ -74,7 +77,7 @@ def references_to(workspace: Workspace, symbol: Symbol) -> list[Reference]:
 
 
 def resolve_name(workspace: Workspace, symbols: SymbolTable, name: NameOccurrence) -> Resolution:
-    """Yield the parts of a dotted name with what each stands for."""
+    """Yield the parts of a dotted name with the symbols that they denote."""
     whole = (0, name.text)
     if name.kind in SPEC_TARGETS:
         yield whole, _resolve_spec(workspace, symbols, name)
@@ -111,6 +114,7 @@ def resolve_name(workspace: Workspace, symbols: SymbolTable, name: NameOccurrenc
 def _resolve_spec(
     workspace: Workspace, symbols: SymbolTable, name: NameOccurrence
 ) -> Symbol | None:
+    """Return the symbol of a file by name; None if there is none."""
     if name.text == symbols.document.name:
         return symbols.names.get(("spec", name.text))
     path = workspace.find_file(name.text, symbols.file, is_effect=name.kind == "effect")
@@ -129,7 +133,7 @@ def _symbol_of_key(symbols: SymbolTable, name: NameOccurrence) -> Symbol | None:
 def _resolve_value(
     symbols: SymbolTable, parts: Sequence[NamePart], name: NameOccurrence
 ) -> Resolution:
-    """Yield what a name in an expression stands for; inside `in(...)` it is a mode."""
+    """Yield the symbols of a name in an expression; arguments of `in` are modes."""
     if not parts:
         return
     head, *rest = parts
@@ -156,9 +160,9 @@ def _resolve_value(
 
 
 def region_of(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str] | None:
-    """Return whose modes a name in an expression has, and of which region; None for other names.
+    """Return the symbol table and the region whose mode a name denotes; None for other names.
 
-    It is `mode`, `est.mode`, `est.gap`, or alone `gap`.
+    Such names are `mode`, `est.mode`, `est.gap` or `gap`.
     """
     inner, region = _split_instance(symbols, path)
     if region.rpartition(".")[2] == "mode":
@@ -167,19 +171,20 @@ def region_of(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str] | None
 
 
 def _split_instance(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str]:
-    """Return the automaton that a path begins with, and the region that is left of it."""
+    """Return the symbol table of the instance at the start of a path, and the rest of the path."""
     head, _, region = path.partition(".")
     return (symbols.instances[head], region) if head in symbols.instances else (symbols, path)
 
 
 def _resolve_mode(symbols: SymbolTable, region: str, parts: Sequence[NamePart]) -> Resolution:
-    """Yield what a mode of a region stands for, or of the chart where none is named."""
+    """Yield the symbols of the name of a mode in a region; an empty region is the main one."""
     before = split_name(region) if region else []
     found = list(resolve_mode_parts(symbols, [*before, *parts]))
     yield from found[len(before) :]
 
 
 def _resolve_model_mode(symbols: SymbolTable, parts: Sequence[NamePart]) -> Resolution:
+    """Yield the symbols of the name of a mode of the model, with the model's name as prefix."""
     model = symbols.model
     if model and len(parts) > 1 and parts[0][1] == model.document.name:
         yield parts[0], model.names.get(("spec", parts[0][1]))

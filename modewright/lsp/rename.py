@@ -1,4 +1,4 @@
-"""Rename: where something is declared and named, and the edits that give it another name."""
+"""Rename: find the declaration and the references of a symbol, and rename it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from modewright.lsp.workspace import Workspace
 
 
 def definition(workspace: Workspace, path: Path, position: types.Position) -> list[types.Location]:
-    """Return where the thing at a position is declared; an equation of modes in each of them."""
+    """Return the declarations of the symbol at a position; an equation may have several."""
     reference = reference_at(workspace, path, position)
     found = find_references(workspace, reference.symbol.file) if reference else []
     return [
@@ -32,7 +32,7 @@ def definition(workspace: Workspace, path: Path, position: types.Position) -> li
 def references(
     workspace: Workspace, path: Path, position: types.Position, with_declaration: bool
 ) -> list[types.Location]:
-    """Return where the thing at a position is named, in the whole project."""
+    """Return the references to the symbol at a position in the whole project."""
     reference = reference_at(workspace, path, position)
     found = references_to(workspace, reference.symbol) if reference else []
     return [
@@ -43,7 +43,7 @@ def references(
 def rename(
     workspace: Workspace, path: Path, position: types.Position, name: str
 ) -> types.WorkspaceEdit:
-    """Return the edits that rename the thing at a position everywhere. Raises RenameRefused."""
+    """Return the edits that rename the symbol at a position everywhere. Raises RenameRefused."""
     reference = reference_at(workspace, path, position)
     if reference is None:
         raise RenameRefused("there is nothing here that has a name")
@@ -65,6 +65,7 @@ def rename(
 
 
 def _require_renamable(workspace: Workspace, reference: Reference, name: str) -> None:
+    """Raise RenameRefused for an invalid or used name, and for symbols outside the project."""
     symbol = reference.symbol
     problems = Problems()
     check_name(name, reference.span, problems)
@@ -84,5 +85,6 @@ def _require_renamable(workspace: Workspace, reference: Reference, name: str) ->
 
 
 def _location(workspace: Workspace, reference: Reference) -> types.Location:
+    """Return the location of a reference."""
     where = range_of(reference.span, workspace.encoding)
     return types.Location(uri_of(Path(reference.span.source.name)), where)

@@ -1,4 +1,4 @@
-"""Renamed: a project as it would be after a rename, looked at before anybody gets the edits."""
+"""Rename check: check the project that a rename would produce before the edits are returned."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from modewright.lsp.workspace import Workspace
 
 
 class RenameRefused(Exception):
-    """A name cannot be given; the message says why."""
+    """A symbol cannot be renamed; the message states the reason."""
 
 
 def replace_last_part(path: str, name: str) -> str:
-    """Return the path of something that gets another name of its own."""
+    """Return a dotted path with another last part."""
     outer, dot, _ = path.rpartition(".")
     return f"{outer}{dot}{name}"
 
@@ -28,7 +28,7 @@ def replace_last_part(path: str, name: str) -> str:
 def require_same_meaning(
     workspace: Workspace, symbol: Symbol, spans: Sequence[Span], name: str
 ) -> None:
-    """Raise RenameRefused where the new name means something else, or breaks what was right."""
+    """Raise RenameRefused if the new name denotes something else or causes errors."""
     after = Workspace(
         workspace.root, workspace.encoding, workspace.texts | _edited_texts(spans, name)
     )
@@ -44,6 +44,7 @@ def require_same_meaning(
 
 
 def _require_no_new_error(workspace: Workspace, after: Workspace, path: Path) -> None:
+    """Raise RenameRefused if a file has more errors than before."""
     broken = _find_errors(after, path)
     if not broken:
         return
@@ -55,12 +56,13 @@ def _require_no_new_error(workspace: Workspace, after: Workspace, path: Path) ->
 
 
 def _find_errors(workspace: Workspace, path: Path) -> list[Problem]:
+    """Return the errors of a file without slow checks."""
     found = check_without_proofs(str(path), workspace.root, workspace.texts).problems
     return [each for each in found if each.severity == "error"]
 
 
 def _edited_texts(spans: Sequence[Span], name: str) -> dict[Path, str]:
-    """Return the texts of the files that are edited, with the new name in all places."""
+    """Return the texts of the edited files with the new name."""
     lines_by_file: dict[Path, list[str]] = {}
     for span in sorted(spans, key=lambda each: (each.line, -each.column)):
         lines = lines_by_file.setdefault(Path(span.source.name).resolve(), list(span.source.lines))
@@ -70,4 +72,5 @@ def _edited_texts(spans: Sequence[Span], name: str) -> dict[Path, str]:
 
 
 def _count_lines(spans: Iterable[Span]) -> Counter[tuple[str, int]]:
+    """Return the number of spans in each line of each file."""
     return Counter((each.source.name, each.line) for each in set(spans))

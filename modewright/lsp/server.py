@@ -1,4 +1,4 @@
-"""Server: what the protocol asks for, answered by the other files of this folder."""
+"""Server: register the requests of the language server protocol and answer them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from modewright.lsp.rename import definition, references, rename
 from modewright.lsp.rename_check import RenameRefused
 
 TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
-"""Characters after which an editor asks for completions by itself."""
+"""Characters after which an editor requests completions."""
 
 
 def create_server() -> LanguageServer:
-    """Return a server that knows no text yet."""
+    """Return a language server without open documents."""
     logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_unexpected)
     server = LanguageServer("modewright", version("modewright"))
 
     def publish(uri: str, number: int | None, found: list[types.Diagnostic]) -> None:
-        told = types.PublishDiagnosticsParams(uri, found, number)
-        server.text_document_publish_diagnostics(told)
+        params = types.PublishDiagnosticsParams(uri, found, number)
+        server.text_document_publish_diagnostics(params)
 
     open_documents = OpenDocuments(publish)
     _register_synchronisation(server, open_documents)
@@ -41,12 +41,14 @@ def create_server() -> LanguageServer:
 
 
 def _is_unexpected(record: logging.LogRecord) -> bool:
-    """Tell whether a record is of more than an answer that refuses."""
+    """Return whether a log record is more than a refused request."""
     kind = record.exc_info[0] if record.exc_info else None
     return kind is None or not issubclass(kind, JsonRpcInvalidParams)
 
 
 def _register_synchronisation(server: LanguageServer, open_documents: OpenDocuments) -> None:
+    """Register the notifications about opened, changed and closed documents."""
+
     @server.feature(types.INITIALIZED)
     def initialized(_: types.InitializedParams) -> None:
         encoding = server.workspace.position_encoding or types.PositionEncodingKind.Utf16
@@ -77,6 +79,8 @@ def _register_synchronisation(server: LanguageServer, open_documents: OpenDocume
 
 
 def _register_editing(server: LanguageServer, open_documents: OpenDocuments) -> None:
+    """Register hover, completion, quick fixes and formatting."""
+
     @server.feature(types.TEXT_DOCUMENT_HOVER)
     def hovered(params: types.HoverParams) -> types.Hover | None:
         return hover(*open_documents.workspace_of(params.text_document.uri), params.position)
@@ -104,7 +108,7 @@ def _register_editing(server: LanguageServer, open_documents: OpenDocuments) -> 
 
 
 def _formatting_edits(text: str) -> list[types.TextEdit]:
-    """Return the edit that formats a text; none where it is formatted or cannot be."""
+    """Return the edit that formats a text; empty if it is formatted or invalid."""
     try:
         formatted_text = format_text(text)
     except SpecError:
@@ -114,6 +118,8 @@ def _formatting_edits(text: str) -> list[types.TextEdit]:
 
 
 def _register_navigation(server: LanguageServer, open_documents: OpenDocuments) -> None:
+    """Register definition, references, outline and rename."""
+
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def defined(params: types.DefinitionParams) -> list[types.Location]:
         return definition(*open_documents.workspace_of(params.text_document.uri), params.position)

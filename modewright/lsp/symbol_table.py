@@ -1,4 +1,4 @@
-"""Namespace: what names mean in a spec, with those of its base, its model, its instances."""
+"""Symbol table: the names of a spec including those of its base, model and instances."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ VALUE_SECTIONS = {
     "measures": "measure",
     "vary": "what varies",
 }
-"""Sections that declare what expressions read, and what each declares."""
+"""Sections that declare names for expressions, with the kind of each."""
 OTHER_SECTIONS = {
     "modes": "mode",
     "regions": "region",
@@ -34,15 +34,17 @@ OTHER_SECTIONS = {
     "faults": "fault",
     "events": "event",
 }
+"""Sections that declare other names, with the group of each."""
 MAX_DEPTH = 20
+"""Largest depth of bases, models and instances."""
 
 
 @dataclass(frozen=True)
 class Symbol:
-    """Something that has a name: where it is declared and what as.
+    """A named thing with the place of its declaration.
 
-    `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`;
-    a mode and a region have their path as their name.
+    `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`. The name
+    of a mode or region is its path.
     """
 
     file: Path
@@ -54,13 +56,13 @@ class Symbol:
 
     @property
     def identity(self) -> tuple[Path, str, str]:
-        """What two mentions of one thing have in common."""
+        """The file, group and name, which are equal for all references."""
         return self.file, self.group, self.name
 
 
 @dataclass
 class SymbolTable:
-    """The names of one spec, by group and name; those of its base and model are the same things."""
+    """The symbols of a spec by group and name."""
 
     file: Path
     document: Document
@@ -71,16 +73,16 @@ class SymbolTable:
 
     @property
     def is_automaton(self) -> bool:
-        """Whether this is an automaton, or a variant of one."""
+        """Whether the spec is an automaton or a variant of one."""
         return ("spec", "automaton") in {(each.group, each.kind) for each in self.names.values()}
 
     def in_groups(self, *groups: str) -> list[Symbol]:
-        """Return what is declared in some groups."""
+        """Return the symbols of some groups."""
         return [each for (group, _), each in self.names.items() if group in groups]
 
 
 def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> SymbolTable | None:
-    """Return the names of a spec; None where it cannot be read."""
+    """Return the symbol table of a file; None if it cannot be read or the depth is too large."""
     document = workspace.document(path)
     if document is None or depth > MAX_DEPTH:
         return None
@@ -90,7 +92,7 @@ def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> Symbo
 def build_symbol_table(
     workspace: Workspace, path: Path, document: Document, depth: int = 0
 ) -> SymbolTable:
-    """Return the names of a document; `depth` counts what it was reached through."""
+    """Return the symbol table of a document; `depth` counts the references to it."""
     symbols = SymbolTable(path.resolve(), document)
     base = _referenced_symbols(workspace, symbols, "extends", depth)
     if base:
@@ -111,9 +113,9 @@ def build_symbol_table(
         symbols.target = target
         symbols.names.update(target.names)
         symbols.instances.update(target.instances)
-        if target.is_automaton:  # it runs alone, and is an instance of its own name
+        if target.is_automaton:  # a lone automaton is an instance with its own name
             symbols.instances[target.document.name] = target
-    if document.kind == "study":  # a bare name is that of all instances that have it
+    if document.kind == "study":  # a name without instance refers to all instances
         for inner in symbols.instances.values():
             for each in inner.in_groups("value"):
                 if each.kind == "parameter":
@@ -125,7 +127,7 @@ def build_symbol_table(
 
 
 def _tested_symbols(workspace: Workspace, symbols: SymbolTable, depth: int) -> SymbolTable | None:
-    """Return what the scenario of a test is of: one that is named, or written in the test."""
+    """Return the symbols of the system of a test's scenario, named or inline; None for others."""
     if symbols.document.kind != "test":
         return None
     written = symbols.document.root.get("scenario")
@@ -140,12 +142,14 @@ def _tested_symbols(workspace: Workspace, symbols: SymbolTable, depth: int) -> S
 def _referenced_symbols(
     workspace: Workspace, symbols: SymbolTable, key: str, depth: int
 ) -> SymbolTable | None:
+    """Return the symbols of the spec to which a key refers; None if there is none."""
     name = root_text(symbols.document, key)
     path = workspace.find_file(name, symbols.file) if name else None
     return load_symbol_table(workspace, path, depth + 1) if path else None
 
 
 def _add_instances(workspace: Workspace, symbols: SymbolTable, depth: int) -> None:
+    """Add the symbol tables of the instances."""
     for entry in entries(symbols.document.root.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
         path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
@@ -155,6 +159,7 @@ def _add_instances(workspace: Workspace, symbols: SymbolTable, depth: int) -> No
 
 
 def _iter_symbols(file: Path, document: Document) -> Iterator[Symbol]:
+    """Yield the symbols that a document declares."""
     yield Symbol(file, "spec", document.name, document.kind, document.name_span, document)
     is_calibration = document.kind in ("calibration", "scenario")
     for place in places(document.root):
@@ -167,6 +172,7 @@ def _iter_symbols(file: Path, document: Document) -> Iterator[Symbol]:
 
 
 def _make_symbol(file: Path, path: tuple[str, ...], entry: Entry) -> Symbol | None:
+    """Return the symbol that an entry declares; None if it declares none."""
     section = path[-1] if path else ""
     if entry.key.startswith("$"):
         return None
@@ -186,6 +192,7 @@ def _make_symbol(file: Path, path: tuple[str, ...], entry: Entry) -> Symbol | No
 
 
 def _symbol_name(word: str, path: tuple[str, ...], key: str) -> str:
+    """Return the name of a symbol: the path of a mode or region, else the key."""
     if word == "mode" or (word == "region" and key != CHART):
         return mode_path((*path, key))
     return key
@@ -194,7 +201,7 @@ def _symbol_name(word: str, path: tuple[str, ...], key: str) -> str:
 def mode_path(path: tuple[str, ...]) -> str:
     """Return the path of a mode: `gap`, in a region `tyre.upper`, nested `drive.creep`.
 
-    `path` are the keys that lead to it; what is below the mode is left out.
+    `path` are the keys that lead to it; keys below the mode are ignored.
     """
     found: list[str] = []
     k = 0
@@ -206,5 +213,5 @@ def mode_path(path: tuple[str, ...]) -> str:
 
 
 def column_name(path: tuple[str, ...], key: str) -> str:
-    """Return the name of a column with the place of its table: others may have one like it."""
+    """Return the name of a column with the mode of its table, which makes it unique."""
     return f"{mode_path(path)}.{key}"

@@ -1,4 +1,4 @@
-"""World: the specs of a project as an editor sees them, open texts before files on the disk."""
+"""Workspace: the specs of a project, with open texts instead of files."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from modewright.lsp.name_occurrence import NameOccurrence, find_names
 
 @dataclass
 class Workspace:
-    """A project's folder, the open texts by resolved path, and documents as last read.
+    """The folder of a project, open texts by resolved path, and cached documents.
 
-    `encoding` is that in which the editor counts columns.
-    While a text that is being written is no YAML, its document is the last one that was.
+    `encoding` is that of the editor's columns. While a text is no valid YAML, its document is the
+    last valid one.
     """
 
     root: Path
@@ -30,17 +30,17 @@ class Workspace:
     )
 
     def project(self) -> Project:
-        """Return the project as it was when this was last refreshed: its index takes time."""
+        """Return the project; it is cached until `refresh`, because its index is slow."""
         if self._project is None:
             self._project = Project(self.root, dict(self.texts))
         return self._project
 
     def refresh(self) -> None:
-        """Look anew at what files there are."""
+        """Discard the cached project."""
         self._project = None
 
     def set_text(self, path: Path, text: str | None) -> None:
-        """Take the text of an editor for a file; None: what is on the disk counts again."""
+        """Store the text of an open file; None removes it."""
         path = path.resolve()
         if text is None:
             self.texts.pop(path, None)
@@ -49,7 +49,7 @@ class Workspace:
         self.refresh()
 
     def document(self, path: Path) -> Document | None:
-        """Return the document of a file, None for what never was one."""
+        """Return the document of a file; None if it was never valid."""
         path = path.resolve()
         stamp: object = self.texts.get(path)
         if stamp is None:
@@ -67,7 +67,7 @@ class Workspace:
         return cached[1]
 
     def names(self, path: Path) -> tuple[NameOccurrence, ...]:
-        """Return the names that are written in a file; its expressions are parsed once."""
+        """Return the names in a file, cached with its document."""
         document = self.document(path)
         if document is None:
             return ()
@@ -77,7 +77,7 @@ class Workspace:
         return known[1]
 
     def documents(self) -> Iterator[tuple[Path, Document]]:
-        """Yield the documents of the project, not those that are shipped."""
+        """Yield path and document of each spec of the project, without the library."""
         found = {path.resolve() for path in (self.root / "spec").rglob("*.yaml")}
         for path in sorted(found | set(self.texts)):
             document = self.document(path)
@@ -85,7 +85,7 @@ class Workspace:
                 yield path, document
 
     def find_file(self, name: str, referring_file: Path, is_effect: bool = False) -> Path | None:
-        """Return the file of a name or a path that a spec names."""
+        """Return the file of a name or a path that a spec refers to; None if there is none."""
         if name.endswith((".yaml", ".yml")):
             beside = referring_file.parent / name
             return beside.resolve() if beside.is_file() else None
@@ -98,17 +98,19 @@ class Workspace:
         return found[0].resolve() if len(found) == 1 else None
 
     def is_in_project(self, path: Path) -> bool:
-        """Tell whether a file belongs to the project: what is shipped is not edited."""
+        """Return whether a file belongs to the project and may be edited."""
         return path.resolve().is_relative_to(self.root.resolve())
 
 
 def project_root_of(path: Path) -> Path:
-    """Return the folder of the project of a file: that whose `spec/` holds it, else its own."""
+    """Return the folder of a file's project: the one that contains `spec/`, else the file's
+    folder.
+    """
     above = [folder.parent for folder in path.resolve().parents if folder.name == "spec"]
     return above[-1] if above else path.resolve().parent
 
 
 def root_text(document: Document, key: str) -> str:
-    """Return the text of a key at the root of a document, empty where there is none."""
+    """Return the text of a key at the root of a document; empty if it is absent."""
     node = document.root.get(key)
     return node.text if isinstance(node, ScalarNode) else ""

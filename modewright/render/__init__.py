@@ -1,1 +1,1 @@
-"""Rendering of results for people: tables, pages, SARIF."""
+"""Rendering: convert results to text, tables, HTML pages, SARIF and JSON."""

@@ -1,4 +1,4 @@
-"""Show calibration: what was written to, taken from, or solved for a calibration page."""
+"""Calibration output: print calibration pages, imports and recomputed numbers."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from language.text.sanitise import escape_invisible
 from modewright.api.calibrations import CalibrationPage, ImportedPage, ResolvedPage, SolvedChange
 from modewright.api.checking import problem_json
 from modewright.render.text import pluralise
+from modewright.runtime.json_format import format_entry
 
 MAX_SHOWN = 12
-"""Most remarks of a kind and changes shown to a person; all of them are in --json."""
+"""Largest number of remarks of a kind, and of changes, that are printed; --json has all."""
 
 
 def print_page(screen: Console, page: CalibrationPage) -> None:
-    """Print the tunable parameters of a page, and how many numbers were solved."""
+    """Print the tunable parameters of a page and the number of solved numbers."""
     for constant in page.tunable:
         screen.print(_constant_line(page, constant), highlight=False, markup=False, soft_wrap=True)
     solved = pluralise(len(page.solved), "solved number")
@@ -35,7 +36,7 @@ def print_page(screen: Console, page: CalibrationPage) -> None:
 
 
 def print_import(screen: Console, imported: ImportedPage) -> None:
-    """Print the values that were taken and what is to be known of them."""
+    """Print the imported values with warnings and remarks."""
     _print_warnings(screen, imported.warnings)
     for name, text in imported.values.items():
         screen.print(f"{name} = {text}", highlight=False, markup=False, soft_wrap=True)
@@ -43,7 +44,8 @@ def print_import(screen: Console, imported: ImportedPage) -> None:
     if imported.stale:
         worst = _largest_change(imported.stale)
         screen.print(
-            f"[yellow]stale[/]: {_count_of_solved(imported.stale, imported.page)} of the file were solved for "
+            f"[yellow]stale[/]: {_count_of_solved(imported.stale, imported.page)} "
+            "of the file were solved for "
             f"other values, the farthest {escape(worst.name)} by {worst.relative:.2g}; "
             "`modewright calibration resolve` solves them anew",
             highlight=False,
@@ -54,7 +56,7 @@ def print_import(screen: Console, imported: ImportedPage) -> None:
 
 
 def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
-    """Print which solved numbers changed, the farthest first, and by how much."""
+    """Print the changed solved numbers, the largest change first."""
     _print_warnings(screen, resolved.warnings)
     print_page(screen, resolved.page)
     _print_remarks(screen, resolved.remarks)
@@ -69,8 +71,8 @@ def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
         return
     worst = _largest_change(resolved.changes)
     screen.print(
-        f"{_count_of_solved(resolved.changes, resolved.page)} changed, the farthest {escape(worst.name)} "
-        f"by {worst.relative:.2g} of its size",
+        f"{_count_of_solved(resolved.changes, resolved.page)} changed, "
+        f"the farthest {escape(worst.name)} by {worst.relative:.2g} of its size",
         highlight=False,
         soft_wrap=True,
     )
@@ -83,8 +85,9 @@ def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
 
 
 def page_json(page: CalibrationPage) -> dict[str, Any]:
-    """Return a page as JSON, values in SI."""
+    """Return a page as a dict for JSON; values in SI."""
     return {
+        **format_entry("calibration"),
         "automaton": page.program.name,
         "numbers": page.program.number_type,
         "tunable": {
@@ -99,8 +102,9 @@ def page_json(page: CalibrationPage) -> dict[str, Any]:
 
 
 def import_json(imported: ImportedPage) -> dict[str, Any]:
-    """Return what was taken as JSON."""
+    """Return an import as a dict for JSON."""
     return {
+        **format_entry("calibration-import"),
         "automaton": imported.page.program.name,
         "values": dict(imported.values),
         "remarks": _remarks_json(imported.remarks),
@@ -110,9 +114,10 @@ def import_json(imported: ImportedPage) -> dict[str, Any]:
 
 
 def resolved_json(resolved: ResolvedPage) -> dict[str, Any]:
-    """Return a page solved anew as JSON, with what changed."""
+    """Return a recomputed page with its changes as a dict for JSON."""
     return {
         **page_json(resolved.page),
+        **format_entry("calibration-resolution"),
         "changed": _changes_json(resolved.changes),
         "added": list(resolved.added),
         "remarks": _remarks_json(resolved.remarks),
@@ -121,6 +126,7 @@ def resolved_json(resolved: ResolvedPage) -> dict[str, Any]:
 
 
 def _changes_json(changes: Sequence[SolvedChange]) -> dict[str, Any]:
+    """Return changes as a dict for JSON."""
     return {
         "count": len(changes),
         "largest_relative": _largest_change(changes).relative if changes else 0.0,
@@ -137,6 +143,7 @@ def _changes_json(changes: Sequence[SolvedChange]) -> dict[str, Any]:
 
 
 def _remarks_json(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
+    """Return remarks as a list for JSON."""
     return [
         {
             "kind": remark.kind,
@@ -149,13 +156,14 @@ def _remarks_json(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
 
 
 def _constant_value(page: CalibrationPage, constant: Constant) -> Any:
+    """Return the value of a parameter: number, word, or list of a table."""
     if constant.items:
         return list(constant.items)
     return constant.values[int(constant.value)] if constant.values else constant.value
 
 
 def _constant_line(page: CalibrationPage, constant: Constant) -> str:
-    """A parameter with its value; of a table how many there are."""
+    """Return a parameter with its value, or the size of a table."""
     if constant.items:
         return f"{unqualified_name(constant.name)}: a table of {len(constant.items)} values"
     text = format_constant_value(constant.value, constant, page.program.number_type)
@@ -164,13 +172,13 @@ def _constant_line(page: CalibrationPage, constant: Constant) -> str:
 
 
 def _print_remarks(screen: Console, remarks: Sequence[Remark]) -> None:
-    """Print remarks by kind; of many of one kind the first ones."""
+    """Print remarks by kind, at most MAX_SHOWN of each."""
     for kind in dict.fromkeys(remark.kind for remark in remarks):
         mine = [remark for remark in remarks if remark.kind == kind]
         for remark in mine[:MAX_SHOWN]:
             where = escape(escape_invisible(f"{remark.span}: ")) if remark.span else ""
-            told = escape(escape_invisible(f"{remark.name} {remark.text}"))
-            line = f"{where}[yellow]{kind}[/]: {told}"
+            text = escape(escape_invisible(f"{remark.name} {remark.text}"))
+            line = f"{where}[yellow]{kind}[/]: {text}"
             screen.print(line, highlight=False, soft_wrap=True)
         if len(mine) > MAX_SHOWN:
             screen.print(
@@ -179,6 +187,7 @@ def _print_remarks(screen: Console, remarks: Sequence[Remark]) -> None:
 
 
 def _print_warnings(screen: Console, problems: Sequence[Problem]) -> None:
+    """Print warnings, at most MAX_SHOWN."""
     if problems:
         text = render_all(problems[:MAX_SHOWN])
         screen.print(text, highlight=False, markup=False, soft_wrap=True)
@@ -187,8 +196,10 @@ def _print_warnings(screen: Console, problems: Sequence[Problem]) -> None:
 
 
 def _count_of_solved(changes: Sequence[SolvedChange], page: CalibrationPage) -> str:
+    """Return `n of m solved numbers`."""
     return f"{len(changes)} of {pluralise(len(page.solved), 'solved number')}"
 
 
 def _largest_change(changes: Sequence[SolvedChange]) -> SolvedChange:
+    """Return the change with the largest relative size."""
     return max(changes, key=lambda change: change.relative)

@@ -1,4 +1,4 @@
-"""Show code: what tools say of generated C, for people and for machines."""
+"""Code output: print proofs, fuzzing and MC/DC of generated C."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from rich.table import Table
 from codegen.coverage.mcdc import Decision, McdcCoverage
 from codegen.toolchain.tool_verdict import ToolVerdict
 from lockstep.fuzzing import FuzzReport
+from modewright.runtime.json_format import format_entry
 
 
 def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
-    """Print what tools say of generated C, and each thing that they found."""
+    """Print a table of the checks and all findings."""
     table = Table(box=None, pad_edge=False)
     for title in ("check", "tool", "of", "found"):
         table.add_column(title, overflow="fold")
@@ -29,12 +30,12 @@ def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
 
 
 def proof_json(proof: ToolVerdict) -> dict[str, Any]:
-    """Return what a machine wants of a check of generated C."""
+    """Return a check of generated C as a dict for JSON."""
     return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
 
 
 def print_fuzzed(console: Console, result: FuzzReport) -> None:
-    """Print what came of fuzzing: what was tried, and each thing that was found."""
+    """Print the counts of a fuzzing run, the findings and the first difference."""
     console.print(
         f"{result.program}: {result.distinct} different sequences of {result.runs}, "
         f"{result.ticks} ticks, {result.transitions} transitions, {result.edges} edges of the C",
@@ -44,45 +45,45 @@ def print_fuzzed(console: Console, result: FuzzReport) -> None:
     console.print(f"modes: {', '.join(result.modes)}", soft_wrap=True, highlight=False)
     for finding in result.findings:
         console.print(f"sanitizers: {finding}", soft_wrap=True, highlight=False, markup=False)
-    told = f"; first: {result.first}" if result.first else ""
-    text = f"{result.differing} sequences differ from the engine{told}"
+    first = f"; first: {result.first}" if result.first else ""
+    text = f"{result.differing} sequences differ from the engine{first}"
     console.print(text, soft_wrap=True, highlight=False, markup=False)
 
 
 def fuzzed_json(result: FuzzReport) -> dict[str, Any]:
-    """Return what a machine wants of fuzzing."""
+    """Return the result of a fuzzing run as a dict for JSON."""
     first = vars(result.first) if result.first else None
     lists = {"modes": list(result.modes), "findings": list(result.findings)}
-    return {**vars(result), **lists, "first": first, "clean": result.is_clean}
+    values = {**vars(result), **lists, "first": first, "clean": result.is_clean}
+    return {**format_entry("fuzzing"), **values}
 
 
 def print_mcdc(console: Console, coverage: McdcCoverage) -> None:
-    """Print what was shown of generated C, and each decision of which something was not."""
+    """Print the decisions that are not covered, and the counts."""
     for decision in coverage.uncovered:
         text = f"{coverage.file}:{decision.line}: {_marks(decision)} {decision.text}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
     text = (
-        f"{coverage.file}: of {coverage.conditions} conditions {coverage.shown} are shown to matter (MC/DC) "
-        f"by {coverage.sequences} sequences, {coverage.steps} steps; "
-        f"{coverage.conditions - coverage.shown - coverage.open} are proven infeasible, {coverage.open} open"
+        f"{coverage.file}: of {coverage.conditions} conditions {coverage.shown} "
+        f"are shown to matter (MC/DC) by {coverage.sequences} sequences, {coverage.steps} steps; "
+        f"{coverage.conditions - coverage.shown - coverage.open} are proven infeasible, "
+        f"{coverage.open} open"
     )
     console.print(text, soft_wrap=True, highlight=False)
 
 
 def _marks(decision: Decision) -> str:
-    """Return a mark for each condition: `+` if it was shown, `T` or `F` if it is always true or
-    false, else `-`.
-    """
+    """Return a mark for each condition: `+` covered, `T` or `F` always true or false, else `-`."""
     never = {None: "-", True: "F", False: "T"}
     pairs = zip(decision.shown, decision.never, strict=True)
     return "".join("+" if shown else never[outcome] for shown, outcome in pairs)
 
 
 def mcdc_json(coverage: McdcCoverage) -> dict[str, Any]:
-    """Return what a machine wants of MC/DC."""
+    """Return an MC/DC coverage as a dict for JSON."""
     decisions = [
         {**vars(each), "shown": list(each.shown), "never": list(each.never)}
         for each in coverage.decisions
     ]
     counts = {"conditions": coverage.conditions, "shown": coverage.shown, "open": coverage.open}
-    return {**vars(coverage), **counts, "decisions": decisions}
+    return {**format_entry("mcdc"), **vars(coverage), **counts, "decisions": decisions}

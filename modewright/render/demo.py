@@ -1,4 +1,4 @@
-"""The demo: a tip-out of an EV driveline, simulated, compared with its C and drawn."""
+"""Demo: simulate a tip-out of an EV driveline, compare it with its C and draw it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from modewright.render import run as show
 from modewright.runtime.output_files import write_files
 
 SYSTEM, SCENARIO = "ev_driveline", "tip_out"
+"""The system of the demo."""
 
 WINDOW = (0.45, 1.15)
-"""The part of the scenario in which the gap is crossed [s]."""
+"""The time window [s] of the figure, in which the backlash gap is crossed."""
 
 
 def run_demo(folder: Path, console: Console) -> bool:
-    """Run the demo, print its tables, write `tip_out.png`; tell whether no bit differs."""
+    """Run the demo, print its tables and write `tip_out.png`.
+
+    Return whether the run completed and no bit differs between engine and C.
+    """
     console.print("Tip-out of an EV driveline with backlash, 30 -> -20 N*m at 0.4785 s")
     trajectory, verdicts = api.lockstep(SYSTEM, SCENARIO)
     torque = [

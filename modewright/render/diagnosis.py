@@ -1,4 +1,4 @@
-"""Show diagnosis: verdicts and fits for people at a console, fits as plain data."""
+"""Diagnosis output: print verdicts and fits."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from rich.table import Table
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
 from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
 from diagnosis.report.sentences import format_rounded, summary_lines
+from modewright.runtime.json_format import format_entry
 
 
 def print_dossier(screen: Console, dossier: DiagnosisReport) -> None:
-    """Print a diagnosis in at most four lines."""
+    """Print the summary of a diagnosis in at most four lines."""
     for line in summary_lines(dossier):
         screen.print(line.replace("`", ""), highlight=False, markup=False, soft_wrap=True)
 
 
 def print_fit(screen: Console, fit: Fit) -> None:
-    """Print the parameters of a fit, what they improve, and what data cannot tell."""
+    """Print the fitted parameters, misfits, strong correlations and parameters that are not
+    identifiable.
+    """
     table = Table(
         "parameter", "declared", "fitted", "std", "unit", "of prior", "goes with", "",
         box=None, pad_edge=False, header_style="bold",
@@ -30,9 +33,10 @@ def print_fit(screen: Console, fit: Fit) -> None:
             if one.strongest_correlation
             else ""
         )
+        quantity = one.quantity
         table.add_row(
-            one.name, f"{one.declared:.5g}", f"{one.quantity.value:.5g}",
-            format_rounded(one.quantity.std), one.quantity.unit, f"{one.prior_ratio:.0%}", goes, one.note,
+            one.name, f"{one.declared:.5g}", f"{quantity.value:.5g}",
+            format_rounded(quantity.std), quantity.unit, f"{one.prior_ratio:.0%}", goes, one.note,
         )  # fmt: skip
     screen.print(table)
     for name, misfit in fit.misfits.items():
@@ -48,8 +52,9 @@ def print_fit(screen: Console, fit: Fit) -> None:
 
 
 def fit_json(fit: Fit) -> dict[str, Any]:
-    """Return a fit as plain data, in SI."""
+    """Return a fit as a dict for JSON; values in SI, values that are not finite are null."""
     found = {
+        **format_entry("fit"),
         "of": fit.automaton.name,
         "parameters": {
             one.name: {

@@ -1,4 +1,4 @@
-"""Show effects: the library for people and as plain data."""
+"""Effect output: print the library of effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from diagnosis.result.effect_naming import VERDICT_ALIASES
 
 
 def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str | None) -> None:
-    """Print a line for each effect; with a spec those that fit it, and where."""
+    """Print one line for each effect; with a spec those that fit it, with places."""
     table = Table(
         "effect", f"places of {at}" if at else "fits", "what it is",
         box=None, pad_edge=False, header_style="bold",
@@ -29,7 +29,7 @@ def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str
 
 
 def print_effect(screen: Console, entry: EffectDescription, at: str | None) -> None:
-    """Print all that is known of an effect."""
+    """Print all information about an effect, with a spec also the changes of its equations."""
     effect = entry.effect
     lines = [f"{effect.name}: {effect.about}", f"fits {format_place_kinds(effect)}"]
     for name, (other, where) in VERDICT_ALIASES.items():
@@ -52,6 +52,7 @@ def print_effect(screen: Console, entry: EffectDescription, at: str | None) -> N
 
 
 def _change_lines(changes: Sequence[EquationChange]) -> list[str]:
+    """Return the lines of changed equations."""
     found = []
     for change in changes:
         found.append(f"  {change.path}")
@@ -61,7 +62,7 @@ def _change_lines(changes: Sequence[EquationChange]) -> list[str]:
 
 
 def effect_json(entry: EffectDescription) -> dict[str, Any]:
-    """Return an effect as plain data."""
+    """Return an effect as a dict for JSON."""
     effect = entry.effect
     return {
         "id": effect.name,

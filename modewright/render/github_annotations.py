@@ -1,4 +1,4 @@
-"""Annotations: problems as the commands by which GitHub Actions marks lines of a change."""
+"""GitHub annotations: print problems as workflow commands of GitHub Actions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from language.text.diagnostic import Problem
 
 
 def annotation_lines(problems: Iterable[Problem]) -> str:
-    """Return one `::error file=...::message` for each problem."""
+    """Return one line `::error file=...::message` for each problem."""
     return "".join(f"{_format_annotation(problem)}\n" for problem in problems)
 
 
 def _format_annotation(problem: Problem) -> str:
+    """Return the workflow command of a problem."""
     span = problem.span
     values = {
         "file": span.source.name,
@@ -27,8 +28,10 @@ def _format_annotation(problem: Problem) -> str:
 
 
 def _escape_data(text: str) -> str:
+    """Return a text escaped as the message of a workflow command."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _escape_property(text: str) -> str:
+    """Return a text escaped as a property of a workflow command."""
     return _escape_data(text).replace(":", "%3A").replace(",", "%2C")

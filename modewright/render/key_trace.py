@@ -1,4 +1,4 @@
-"""Show keys: specs and their C side by side; which line comes from which key, and back."""
+"""Key trace output: show specs and C side by side with the relation of keys and lines."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from expectation.key_trace import KeyTrace, KeyTraces
 from expectation.requirement_trace import CodeLine
 from modewright.render.text import pluralise
+from modewright.runtime.json_format import format_entry
 
 STYLE = """body{font:13px/1.4 system-ui,sans-serif;margin:0;color:#222;height:100vh;display:flex;
 flex-direction:column}header{padding:.6rem 1rem;border-bottom:1px solid #ccc}
@@ -29,8 +30,9 @@ const f=s.querySelector(".on");if(f)s.scrollTo({top:f.offsetTop-s.clientHeight/3
 
 
 def key_traces_json(traces: KeyTraces) -> dict[str, Any]:
-    """Return a trace of keys as plain data."""
+    """Return a key trace as a dict for JSON."""
     return {
+        **format_entry("key-trace"),
         "keys": [
             {
                 "spec": key.spec,
@@ -47,7 +49,7 @@ def key_traces_json(traces: KeyTraces) -> dict[str, Any]:
 
 
 def key_traces_lines(traces: KeyTraces) -> list[str]:
-    """Return the lines that tell of a trace of keys."""
+    """Return the lines of a key trace: one for each key, and a summary."""
     return [
         *(f"{key.spec} {key.path}: {_code_places(key)}" for key in traces.keys),
         key_traces_summary(traces),
@@ -55,7 +57,7 @@ def key_traces_lines(traces: KeyTraces) -> list[str]:
 
 
 def key_traces_summary(traces: KeyTraces) -> str:
-    """Return how many keys show in C."""
+    """Return the number of keys and of those that C cites."""
     shown = len(traces.keys) - len(traces.uncited)
     text = f"{pluralise(len(traces.keys), 'key')}, {shown} of them in lines of C"
     return text + (
@@ -68,7 +70,7 @@ def key_traces_summary(traces: KeyTraces) -> str:
 def key_traces_html(
     traces: KeyTraces, specs: Mapping[str, str], code: Mapping[str, str], title: str
 ) -> str:
-    """Return a page with specs and C side by side; a click on a line shows what belongs to it.
+    """Return a page with specs and C side by side; a click on a line highlights related lines.
 
     `specs` and `code` are texts by file.
     """
@@ -83,9 +85,9 @@ def key_traces_html(
     right = "".join(_file_section(name, text, marks, set()) for name, text in code.items())
     return (
         f"<!doctype html><meta charset=utf-8><title>{escape(title)}</title><style>{STYLE}</style>\n"
-        f"<header><b>{escape(title)}</b>: {escape(key_traces_summary(traces))}. Click a line to see what "
-        "belongs to it; keys in brown show in no line: their values went into other numbers, or "
-        f"their name says all.</header>\n<main><section>{left}</section>"
+        f"<header><b>{escape(title)}</b>: {escape(key_traces_summary(traces))}. "
+        "Click a line to highlight the related lines. No line of C cites the keys in brown: "
+        f"their values are folded into other numbers.</header>\n<main><section>{left}</section>"
         f"<section>{right}</section></main><script>{SCRIPT}</script>\n"
     )
 
@@ -96,6 +98,7 @@ def _file_section(
     marks: Mapping[tuple[str, int], Sequence[str]],
     silent: set[tuple[str, int]],
 ) -> str:
+    """Return the HTML of a file with the keys of each line."""
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
         keys = marks.get((name, number), ())
@@ -106,6 +109,7 @@ def _file_section(
 
 
 def _code_places(key: KeyTrace) -> str:
+    """Return the lines of C that cite a key, by file."""
     by_file: dict[str, list[str]] = {}
     for file, line in key.code:
         by_file.setdefault(file, []).append(str(line))

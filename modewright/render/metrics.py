@@ -1,4 +1,4 @@
-"""Show metrics: what generated C takes of an ECU, as a table, a page and plain data."""
+"""Metrics output: show memory and instructions of generated C as table, page and JSON."""
 
 from __future__ import annotations
 
@@ -10,30 +10,32 @@ from rich.table import Table
 
 from codegen.harness.instruction_count import InstructionCounts
 from codegen.harness.metrics import Metrics
+from modewright.runtime.json_format import format_entry
 
 AutomatonMetrics = tuple[Metrics, InstructionCounts | None]
-"""What one automaton takes, and its instructions where they were counted."""
+"""The metrics of an automaton, with instruction counts if they were measured."""
 HEADS = (
     *("automaton", "ROM", "code", "constants", "page", "RAM", "data", "stack", "instructions"),
     "at most",
 )
 ABOUT = (
     "Bytes on a Cortex-M4F, -O2. ROM: code, constants and the default calibration page. RAM: one "
-    "instance; data: what belongs to none. Stack: the most that a step takes with all that it "
-    "calls. Instructions of a step: mean, least and most of those counted; at most: with each loop "
-    "to its end and the longer side of each branch, read from the machine code."
+    "instance; data: static data. Stack: the largest stack of a step including its calls. "
+    "Instructions of a step: mean, minimum and maximum of the counted steps; at most: the bound "
+    "from the machine code, with all iterations of loops and the longer side of each branch."
 )
+"""The explanation on the page."""
 STYLE = """body{font:14px/1.45 system-ui,sans-serif;margin:2rem;color:#222;max-width:60rem}
 table{border-collapse:collapse}
 th,td{padding:.35rem .7rem;border-bottom:1px solid #ddd;text-align:right}
 th:first-child,td:first-child{text-align:left}svg{display:block;margin:.3rem 0 1.2rem}
 @media(prefers-color-scheme:dark){body{background:#161616;color:#ddd}td,th{border-color:#444}}"""
 WIDTH, HEIGHT = 900, 90
-"""Of the picture of instructions over steps [px]."""
+"""Size of the figure of instructions over steps [px]."""
 
 
 def metrics_table(automata: Sequence[AutomatonMetrics]) -> Table:
-    """Return a table for a person."""
+    """Return the metrics as a table."""
     table = Table(*HEADS, box=None, pad_edge=False, header_style="bold")
     for measured in automata:
         table.add_row(*_row(measured))
@@ -41,8 +43,9 @@ def metrics_table(automata: Sequence[AutomatonMetrics]) -> Table:
 
 
 def metrics_json(automata: Sequence[AutomatonMetrics]) -> dict[str, Any]:
-    """Return metrics as plain data."""
+    """Return the metrics as a dict for JSON."""
     return {
+        **format_entry("metrics"),
         "target": "cortex-m4f",
         "automata": [
             {
@@ -57,7 +60,7 @@ def metrics_json(automata: Sequence[AutomatonMetrics]) -> dict[str, Any]:
 
 
 def metrics_html(automata: Sequence[AutomatonMetrics]) -> str:
-    """Return a page: the table, and the instructions of each step as a picture."""
+    """Return a page with the table and the instructions of each step as figures."""
     heads = "".join(f"<th>{escape(head)}</th>" for head in HEADS)
     rows = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(measured)) + "</tr>\n"
@@ -67,12 +70,13 @@ def metrics_html(automata: Sequence[AutomatonMetrics]) -> str:
     pictures = "".join(_instructions_svg(metrics, counts) for metrics, counts in automata if counts)
     return (
         f"<!doctype html><meta charset=utf-8><title>metrics</title><style>{STYLE}</style>\n"
-        f"<h1>What generated C takes</h1><p>{escape(ABOUT)}</p>\n"
+        f"<h1>Resources of generated C</h1><p>{escape(ABOUT)}</p>\n"
         f"<table><tr>{heads}</tr>\n{rows}</table>\n{reasons}{pictures}"
     )
 
 
 def _row(measured: AutomatonMetrics) -> tuple[str, ...]:
+    """Return the cells of an automaton."""
     metrics, counts = measured
     stack = f"{metrics.stack}{' and more' if metrics.beside else ''}"
     sizes = (metrics.rom, metrics.code, metrics.constants, metrics.page)
@@ -83,13 +87,13 @@ def _row(measured: AutomatonMetrics) -> tuple[str, ...]:
 
 
 def unbounded_lines(automata: Sequence[AutomatonMetrics]) -> list[str]:
-    """Return why there is no bound of a step, a line for each automaton without one."""
+    """Return the reason for each automaton whose steps have no bound."""
     unbounded = [metrics for metrics, _ in automata if metrics.longest is None]
     return [f"{one.name}: no bound of a step: {one.unbounded}" for one in unbounded]
 
 
 def _instructions_svg(metrics: Metrics, counts: InstructionCounts) -> str:
-    """Return the instructions over the steps: the least and most of those in a pixel."""
+    """Return a figure of the instructions over the steps: minimum and maximum in each pixel."""
     steps, most = counts.steps, max(counts.steps, default=0) or 1
     wide = max(1, -(-len(steps) // WIDTH))
     lines = []

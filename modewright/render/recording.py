@@ -1,4 +1,4 @@
-"""Show recording: what a check of recordings found, for people and for machines."""
+"""Recording output: print the check of recordings."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from diagnosis.quality.excitation import Excitation
 from diagnosis.quality.finding import format_findings
 from diagnosis.quality.recording import RecordingCheck
 from modewright.render.run import null_nonfinite
+from modewright.runtime.json_format import format_entry
 
 STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
+"""Styles of severities."""
 MAX_CHANNELS = 24
-"""Longest table of channels shown to a person; all of them are in --json."""
+"""Largest number of channels that are printed; --json has all."""
 
 
 def print_check(screen: Console, check: RecordingCheck) -> None:
-    """Print the channels, what they excite and what was found."""
+    """Print channels, excitation and findings."""
     screen.print(channel_table(check.channels))
     _print_excitation(screen, check.excitation)
     if not check.findings:
@@ -34,7 +36,7 @@ def print_check(screen: Console, check: RecordingCheck) -> None:
 
 
 def channel_table(channels: Sequence[ChannelCheck]) -> Table:
-    """Return a table of channels, their values in the units of the map."""
+    """Return a table of channels, with values in the units of the map."""
     heads = ("recording", "channel", "signal", "unit", "rate", "jitter", "missing", "step", "noise")
     table = Table(*heads, "from", "to", box=None, pad_edge=False, header_style="bold")
     for channel in channels[:MAX_CHANNELS]:
@@ -57,6 +59,7 @@ def channel_table(channels: Sequence[ChannelCheck]) -> Table:
 
 
 def _print_excitation(screen: Console, excitation: Excitation) -> None:
+    """Print the excitation of inputs and speeds, and the effects that can be tested."""
     screen.print(f"\n{excitation.duration:.4g} s in all", highlight=False)
     for kind, signals in (("input", excitation.inputs), ("speed", excitation.speeds)):
         for one in signals:
@@ -75,9 +78,10 @@ def _print_excitation(screen: Console, excitation: Excitation) -> None:
 
 
 def check_json(check: RecordingCheck) -> dict[str, Any]:
-    """Return a check as JSON, values in SI."""
+    """Return a check as a dict for JSON; values in SI."""
     excitation = check.excitation
     return {
+        **format_entry("recording-check"),
         "usable": check.is_usable,
         "channels": [null_nonfinite(asdict(one)) for one in check.channels],
         "findings": [asdict(one) for one in check.findings],

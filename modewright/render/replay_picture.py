@@ -1,4 +1,4 @@
-"""Replay picture: measured speeds, estimated half-shaft torque and mode of a replay."""
+"""Replay figure: draw measured inputs, estimated outputs and mode of a replay."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from modewright.api.simulation import Replayed
 
 
 def replay_picture(replayed: Replayed, title: str, form: str = "png") -> bytes:
-    """Return the picture: one panel per unit of what was measured, one per unit of the outputs."""
+    """Return a figure with one panel for each unit of the measured signals and of the outputs."""
     trajectory = replayed.result.trajectory
     panels = [*_panels(trajectory, measured=True), *_panels(trajectory, measured=False)]
     return draw_picture([trajectory], panels, [ModeBand("mode", "mode")], title).data(form)
 
 
 def _panels(trajectory: Trajectory, *, measured: bool) -> list[Panel]:
+    """Return the panels of the measured or of the estimated signals."""
     by_unit: dict[str, list[str]] = {}
     for name, values in trajectory.signals.items():
         if values.dtype == np.float64 and name.startswith("in.") == measured:

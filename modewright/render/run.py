@@ -1,4 +1,4 @@
-"""Show: results as tables for people and as JSON for machines."""
+"""Run output: print trajectories, lock-step verdicts, replays and comparisons."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from engine.results.trajectory import Trajectory
 from lockstep.comparison import Verdict
 from modewright.api.doctor import HealthCheck
 from modewright.api.simulation import Replayed
+from modewright.runtime.json_format import format_entry
 
 MAX_EVENTS = 40
-"""Most transitions shown to a person; all of them are in --json."""
+"""Largest number of transitions that are printed; --json has all."""
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -28,7 +29,7 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def events_table(events: Sequence[Event]) -> Table:
-    """Return a table of transitions; of many the middle is left out."""
+    """Return a table of transitions; the middle of long lists is left out."""
     table = Table(
         escape("time [s]"), "automaton", "transition", "from", "to",
         box=None, pad_edge=False, header_style="bold",
@@ -46,7 +47,9 @@ def events_table(events: Sequence[Event]) -> Table:
 
 
 def _select_events(events: Sequence[Event]) -> set[int]:
-    """Return which events are shown: of many the first, the last, and what is no transition."""
+    """Return the indices of the printed events: the first and last ones, and all but
+    transitions.
+    """
     numbers = range(len(events))
     if len(events) <= MAX_EVENTS:
         return set(numbers)
@@ -76,7 +79,7 @@ def verdict_table(verdicts: Iterable[Verdict]) -> Table:
 
 
 def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
-    """Print the verdicts, and the first difference of each that has one."""
+    """Print the verdicts with notes, instruction counts and the first difference of each."""
     console.print(verdict_table(verdicts))
     for verdict in verdicts:
         if verdict.note:
@@ -90,12 +93,13 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
 
 
 def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
-    """Return what a machine wants of a run: events, last values, why it stopped."""
+    """Return events, last values and end of a run as a dict for JSON."""
     last = {
         name: (values[-1].item() if len(values) else None)
         for name, values in trajectory.signals.items()
     }
     return {
+        **format_entry("run"),
         "name": trajectory.name,
         "samples": len(trajectory.times),
         "events": [vars(event) for event in trajectory.events],
@@ -107,7 +111,7 @@ def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """Return a verdict as plain data."""
+    """Return a lock-step verdict as a dict for JSON."""
     return {
         "name": verdict.name,
         "program": verdict.program,
@@ -122,6 +126,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
+    """Return instruction counts as a dict for JSON; None without counts."""
     counts = verdict.instructions
     if counts is None:
         return None
@@ -130,9 +135,10 @@ def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
 
 
 def replay_json(replayed: Replayed) -> dict[str, Any]:
-    """Return a replay as plain data."""
+    """Return a replay as a dict for JSON."""
     return {
         **trajectory_json(replayed.result.trajectory),
+        **format_entry("replay"),
         "innovation_rms": dict(replayed.result.innovation_rms),
         "comparisons": [vars(comparison) for comparison in replayed.result.comparisons],
         "columns_left_out": list(replayed.left_out),
@@ -164,7 +170,7 @@ def print_replay(console: Console, replayed: Replayed) -> None:
 
 
 def print_difference(console: Console, difference: RunDifference) -> None:
-    """Print the differences of two runs: signals, modes, transitions, and when they part."""
+    """Print the differences of two runs: signals, modes, transitions and the first difference."""
     table = Table(
         "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
         box=None, pad_edge=False, header_style="bold",
@@ -191,14 +197,14 @@ def print_difference(console: Console, difference: RunDifference) -> None:
         console.print(
             f"they part at {difference.first[0]:.9g} s: {difference.first[1]}", highlight=False
         )
-    console.print(
-        f"{difference.samples} samples: {'within' if difference.is_within else 'NOT within'} tolerance"
-    )
+    word = "within" if difference.is_within else "NOT within"
+    console.print(f"{difference.samples} samples: {word} tolerance")
 
 
 def difference_json(difference: RunDifference) -> dict[str, Any]:
-    """Return the differences of two runs as plain data; what is infinite is null."""
+    """Return the differences of two runs as a dict for JSON; infinite values are null."""
     return {
+        **format_entry("comparison"),
         "within": difference.is_within,
         "span": list(difference.span),
         "samples": difference.samples,
@@ -213,6 +219,7 @@ def difference_json(difference: RunDifference) -> dict[str, Any]:
 
 
 def _sequence_line(sequence: ModeSequence) -> str:
+    """Return a line about the transition sequences of an instance in two runs."""
     counts = f"{sequence.count_a} transitions in A, {sequence.count_b} in B"
     same = f"the same, at most {sequence.apart:.3g} s apart"
     order_text = (
@@ -222,18 +229,19 @@ def _sequence_line(sequence: ModeSequence) -> str:
 
 
 def null_nonfinite(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values for JSON, which has neither infinities nor NaN: they are null."""
+    """Return values for JSON, with None in place of infinities and NaN."""
     return {name: _null_nonfinite_value(value) for name, value in values.items()}
 
 
 def _null_nonfinite_value(value: Any) -> Any:
+    """Return a value or a list with None in place of infinities and NaN."""
     if isinstance(value, tuple | list):
         return [_null_nonfinite_value(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_health_check(console: Console, check: HealthCheck) -> None:
-    """Print one finding of the doctor, and what would help."""
+    """Print a result of the doctor with its remedy."""
     colour = {"ok": "green", "absent": "yellow", "fault": "red"}[check.verdict]
     text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.told)}"
     console.print(text, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""SARIF: problems in the form that code hosts and editors read (SARIF 2.1.0, OASIS 2020)."""
+"""SARIF output: convert problems to SARIF 2.1.0 (OASIS 2020) for code hosts and editors."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from language.text.diagnostic import Problem
 from language.text.error_codes import code_of, meaning_of
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+"""The schema of the format."""
 
 
 def to_sarif(problems: Sequence[Problem]) -> dict[str, Any]:
-    """Return problems as one run of a SARIF log; only the rules that they break are listed."""
+    """Return problems as a SARIF log with one run; it lists the violated rules only."""
     kinds = sorted({problem.kind for problem in problems}, key=code_of)
     places = {kind: index for index, kind in enumerate(kinds)}
     driver = {
@@ -28,10 +29,12 @@ def to_sarif(problems: Sequence[Problem]) -> dict[str, Any]:
 
 
 def _rule(kind: str) -> dict[str, Any]:
+    """Return the SARIF rule of a kind of problem."""
     return {"id": code_of(kind), "name": kind, "shortDescription": {"text": meaning_of(kind)}}
 
 
 def _result(problem: Problem, rule: int) -> dict[str, Any]:
+    """Return the SARIF result of a problem."""
     span = problem.span
     text = f"{problem.label}. {problem.help}" if problem.help else problem.label
     region = {

@@ -1,4 +1,4 @@
-"""Show sensitivity: indices as a table and as plain data."""
+"""Sensitivity output: print sensitivity indices."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from rich.table import Table
 from language.text.sanitise import escape_invisible
 from modewright.render.run import null_nonfinite
 from modewright.render.study import format_number, interval_text, progress_text
+from modewright.runtime.json_format import format_entry
 from sweep.analysis.sensitivity import MIN_COMPLETE, Index, Sensitivity
 
 DESIGN_UNITS = {"saltelli": "blocks", "morris": "paths"}
+"""The units of each design."""
 
 
 def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
     """Print the indices by group and measure, the largest first."""
-    text = f"{sensitivity.study}: {sensitivity.method}; {progress_text(sensitivity.counts, sensitivity.expected)}"
+    progress = progress_text(sensitivity.counts, sensitivity.expected)
+    text = f"{sensitivity.study}: {sensitivity.method}; {progress}"
     console.print(escape_invisible(text), highlight=False, markup=False)
     if sum(sensitivity.counts.values()) < sensitivity.expected:
         text = "unfinished: the same `modewright sweep STUDY --out DIR` goes on"
@@ -30,9 +33,10 @@ def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
     first = sensitivity.indices[0]
     sure = f"{sensitivity.confidence * 100:g} %"
     values = [head for name in first.values for head in (name, sure)]
+    unit = DESIGN_UNITS[sensitivity.method]
     table = Table(
-        *first.group, "measure", "of", *values, DESIGN_UNITS[sensitivity.method], box=None, pad_edge=False,
-        header_style="bold",
+        *first.group, "measure", "of", *values, unit,
+        box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
     for one in sort_indices(sensitivity):
         groups = (escape(escape_invisible(name)) for name in one.group.values())
@@ -43,15 +47,15 @@ def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
 
 
 def incomplete_index_notes(sensitivity: Sensitivity) -> list[str]:
-    """Return a note where some indices are not told, for want of complete blocks or paths."""
+    """Return a note if indices are missing because too few blocks or paths are complete."""
     few = sum(one.used < MIN_COMPLETE for one in sensitivity.indices)
     whole = DESIGN_UNITS[sensitivity.method]
     hint = f"fewer than {MIN_COMPLETE} {whole} are complete (every point done and with the measure)"
-    return [f"{few} of {len(sensitivity.indices)} indices are not told (-): {hint}"] if few else []
+    return [f"{few} of {len(sensitivity.indices)} indices are missing (-): {hint}"] if few else []
 
 
 def sort_indices(sensitivity: Sensitivity) -> list[Index]:
-    """Return the indices with the largest of each measure first."""
+    """Return the indices by group and measure, the largest first and NaN last."""
     key = "total" if sensitivity.method == "saltelli" else "mu_star"
     places: dict[object, int] = {}
     for one in sensitivity.indices:
@@ -66,8 +70,9 @@ def sort_indices(sensitivity: Sensitivity) -> list[Index]:
 
 
 def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
-    """Return the indices as plain data; what is not there is null."""
+    """Return the indices as a dict for JSON; missing values are null."""
     return {
+        **format_entry("sensitivity"),
         "study": sensitivity.study,
         "digest": sensitivity.digest,
         "expected": sensitivity.expected,
@@ -83,6 +88,7 @@ def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
 
 
 def _intervals_json(index: Index) -> dict[str, Any]:
+    """Return the intervals of an index by name."""
     return {
         name: list(null_nonfinite({"from": pair[0], "to": pair[1]}).values()) if pair else None
         for name, pair in index.intervals.items()
@@ -90,6 +96,7 @@ def _intervals_json(index: Index) -> dict[str, Any]:
 
 
 def _cells(index: Index) -> list[str]:
+    """Return the cells of an index."""
     found = []
     for name, value in index.values.items():
         found += [format_number(value), interval_text(index.intervals[name])]

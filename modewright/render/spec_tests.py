@@ -1,4 +1,4 @@
-"""Show tests: what became of tests, for a person, as plain data, and as JUnit XML."""
+"""Test output: print the results of tests, also as JSON and JUnit XML."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from modewright.render.text import pluralise
 
 XML_DECLARATION = "<?xml version='1.0' encoding='utf-8'?>"
 SECONDS_DECIMALS = 3
-"""Decimals of the seconds that a test took."""
+"""Decimals of the duration of a test."""
 
 
 def spec_test_lines(run: TestRun) -> Iterator[str]:
-    """Yield the lines that tell of a test: one if it passed, else one for all that failed."""
+    """Yield the lines of a test: one if it passed, else also all failures."""
     word = "passed" if run.passed else "FAILED"
     also = f" and C, {run.means.partition(':')[0]}" if run.means else ""
     count = pluralise(len(run.outcomes), "expectation")
@@ -36,19 +36,19 @@ def spec_test_lines(run: TestRun) -> Iterator[str]:
 
 
 def failure_text(expectation: Expectation, outcome: Outcome) -> str:
-    """Return what went wrong in one line."""
+    """Return the failure of an expectation in one line."""
     subject = f"`{escape_invisible(expectation.text)}` " if expectation.text else ""
     return f"{subject}{outcome.message}"
 
 
 def spec_tests_summary(runs: Sequence[TestRun]) -> str:
-    """Return how many tests there were, and how many failed."""
+    """Return the number of tests and of failures."""
     failed = sum(not run.passed for run in runs)
     return f"{pluralise(len(runs), 'test')}, {failed} failed"
 
 
 def spec_test_json(run: TestRun) -> dict[str, Any]:
-    """Return what became of a test as plain data; times in s, values in SI."""
+    """Return the result of a test as a dict for JSON; times in s, values in SI."""
     return {
         "name": run.test.name,
         "file": run.test.span.source.name,
@@ -67,7 +67,7 @@ def spec_test_json(run: TestRun) -> dict[str, Any]:
 
 
 def junit_xml(runs: Sequence[TestRun]) -> bytes:
-    """Return the tests as JUnit XML: a suite for each, a case for each expectation."""
+    """Return the tests as JUnit XML with a suite for each test and a case for each expectation."""
     root = ElementTree.Element("testsuites", _counts(runs))
     for run in runs:
         suite = ElementTree.SubElement(root, "testsuite", {"name": run.test.name, **_counts([run])})
@@ -87,7 +87,7 @@ def junit_xml(runs: Sequence[TestRun]) -> bytes:
 
 
 def _failure_details(run: TestRun, outcome: Outcome) -> list[str]:
-    """Return the modes and values at the place of a failure."""
+    """Return the modes and values at the time of a failure."""
     units = {name: unit for name, unit in _units(run).items()}
     lines = []
     if outcome.modes:
@@ -100,6 +100,7 @@ def _failure_details(run: TestRun, outcome: Outcome) -> list[str]:
 
 
 def _units(run: TestRun) -> Mapping[str, str]:
+    """Return the units of the signals of a test."""
     return {
         name: str(kind)
         for expectation in run.test.expectations
@@ -110,6 +111,7 @@ def _units(run: TestRun) -> Mapping[str, str]:
 
 
 def _outcome_json(expectation: Expectation, outcome: Outcome) -> dict[str, Any]:
+    """Return the outcome of an expectation as a dict for JSON."""
     return {
         "name": outcome.name,
         "kind": expectation.kind,
@@ -126,6 +128,7 @@ def _outcome_json(expectation: Expectation, outcome: Outcome) -> dict[str, Any]:
 
 
 def _counts(runs: Sequence[TestRun]) -> dict[str, str]:
+    """Return the JUnit counts of tests; a difference or a stop is an additional failed case."""
     extra = sum(bool(run.difference) + (run.stopped is not None) for run in runs)
     failed = sum(not outcome.passed for run in runs for outcome in run.outcomes)
     cases = sum(len(run.outcomes) for run in runs)
@@ -140,6 +143,7 @@ def _counts(runs: Sequence[TestRun]) -> dict[str, str]:
 def _add_case(
     suite: ElementTree.Element, run: TestRun, name: str, seconds: float, place: tuple[str, int]
 ) -> ElementTree.Element:
+    """Add a test case to a suite."""
     file, line = place
     return ElementTree.SubElement(
         suite, "testcase",
@@ -149,5 +153,6 @@ def _add_case(
 
 
 def _add_failure(case: ElementTree.Element, message: str, lines: Sequence[str]) -> None:
+    """Add a failure with details to a test case."""
     failed = ElementTree.SubElement(case, "failure", {"message": escape_invisible(message)})
     failed.text = "\n".join(map(escape_invisible, lines)) or None

@@ -1,4 +1,4 @@
-"""Show study: the summary of a study as tables and as plain data."""
+"""Study output: print the summary of a study."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from rich.table import Table
 from language.expressions.units import display_unit
 from language.text.sanitise import escape_invisible
 from modewright.render.run import null_nonfinite
+from modewright.runtime.json_format import format_entry
 from sweep.analysis.summary import Rate, Summary, SummaryLine
 
 MAX_FAILURES = 5
-"""Reasons that are told; `--json` and the store have all."""
+"""Largest number of reasons that are printed; --json and the store have all."""
 
 
 def print_summary(console: Console, summary: Summary) -> None:
-    """Print how variants ended, and why they did otherwise; the measures by group, and rates."""
+    """Print the number of variants by status, reasons of failure, measures and rates."""
     text = f"{summary.study}: {progress_text(summary.counts, summary.expected)}"
     console.print(escape_invisible(text), highlight=False, markup=False)
     for text in failure_texts(summary):
@@ -33,13 +34,15 @@ def print_summary(console: Console, summary: Summary) -> None:
 
 
 def progress_text(counts: Mapping[str, int], expected: int) -> str:
-    """Return how many variants are there, and how they ended."""
+    """Return the number of stored variants by status."""
     ended = ", ".join(f"{count} {name}" for name, count in counts.items())
     return f"{sum(counts.values())} of {expected} variants: {ended or 'none yet'}"
 
 
 def failure_texts(summary: Summary) -> list[str]:
-    """Return the most frequent reasons why variants are not done, each with one of its variants."""
+    """Return the most frequent reasons of failure with one variant each, and a count of the
+    rest.
+    """
     texts = [
         f"{one.count} {one.status}: {one.message} (variant {one.number})"
         for one in summary.failures[:MAX_FAILURES]
@@ -52,8 +55,9 @@ def failure_texts(summary: Summary) -> list[str]:
 
 
 def summary_json(summary: Summary) -> dict[str, Any]:
-    """Return a summary as plain data; what is not there is null."""
+    """Return a summary as a dict for JSON; missing values are null."""
     return {
+        **format_entry("summary"),
         "study": summary.study,
         "digest": summary.digest,
         "expected": summary.expected,
@@ -66,6 +70,7 @@ def summary_json(summary: Summary) -> dict[str, Any]:
 
 
 def _measure_table(summary: Summary) -> Table:
+    """Return the table of measures."""
     groups = list(summary.lines[0].group)
     sure = f"{summary.confidence * 100:g} %"
     table = Table(
@@ -80,6 +85,7 @@ def _measure_table(summary: Summary) -> Table:
 
 
 def _measure_cells(line: SummaryLine) -> list[str]:
+    """Return the cells of a measure."""
     numbers = (line.mean, line.deviation, line.p95, line.low, line.high)
     mean, deviation, p95, low, high = (format_number(number) for number in numbers)
     return [
@@ -90,6 +96,7 @@ def _measure_cells(line: SummaryLine) -> list[str]:
 
 
 def _rate_table(summary: Summary) -> Table:
+    """Return the table of rates."""
     groups = list(summary.rates[0].group)
     sure = f"{summary.confidence * 100:g} % (Wilson)"
     table = Table(*groups, "rate", "hits", "of", "draws", "share", sure, box=None, pad_edge=False,
@@ -102,6 +109,7 @@ def _rate_table(summary: Summary) -> Table:
 
 
 def _rate_cells(rate: Rate) -> list[str]:
+    """Return the cells of a rate."""
     return [
         rate.measure,
         str(rate.hits),
@@ -113,10 +121,10 @@ def _rate_cells(rate: Rate) -> list[str]:
 
 
 def interval_text(interval: tuple[float, float] | None) -> str:
-    """Return the ends of an interval as text."""
+    """Return the ends of an interval; `-` for None."""
     return f"{format_number(interval[0])} .. {format_number(interval[1])}" if interval else "-"
 
 
 def format_number(number: float) -> str:
-    """Return a number to five digits; what is not there as a dash."""
+    """Return a number with five digits; `-` for NaN."""
     return "-" if math.isnan(number) else f"{number:.5g}"

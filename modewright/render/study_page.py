@@ -1,4 +1,4 @@
-"""Study page: the results of a study as one HTML page that needs no other file."""
+"""Study page: render the results of a study as a self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib import metadata, resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -26,24 +26,24 @@ from sweep.store.row import DONE
 from sweep.store.store import Store, read_store
 from sweep.store.table import StudyTable
 
-if TYPE_CHECKING:
-    pass
-
 MAX_EXTREMES, MAX_FAILED, MAX_INDICES = 5, 100, 300
-"""Rows of each table that grows with the study."""
+"""Largest numbers of rows of the tables that grow with the study."""
 
 UNITLESS_COLUMN = StoreColumn("", "real", "1")
-"""A number whose unit stands elsewhere."""
+"""A column for numbers whose unit is shown elsewhere."""
 
 SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
+"""The text of an SVG document up to its attributes."""
 
 SVG_METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
+"""The metadata of an SVG document."""
 
 SVG_IDENTIFIER = re.compile(r"(\bid=\"|\"#|url\(#)")
+"""The start of an identifier or of a reference to one."""
 
 
 def render_study_page(store: Store) -> bytes:
-    """Return the page of what a store holds so far. Raises SpecError, ToolMissing."""
+    """Return the page of the stored results. Raises SpecError and MissingToolError."""
     table = StudyTable(store)
     summary, manifest = summary_of(store), store.manifest
     context = {
@@ -70,7 +70,7 @@ def render_study_page(store: Store) -> bytes:
 
 
 def _description_rows(manifest: Manifest) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Return what the study is, as its file says: sections, each with texts by name."""
+    """Return the sections of the study, each with texts by name."""
     found = []
     for key, entry in manifest.description.items():
         rows = [("", entry)] if isinstance(entry, str) else list(entry.items())
@@ -86,18 +86,21 @@ def _description_rows(manifest: Manifest) -> list[tuple[str, list[tuple[str, str
 
 
 def _design_text(design: Design) -> str:
+    """Return the number of points of a design as text."""
     if not design.has_indices:
         return f"{design.count} points"
     return f"{design.group_count} {DESIGN_UNITS[design.method]} of {design.group_size} points"
 
 
 def _measures_context(summary: Summary) -> dict[str, Any]:
+    """Return measures and rates for the template."""
     lines = [
         {
             "group": list(line.group.values()), "measure": line.measure,
             "unit": display_unit(line.unit),
             "cells": [
-                line.count, line.draws, format_number(line.median), interval_text(line.median_interval),
+                line.count, line.draws,
+                format_number(line.median), interval_text(line.median_interval),
                 format_number(line.mean), interval_text(line.mean_interval),
                 *map(format_number, (line.deviation, line.p95, line.low, line.high)),
             ],
@@ -121,6 +124,7 @@ def _measures_context(summary: Summary) -> dict[str, Any]:
 
 
 def _sensitivity_context(store: Store) -> dict[str, Any]:
+    """Return the sensitivity indices for the template; empty without a design."""
     sensitivity = sensitivity_of(store) if store.manifest.design.has_indices else None
     if sensitivity is None or not sensitivity.indices:
         return {"indices": [], "index_heads": [], "index_notes": []}
@@ -144,7 +148,7 @@ def _sensitivity_context(store: Store) -> dict[str, Any]:
 def _extreme_variants(
     table: StudyTable,
 ) -> list[tuple[str, str, list[tuple[str, list[list[str]]]]]]:
-    """Return for each measure that is a number the variants with its highest and lowest values."""
+    """Return for each numeric measure the variants with the highest and the lowest values."""
     found = []
     for column in table.store.manifest.measures:
         if column.type not in ("real", "whole"):
@@ -164,6 +168,9 @@ def _extreme_variants(
 
 
 def _failed_context(table: StudyTable) -> dict[str, Any]:
+    """Return the unfinished variants for the template, at most MAX_FAILED, and the number of
+    others.
+    """
     places, names = table.read_categories("status")
     done = names.index(DONE) if DONE in names else -1
     failed = np.flatnonzero(places != done).tolist()
@@ -172,7 +179,9 @@ def _failed_context(table: StudyTable) -> dict[str, Any]:
 
 
 def _variant_rows(table: StudyTable, places: Sequence[int], last: Sequence[str]) -> list[list[str]]:
-    """Return the cells of some variants: number, variant, scenario, what varies, and others."""
+    """Return the cells of variants: number, variant, scenario, variables, and the `last`
+    columns.
+    """
     if not places:
         return []
     manifest = table.store.manifest
@@ -191,6 +200,7 @@ def _variant_rows(table: StudyTable, places: Sequence[int], last: Sequence[str])
 
 
 def _cell(value: Any, column: StoreColumn | None) -> str:
+    """Return a value of a column as text; `-` for None."""
     if value is None:
         return "-"
     if isinstance(value, float):
@@ -199,7 +209,7 @@ def _cell(value: Any, column: StoreColumn | None) -> str:
 
 
 def _embed_svg(name: str, data: bytes) -> str:
-    """Return an SVG as a part of a page: its names are like no other's."""
+    """Return an SVG for embedding, with identifiers that are unique on the page."""
     title = html.escape(name)
     text = SVG_IDENTIFIER.sub(
         lambda found: f"{found[1]}{title}-", SVG_METADATA.sub("", data.decode())
@@ -208,6 +218,7 @@ def _embed_svg(name: str, data: bytes) -> str:
 
 
 def _render_template(context: Mapping[str, Any]) -> str:
+    """Return the page for a context."""
     own = resources.files("modewright.render").joinpath("templates")
     shared = resources.files("diagnosis.report").joinpath("templates")
 
@@ -226,7 +237,5 @@ def _render_template(context: Mapping[str, Any]) -> str:
 
 
 def study_report(out: str | Path) -> bytes:
-    """Return the results in a folder as one HTML page that needs nothing else. Raises SpecError."""
-    pass
-
+    """Return the results in a folder as a self-contained HTML page. Raises SpecError."""
     return render_study_page(read_store(Path(out)))

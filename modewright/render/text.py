@@ -1,11 +1,6 @@
-"""TODO docstring."""
+"""Text: format numbers with nouns."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
 
 
 def pluralise(number: int, noun: str) -> str:

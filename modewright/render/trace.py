@@ -1,4 +1,4 @@
-"""Show trace: requirements with specs, C and tests, as a table, CSV, HTML and plain data."""
+"""Trace output: show requirements with specs, C and tests as text, CSV, HTML and JSON."""
 
 from __future__ import annotations
 
@@ -16,12 +16,16 @@ from expectation.requirement_trace import (
     Verification,
 )
 from modewright.render.text import pluralise
+from modewright.runtime.json_format import format_entry
 
 HEADINGS = ("requirement", "state", "spec", "place", "C", "test", "test place", "verdict")
+"""The headings of the CSV file."""
 MAX_LINES = 6
-"""Lines of C that are shown to a person for one place of a spec; CSV and JSON have all."""
+"""Largest number of lines of C that are printed for a place; CSV and JSON have all."""
 STATE_COLOURS = {"traced": "#1d7a33", "untested": "#9a6700", "unimplemented": "#b3261e"}
+"""Colours of states."""
 VERDICT_TEXTS = {None: "not run", True: "passed", False: "failed"}
+"""Texts of test results."""
 STYLE = """body{font:14px/1.45 system-ui,sans-serif;margin:2rem;color:#222}
 table{border-collapse:collapse;width:100%}
 th,td{text-align:left;vertical-align:top;padding:.35rem .6rem;border-bottom:1px solid #ddd}
@@ -30,7 +34,7 @@ code{font-size:12px}.n{color:#666}
 
 
 def trace_lines(trace: RequirementTrace) -> Iterator[str]:
-    """Yield the lines that tell of a trace."""
+    """Yield the lines of a trace: requirements with places and tests, and a summary."""
     for each in trace.requirements:
         yield f"{each.name}: {each.state}" + (f" - {each.text}" if each.text else "")
         for claim in each.implementations:
@@ -41,7 +45,7 @@ def trace_lines(trace: RequirementTrace) -> Iterator[str]:
 
 
 def trace_summary(trace: RequirementTrace) -> str:
-    """Return how many requirements there are, and which are not traced."""
+    """Return the number of requirements, and the names of those that are not traced."""
     text = pluralise(len(trace.requirements), "requirement")
     for state in ("untested", "unimplemented"):
         names = trace.with_state(state)
@@ -50,8 +54,9 @@ def trace_summary(trace: RequirementTrace) -> str:
 
 
 def trace_json(trace: RequirementTrace) -> dict[str, Any]:
-    """Return a trace as plain data."""
+    """Return a trace as a dict for JSON."""
     return {
+        **format_entry("trace"),
         "requirements": [_requirement_json(each) for each in trace.requirements],
         "untested": trace.with_state("untested"),
         "unimplemented": trace.with_state("unimplemented"),
@@ -59,7 +64,7 @@ def trace_json(trace: RequirementTrace) -> dict[str, Any]:
 
 
 def trace_csv(trace: RequirementTrace) -> str:
-    """Return a trace as CSV: a row for each place of a spec with each test that names the same."""
+    """Return a trace as CSV with a row for each pair of place and test."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADINGS)
@@ -79,7 +84,7 @@ def trace_csv(trace: RequirementTrace) -> str:
 
 
 def trace_html(trace: RequirementTrace, title: str) -> str:
-    """Return a trace as a page of its own."""
+    """Return a trace as an HTML page."""
     rows = "\n".join(map(_html_row, trace.requirements))
     heads = "".join(f"<th>{head}</th>" for head in ("requirement", "state", "spec and C", "tests"))
     name = escape(title)
@@ -95,6 +100,7 @@ def trace_html(trace: RequirementTrace, title: str) -> str:
 
 
 def _html_row(requirement: TracedRequirement) -> str:
+    """Return the table row of a requirement."""
     claims = "".join(
         f"<div><code>{escape(_subject(c))}</code> <span class=n>{escape(c.place)}</span>"
         f"<br><span class=n>{escape(_code_text(c.code).strip())}</span></div>"
@@ -112,6 +118,7 @@ def _html_row(requirement: TracedRequirement) -> str:
 
 
 def _requirement_json(requirement: TracedRequirement) -> dict[str, Any]:
+    """Return a requirement as a dict for JSON."""
     return {
         "name": requirement.name,
         "text": requirement.text,
@@ -138,14 +145,17 @@ def _requirement_json(requirement: TracedRequirement) -> dict[str, Any]:
 
 
 def _subject(claim: Implementation) -> str:
+    """Return spec and path of a place."""
     return f"{claim.spec} {claim.path}".strip()
 
 
 def _test_name(proof: Verification) -> str:
+    """Return the name of a test, or of one of its expectations."""
     return f"{proof.test}.{proof.expectation}" if proof.expectation else proof.test
 
 
 def _code_text(lines: Sequence[CodeLine]) -> str:
+    """Return the lines of C of a place, at most MAX_LINES."""
     if not lines:
         return ", no line of C"
     more = f" and {len(lines) - MAX_LINES} more" if len(lines) > MAX_LINES else ""

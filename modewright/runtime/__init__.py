@@ -1,1 +1,1 @@
-"""The running process: threads, garbage collection, output files, diagnosis of the installation."""
+"""Runtime: compiled runs, BLAS threads, garbage collection and output files."""

@@ -1,4 +1,4 @@
-"""Threads: linear algebra on one of them, where matrices are small and come by the thousand."""
+"""BLAS threads: restrict linear algebra to one thread."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from threadpoolctl import threadpool_limits
 
 
 class SingleThreadedBlas(ContextDecorator):
-    """While it is entered, or a function that it decorates runs, BLAS takes one thread.
+    """Context manager and decorator that restricts BLAS to one thread.
 
-    More would wait for each other most of the time: a diagnosis takes half of the processor time
-    with one, and no longer.
+    The matrices of a diagnosis are small; with more threads it takes twice the processor time and
+    is not faster.
     """
 
     def __enter__(self) -> None:
-        """Take one thread."""
+        """Restrict BLAS to one thread."""
         self._limits = threadpool_limits(1)
 
     def __exit__(self, *_: object) -> None:
-        """Take as many as before."""
+        """Restore the number of threads."""
         self._limits.restore_original_limits()

@@ -1,6 +1,6 @@
-"""Compiled: runs and batches in C where a compiler is there, by the interpreter where none is.
+"""Compiled run: run simulations and batches in C, or in the interpreter without a compiler.
 
-Both have the same bits. What did the work is told, with the reason where it is the interpreter.
+Both have the same bits. The results name the back end, with the reason for the interpreter.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ from language.model.system import Scenario, System
 from language.text.diagnostic import MissingToolError
 
 COMPILE_THRESHOLD = 100_000
-"""Steps and ticks from which on a run is compiled unasked: the interpreter takes seconds for them,
-the compiler about one, once."""
+"""Number of steps and ticks above which a run is compiled by default.
+
+The interpreter takes seconds for them, the compiler about one second once.
+"""
 
 
 def run_simulation(
     system: System, scenario: Scenario, compiled: bool | None = None
 ) -> tuple[Trajectory, str]:
-    """Return the trajectory of a run, and what carried it out, with the reason if not all in C.
+    """Return the trajectory of a run and the name of the back end, with the reason if not compiled.
 
-    `compiled` takes C where it can; None does so for runs that are long.
+    `compiled` uses C if possible; None uses C for long runs only.
     """
     scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
@@ -53,9 +55,10 @@ def run_simulation(
 
 
 def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
-    """Return the trajectory of a run by compiled C: whole, or block by block where that is not all.
+    """Return the trajectory of a run in compiled C, and how it was run.
 
-    Raises ToolMissing, BuildError.
+    A run that cannot be planned as a whole, or that stops, runs block by block. Raises
+    MissingToolError and BuildError.
     """
     scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
@@ -69,7 +72,7 @@ def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
 def simulate_resolved(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> Trajectory:
-    """Return the trajectory of a resolved scenario, in C where that is possible."""
+    """Return the trajectory of a resolved scenario, in C if possible."""
     with suppress(MissingToolError, BuildError, OSError):
         trajectory, _ = _simulate_in_c(system, scenario, programs)
         if trajectory:
@@ -80,7 +83,10 @@ def simulate_resolved(
 def _simulate_in_c(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> tuple[Trajectory | None, str]:
-    """Return a run in one call; block by block where that is not planned; None: it stopped."""
+    """Return the trajectory in C and a note; None as trajectory if the planned run stopped.
+
+    A system that cannot be planned as a whole is run block by block.
+    """
     reason = planning_obstacle(system, scenario, programs)
     if reason:
         trajectory = simulate(system, scenario, CompiledStepper, programs=programs)
@@ -91,27 +97,26 @@ def _simulate_in_c(
 
 
 def run_batch(batch: Batch, threads: int | None = None, min_steps: int = 0) -> BatchResult:
-    """Return what is kept of each variant of a batch: by C on all cores, or on so many threads.
+    """Return the results of a batch, in C on all cores or on a number of threads.
 
-    Variants that share a Program and have fewer than `min_steps` steps in all are not compiled for.
+    Batches with fewer than `min_steps` steps in total are not compiled.
     """
     return _run_planned(CompiledBatchCache(load_library, min_steps), batch, threads)
 
 
 def run_block(batch: Batch) -> BatchResult:
-    """Return what is kept of each variant of a part of a study, which has one core.
-
-    Parts that differ in numbers alone are planned once in a process.
-    """
+    """Return the results of a part of a study, in C on one core; plans are shared in a process."""
     return _run_planned(_shared_planner(), batch, threads=1)
 
 
 @cache
 def _shared_planner() -> CompiledBatchCache:
+    """Return the cache of plans of this process."""
     return CompiledBatchCache(load_library, COMPILE_THRESHOLD)
 
 
 def _run_planned(planner: CompiledBatchCache, batch: Batch, threads: int | None) -> BatchResult:
+    """Return the results of a batch; the interpreter runs it if it cannot be compiled."""
     try:
         return planner.get_or_compile(batch).run(threads)
     except (MissingToolError, BuildError, OSError) as error:
@@ -120,6 +125,6 @@ def _run_planned(planner: CompiledBatchCache, batch: Batch, threads: int | None)
 
 
 def _count_steps(scenario: Scenario, programs: dict[str, Program]) -> int:
-    """Return how many steps and ticks a run has."""
+    """Return the number of major steps and ticks of a run."""
     assert scenario.horizon is not None
     return sum(int(scenario.horizon / program.major_step) for program in programs.values())

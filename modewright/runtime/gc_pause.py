@@ -1,4 +1,4 @@
-"""Garbage: it is looked for rarely, for trees of expressions have no circles."""
+"""Garbage collection: run the collector less often, because expression trees have no cycles."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 GENERATION_0_THRESHOLD = 1_000_000
-"""New objects after which garbage is looked for."""
+"""Number of new objects after which the collector runs."""
 
 
 def raise_gc_threshold() -> None:
-    """Let garbage be looked for rarely from now on; not at all where it was not."""
+    """Raise the threshold of the collector; do nothing if it is disabled."""
     young, *older = gc.get_threshold()
     if young:
         gc.set_threshold(max(young, GENERATION_0_THRESHOLD), *older)
@@ -19,7 +19,7 @@ def raise_gc_threshold() -> None:
 
 @contextmanager
 def infrequent_gc() -> Iterator[None]:
-    """Let garbage be looked for rarely while it lasts: that took 4 % of a diagnosis."""
+    """Raise the threshold of the collector in the context; it took 4 % of a diagnosis."""
     before = gc.get_threshold()
     raise_gc_threshold()
     try:

@@ -1,4 +1,4 @@
-"""Files: outputs are written whole or not at all."""
+"""Output files: check paths and write files atomically."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 DEFAULT_FILE_MODE = 0o644
+"""Mode of new files."""
 SPEC_SUFFIXES = (".yaml", ".yml")
+"""Suffixes of specs, which outputs must not replace."""
 RESULT_NAMES = ("study.json", "blocks")
-"""What the results of a study are in their folder: sweep/store/store.py."""
+"""The parts of a store of results, see sweep/store/store.py."""
 STUDY_FOLDER_NAMES = (*RESULT_NAMES, "plots", ".lock")
-"""What a run of a study writes into that folder."""
+"""All names that a run of a study writes into its folder."""
 
 
 class OutputError(Exception):
-    """An output cannot be written; the message says which and why."""
+    """An output cannot be written; the message states which and why."""
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it. Raises OutputError."""
+    """Create a folder and its parents. Raises OutputError."""
     if folder.is_symlink() and not folder.exists():
         raise OutputError(f"{folder}: this is a link to what is not there")
     if folder.exists() and not folder.is_dir():
@@ -33,7 +35,10 @@ def make_folder(folder: Path) -> None:
 
 
 def require_writable(*paths: Path | None) -> None:
-    """Raise OutputError, before any work is done, for a path that is no place for an output."""
+    """Raise OutputError for paths that are specs, results of a study, or not writable.
+
+    Commands call this before the computation; None is skipped.
+    """
     for path in paths:
         if path is None:
             continue
@@ -45,15 +50,16 @@ def require_writable(*paths: Path | None) -> None:
 
 
 def _is_result(place: Path) -> bool:
+    """Return whether a path is a part of a store of results."""
     folder = place.parent
     is_store = (folder / RESULT_NAMES[0]).is_file() and (folder / RESULT_NAMES[1]).is_dir()
     return is_store and place.name in RESULT_NAMES
 
 
 def require_separate_outputs(results: Path, *paths: Path | None) -> None:
-    """Raise OutputError, before any work is done, for outputs that a run would get mixed up with.
+    """Raise OutputError for outputs that are equal or part of the folder `results` of a study.
 
-    Its `results` are a folder that may be made by the run; an output may lie in it.
+    The folder need not exist yet; outputs may be in it.
     """
     folder, claimed = results.resolve(), set[Path]()
     for path in paths:
@@ -70,7 +76,7 @@ def require_separate_outputs(results: Path, *paths: Path | None) -> None:
 
 
 def require_calibration_output(path: Path) -> None:
-    """Raise OutputError for what a new calibration cannot be written to, such as another spec."""
+    """Raise OutputError for a path that is another kind of spec or not writable."""
     require_writable_location(path)
     if path.is_file() and not any(line.startswith(b"calibration:") for line in path.open("rb")):
         raise OutputError(f"{path}: this is no calibration; a new one would replace it")
@@ -91,9 +97,9 @@ def require_writable_location(path: Path) -> None:
 
 
 def write_files(files: Mapping[Path, bytes]) -> None:
-    """Write all files or, if one cannot be written, none. Raises OutputError.
+    """Write all files, or none if one cannot be written. Raises OutputError.
 
-    A file that is there keeps its mode, a link leads where it led; pipes are written to at last.
+    Existing files keep their mode and links their target; pipes are written last.
     """
     temporary_files: list[tuple[str, Path]] = []
     current = Path()
@@ -126,12 +132,12 @@ def write_files(files: Mapping[Path, bytes]) -> None:
 
 
 def _resolve_link(path: Path) -> Path:
-    """Return the file that a path leads to: a link stays, what it names is written."""
+    """Return the target of a link; other paths are unchanged."""
     return path.resolve() if path.is_symlink() and not _is_stream(path) else path
 
 
 def _is_stream(path: Path) -> bool:
-    """Tell whether a path is a pipe or a terminal, which take what comes and keep nothing."""
+    """Return whether a path is a pipe or a character device."""
     try:
         mode = path.stat().st_mode
     except OSError:
@@ -140,7 +146,7 @@ def _is_stream(path: Path) -> bool:
 
 
 def remove_files(paths: Iterable[Path]) -> None:
-    """Remove files. Raises OutputError."""
+    """Remove files; missing ones are ignored. Raises OutputError."""
     for path in paths:
         try:
             path.unlink(missing_ok=True)

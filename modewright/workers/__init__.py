@@ -1,1 +1,1 @@
-"""Worker processes of studies."""
+"""Workers: entry points of worker processes of studies."""

@@ -1,7 +1,6 @@
-"""Cluster template: what workers started on this machine have loaded before they are.
+"""Dask template: modules that the fork server loads for local Dask workers.
 
-Loaded by name in the process that they are copies of, which goes on without where some package is
-missing: the client tells of it.
+If a package is missing, the fork server continues without this module and the client reports it.
 """
 
 from __future__ import annotations
@@ -16,4 +15,4 @@ from modewright.workers import dask_worker
 from sweep.execution import dask_worker as block_worker  # noqa: F401
 
 dask_worker.own_fingerprint()
-pyarrow.array([0])  # which loads pandas where that is installed
+pyarrow.array([0])  # loads pandas if it is installed

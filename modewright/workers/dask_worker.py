@@ -1,6 +1,6 @@
-"""Cluster worker: what a worker of a Dask cluster finds here by name, and does with a block.
+"""Dask worker: functions that Dask calls by name in a worker process.
 
-To load this module is to load our packages, whatever folders of their names are around.
+The module imports the packages of this installation, independent of the working folder.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def compute_block(
     expected_fingerprint: Mapping[str, str], serialised_study: bytes, start: int, stop: int
 ) -> Answer:
-    """Return the answer of this worker about the variants from `start` to before `stop`."""
+    """Return the answer of this worker for the variants from `start` to `stop` (exclusive)."""
     from modewright.runtime.compiled_run import run_block
     from sweep.execution.dask_worker import answer_block
     from sweep.store.row import Block
@@ -32,5 +32,5 @@ def own_fingerprint() -> Mapping[str, str]:
 
 
 def dask_setup(worker: object) -> None:
-    """Leave Ctrl-C to who started this worker: it ends us. Called by Dask."""
+    """Ignore Ctrl-C in the worker; the parent process ends it. Dask calls this at the start."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Worker: the process that `modewright sweep` starts to compute blocks of a study."""
+"""Study worker: the process that `modewright sweep` starts to compute blocks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from sweep.execution.worker import serve_blocks
 
 
 def main() -> None:
-    """Answer blocks until who started us is gone."""
+    """Answer blocks until the parent process is gone."""
     serve_blocks(run_block)
 
 

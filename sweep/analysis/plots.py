@@ -74,8 +74,11 @@ def draw_pictures(store: Store) -> dict[str, Picture]:
     """
     table = StudyTable(store)
     draw = {
-        "heat_map": _draw_heat_map, "parallel": _draw_parallel, "tornado": _draw_tornado, "histogram": _draw_histogram,
-    }  # fmt: skip
+        "heat_map": _draw_heat_map,
+        "parallel": _draw_parallel,
+        "tornado": _draw_tornado,
+        "histogram": _draw_histogram,
+    }
     found = {}
     for name, plot in store.manifest.presentation.plots.items():
         count = int(np.sum(table.is_done))
@@ -94,7 +97,8 @@ def _draw_empty() -> Figure:
 
 
 def _find_column(table: StudyTable, name: str) -> StoreColumn:
-    """Return the column of a variable or a measure with this name. Raises StopIteration if unknown.
+    """Return the column of a variable or a measure with this name. Raises StopIteration if
+    unknown.
     """
     manifest = table.store.manifest
     return next(c for c in (*manifest.varied, *manifest.measures) if c.name == name)
@@ -124,7 +128,8 @@ def _mask_undrawable(values: Reals) -> Reals:
 
 
 def _omission_text(table: StudyTable, plot: Mapping[str, Any]) -> str:
-    """Return a note with the number of values that are too large to draw; empty if there are none.
+    """Return a note with the number of values that are too large to draw; empty if there are
+    none.
     """
     drawn = [table.read_pooled(name) for name in plot["of"]]
     count = sum(
@@ -169,7 +174,8 @@ def _label_rotation(names: Sequence[str]) -> float:
 
 
 def _annotate(axis: Axes, cells: Reals) -> None:
-    """Write the finite values into the cells of a heat map; do nothing if there are too many cells.
+    """Write the finite values into the cells of a heat map; do nothing if there are too many
+    cells.
     """
     if cells.size > MAX_ANNOTATED_CELLS or not np.any(np.isfinite(cells)):
         return

@@ -76,7 +76,8 @@ class Sensitivity:
     indices: tuple[Index, ...]
 
     def csv(self) -> str:
-        """Return the indices as CSV text with numbers in SI; NaN and missing intervals are empty.
+        """Return the indices as CSV text with numbers in SI; NaN and missing intervals are
+        empty.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -152,7 +153,9 @@ def sobol_indices(results: Reals) -> dict[str, Reals]:
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
     """Return mu_star, mu and sigma (..., d) of elementary effects (..., n, d)."""
-    with np.errstate(over="ignore", invalid="ignore"):  # an overflow gives a value that is not finite
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # an overflow gives a value that is not finite
         return {
             "mu_star": np.mean(np.abs(effects), axis=-2),
             "mu": np.mean(effects, axis=-2),

@@ -82,7 +82,9 @@ class MeasureReader(Reader):
         found = []
         for entry in self.named_entries(node, "measures"):
             measure = self._measure(entry)
-            self.dimensions[entry.key] = None   # None suppresses further reports about a faulty measure
+            self.dimensions[entry.key] = (
+                None  # None suppresses further reports about a faulty measure
+            )
             if measure:
                 del self.dimensions[entry.key]
                 found.append(measure)
@@ -154,7 +156,8 @@ class MeasureReader(Reader):
         since: Bound,
         until: Bound,
     ) -> Measure | None:
-        """Return a measure of events (time, count, delay or match); None if a problem was reported.
+        """Return a measure of events (time, count, delay or match); None if a problem was
+        reported.
         """
         event = self._event_name(scalar)
         if event is None:
@@ -191,7 +194,9 @@ class MeasureReader(Reader):
         for system in self.systems if event else ():
             assert event is not None
             if system.instances[event.instance].automaton.statechart is not None:
-                label = f"`{event.instance}` is a chart: its transitions do not determine all entries"
+                label = (
+                    f"`{event.instance}` is a chart: its transitions do not determine all entries"
+                )
                 hint = "a test of the spec does: docs/testing.md"
                 self.problems.error("event", scalar.span, label, hint)
                 return None
@@ -223,8 +228,9 @@ class MeasureReader(Reader):
             self._last_dimension = (
                 SECOND if kind == "settling" else dimension_product(PURE_NUMBER, SECOND, -1)
             )
+        result_unit = str(self._last_dimension)
         return SignalMeasure(
-            entry.key, kind, signal, since, until, float(within), by, str(self._last_dimension), entry.span  # type: ignore[arg-type]
+            entry.key, kind, signal, since, until, float(within), by, result_unit, entry.span  # type: ignore[arg-type]
         )  # fmt: skip
 
     def _recorded_signal(self, name: str, scalar: ScalarNode) -> tuple[str, Dimension | None]:

@@ -60,7 +60,8 @@ class PresentationReader(Reader):
         if node is not None:
             confidence = float(self.read_quantity(node, "confidence", node.span, None)[0])
             if not MIN_CONFIDENCE <= confidence <= MAX_CONFIDENCE:
-                label = f"`confidence` is a share from {MIN_CONFIDENCE:g} to {MAX_CONFIDENCE!r}, like 0.95"
+                limits = f"from {MIN_CONFIDENCE:g} to {MAX_CONFIDENCE!r}"
+                label = f"`confidence` is a share {limits}, like 0.95"
                 self.problems.error("range", node.span, label)
         found = {entry.key: self._plot(entry) for entry in self.named_entries(plots, "plots")}
         return Presentation(tuple(by), confidence, found)

@@ -94,7 +94,8 @@ class SamplingReader(Reader):
 
 
 def find_imbalance(method: str, count: int) -> tuple[str, str] | None:
-    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method; else None.
+    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method; else
+    None.
     """
     if method not in ("sobol", "saltelli") or not count & (count - 1):
         return None

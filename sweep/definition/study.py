@@ -38,7 +38,8 @@ class Target:
 
     @property
     def is_input_time(self) -> bool:
-        """Return whether the target is a time in an input; drawn times are rounded to nanoseconds.
+        """Return whether the target is a time in an input; drawn times are rounded to
+        nanoseconds.
         """
         is_time = "times" in self.path[1:2] or self.path[-1] in ("from", "to")
         return self.kind == "input" and is_time
@@ -195,7 +196,8 @@ class Study:
 
     @property
     def count(self) -> int:
-        """The number of variants: system variants * scenarios * grid points * samples * replicates.
+        """The number of variants: system variants * scenarios * grid points * samples *
+        replicates.
         """
         samples = max(1, self.sampling.count)
         shared = self.grid_count * samples * self.replicates

@@ -35,8 +35,9 @@ from sweep.definition.study import ScenarioBinding, Setting, Study, SweepVariabl
 from sweep.definition.target import TargetInfo, find_targets
 from sweep.definition.vary_reader import VaryReader
 
-STUDY_KEYS = tuple(
-    "language study of scenarios variants vary set sampling replicates measures record summary plots".split()  # noqa: SIM905
+STUDY_KEYS = (
+    *("language", "study", "of", "scenarios", "variants", "vary", "set", "sampling"),
+    *("replicates", "measures", "record", "summary", "plots"),
 )
 """The sections of a study."""
 PRESENTATION_KEYS = ("summary", "plots", "sampling", "study", *TEXT_KEYS)

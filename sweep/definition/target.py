@@ -107,7 +107,8 @@ def _sensors(system: System) -> Iterator[tuple[str, TargetInfo]]:
 
 
 def _clocks(system: System) -> Iterator[tuple[str, TargetInfo]]:
-    """Yield `<instance>.period` of sampled, `.step` of continuous instances, and `.offset` of all.
+    """Yield `<instance>.period` of sampled, `.step` of continuous instances, and `.offset` of
+    all.
     """
     for owner, instance in system.instances.items():
         for clock in CLOCKS:

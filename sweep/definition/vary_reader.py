@@ -215,7 +215,8 @@ class VaryReader(Reader):
     def _truncation(
         self, node: YamlNode | None, unit: Unit, form: str, place: TargetInfo | None
     ) -> tuple[float, float] | None:
-        """Return the bounds `within` [SI]; None without. Reports them for other than (log)normals.
+        """Return the bounds `within` [SI]; None without. Reports them for other than
+        (log)normals.
         """
         limits = self.read_range(node, unit) if node else None
         for item in self.read_list(node, "within") if limits and place and place.is_width else ():
@@ -225,7 +226,6 @@ class VaryReader(Reader):
             label = f"`within` cuts a normal or lognormal; `{form}` has its ends"
             self.problems.error("form", node.span, label)
         return (_to_float(limits[0]), _to_float(limits[1])) if limits else None
-
 
     def settings(
         self, node: YamlNode | None, variables: Sequence[SweepVariable]

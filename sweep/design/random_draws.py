@@ -98,7 +98,8 @@ def _unit_cube_points(study: Study, samples: NDArray[np.int64]) -> Reals:
 
 
 def _random_stream(seed: int, name: str, first: int, count: int) -> Reals:
-    """Return the numbers `first` to `first + count` (exclusive) of the stream of a variable name.
+    """Return the numbers `first` to `first + count` (exclusive) of the stream of a variable
+    name.
     """
     digest = hashlib.sha256(name.encode()).digest()
     key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
@@ -109,12 +110,13 @@ def _random_stream(seed: int, name: str, first: int, count: int) -> Reals:
 
 
 def _sobol_points(dimensions: int, seed: int, first: int, count: int) -> Reals:
-    """Return rows `first` to `first + count` (exclusive) of a scrambled Sobol sequence (count, d).
+    """Return rows `first` to `first + count` (exclusive) of a scrambled Sobol sequence (count,
+    d).
     """
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)   # the number of rows is no power of 2
+        warnings.simplefilter("ignore", UserWarning)  # the number of rows is no power of 2
         engine = qmc.Sobol(d=dimensions, scramble=True, seed=seed)
         if first:
             engine.fast_forward(first)

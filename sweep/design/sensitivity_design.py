@@ -51,7 +51,8 @@ def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Rea
 
 
 def _morris_path(dimensions: int, seed: int, number: int) -> Reals:
-    """Return the quantile levels (dimensions + 1, dimensions) of one path, by seed and path number.
+    """Return the quantile levels (dimensions + 1, dimensions) of one path, by seed and path
+    number.
     """
     key = np.array([seed, number], dtype=np.uint64)
     source = np.random.Generator(np.random.Philox(key=key))

@@ -178,7 +178,8 @@ def _build_input_tables(group: _BatchGroup) -> dict[str, InputTable]:
 
 
 def _share_step_times(group: _BatchGroup) -> bool:
-    """Return whether the inputs of all variants step at the same times and vary equally in between.
+    """Return whether the inputs of all variants step at the same times and vary equally in
+    between.
     """
     return all(
         [piece.start for piece in scenario.inputs[name].pieces]

@@ -23,7 +23,8 @@ class Address:
 
     @property
     def is_unprotected(self) -> bool:
-        """Return whether the connection can be read by others: neither TLS nor a loopback address.
+        """Return whether the connection can be read by others: neither TLS nor a loopback
+        address.
         """
         return self.url.startswith("tcp:") and not _is_loopback(self.host)
 

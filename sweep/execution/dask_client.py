@@ -105,7 +105,8 @@ def _connect(scheduler: Any, security: Security | None, timeout: float) -> Clien
 
 @contextmanager
 def _silence_dask_loggers() -> Iterator[None]:
-    """Disable the loggers of Dask, which would log tracebacks of failures that are reported here.
+    """Disable the loggers of Dask, which would log tracebacks of failures that are reported
+    here.
     """
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in DASK_LOGGERS]
     loggers = [logging.getLogger(name) for name in (*DASK_LOGGERS, *names)]
@@ -173,8 +174,8 @@ def _require_workers(client: Client, worker_setup: WorkerSetup, timeout: float) 
     try:
         found = client.run(worker_setup.fingerprint, on_error="return", callback_timeout=timeout)
     except OSError:
-        label = f"a worker did not report its code, or the scheduler did not answer, within {timeout:g} s"
-        raise ClusterError(label) from None
+        label = "a worker did not report its code, or the scheduler did not answer"
+        raise ClusterError(f"{label}, within {timeout:g} s") from None
     for name, there in found.items():
         if isinstance(there, ImportError):
             raise ClusterError(f"worker {name} cannot import modewright: {there}")

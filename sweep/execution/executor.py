@@ -27,11 +27,13 @@ class BlockResult:
 
 
 class Executor(Protocol):
-    """Computation of blocks; the results depend neither on the executor nor on the order of blocks.
+    """Computation of blocks; the results depend neither on the executor nor on the order of
+    blocks.
     """
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield the blocks in the order of completion; closing the iterator ends the computation.
+        """Yield the blocks in the order of completion; closing the iterator ends the
+        computation.
         """
 
 

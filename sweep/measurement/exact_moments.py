@@ -33,7 +33,8 @@ def mean_of(values: Reals) -> float:
 
 
 def deviation_of(values: Reals) -> float:
-    """Return the sample standard deviation (divisor n - 1) of values (n,), n > 1; NaN on overflow.
+    """Return the sample standard deviation (divisor n - 1) of values (n,), n > 1; NaN on
+    overflow.
     """
     own, exponent = scale_to_squarable(values)
     mean = math.fsum(own) / len(own)

@@ -13,7 +13,8 @@ DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
 
 @dataclass(frozen=True)
 class Row:
-    """The results of one variant: indices in the study, values [SI], status, message and measures.
+    """The results of one variant: indices in the study, values [SI], status, message and
+    measures.
     """
 
     number: int

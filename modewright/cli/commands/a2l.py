@@ -16,10 +16,12 @@ def a2l(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write .a2l")],
     elf: Annotated[
-        Path | None, typer.Option("--elf", help="linked program with debug information (-g), for addresses")
+        Path | None,
+        typer.Option("--elf", help="linked program with debug information (-g), for addresses"),
     ] = None,
     page: Annotated[
-        str | None, typer.Option(help="the structure of the calibration page; default X_default_cal")
+        str | None,
+        typer.Option(help="the structure of the calibration page; default X_default_cal"),
     ] = None,
     instance: Annotated[
         str | None, typer.Option(help="the instance if the program has several: 'app.left'")

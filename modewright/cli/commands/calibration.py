@@ -14,6 +14,7 @@ from language.text.sanitise import escape_invisible
 from modewright.cli.common.console import console, progress_spinner, report_written_files
 from modewright.cli.common.exit_codes import EXIT_CODES
 from modewright.cli.common.options import Calibrations, Json, Sets, calibration_title, values_of
+from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import OutputError, require_writable, write_files
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: name or file")]
@@ -71,7 +72,8 @@ def import_page(
     out: Annotated[Path, typer.Option("--out", "-o", help="write a calibration: .yaml")],
     form: Format = None,
     name: Annotated[
-        str | None, typer.Option("--name", help="name of the calibration; by default that of its file")
+        str | None,
+        typer.Option("--name", help="name of the calibration; by default that of its file"),
     ] = None,
     date: Annotated[str, typer.Option("--date", help="date of the page: '2026-11-21'")] = "",
     own_only: Annotated[
@@ -149,7 +151,7 @@ def _report_problems_as_json(as_json: bool) -> Iterator[None]:
     except SpecError as error:
         if as_json:
             problems = [problem_json(problem) for problem in sort_problems(error.problems)]
-            show.print_json({"problems": problems})
+            show.print_json({**format_entry("problems"), "problems": problems})
         raise
 
 

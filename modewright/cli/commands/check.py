@@ -14,6 +14,7 @@ from modewright.cli.common.console import console, report_written_files
 from modewright.cli.common.exit_codes import MAX_SHOWN, PROBLEMS
 from modewright.cli.common.options import Json
 from modewright.render.text import pluralise
+from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import require_writable, write_files
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ def _report_problems(
 
     if as_json:
         entries = [problem_json(problem) for problem in problems]
-        print(json.dumps({"problems": entries}, indent=2, allow_nan=False))
+        report = {**format_entry("problems"), "problems": entries}
+        print(json.dumps(report, indent=2, allow_nan=False))
         return
     if as_annotations:
         print(annotation_lines(problems), end="")

@@ -32,7 +32,9 @@ def compare(
         list[str] | None,
         typer.Option(help="tolerance of signals in their unit: '*.T_hs=0.5' (repeatable)"),
     ] = None,
-    slack: Annotated[float, typer.Option(min=0.0, help="time for which modes may differ [s]")] = 0.0,
+    slack: Annotated[
+        float, typer.Option(min=0.0, help="time for which modes may differ [s]")
+    ] = 0.0,
     signals: Signals = None,
     start: From = None,
     end: To = None,

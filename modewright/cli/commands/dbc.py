@@ -16,7 +16,9 @@ def dbc(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write .dbc")],
     first: Annotated[str, typer.Option(help="identifier of the first CAN message")] = "0x100",
-    is_fd: Annotated[bool, typer.Option("--fd", help="use CAN FD frames of up to 64 bytes")] = False,
+    is_fd: Annotated[
+        bool, typer.Option("--fd", help="use CAN FD frames of up to 64 bytes")
+    ] = False,
     sets: Sets = None,
     calibrations: Calibrations = None,
 ) -> None:

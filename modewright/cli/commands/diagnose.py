@@ -21,9 +21,7 @@ DURATION_PATTERN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
 """The form of a duration."""
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
-Train = Annotated[
-    list[Path], typer.Option("--train", help="recording for the diagnosis (repeatable)")
-]
+Train = Annotated[list[Path], typer.Option("--train", help="training recording (repeatable)")]
 Map = Annotated[
     str | None, typer.Option("--map", "-m", help="map of columns; by default that of the spec")
 ]
@@ -38,13 +36,11 @@ def folder_of(text: str) -> Path:
 
 Out = Annotated[
     Path,
-    typer.Option(
-        "--out", "-o", help="folder for the results", parser=folder_of, metavar="<path>"
-    ),
+    typer.Option("--out", "-o", help="folder for the results", parser=folder_of, metavar="<path>"),
 ]
 HeldOut = Annotated[
     list[Path] | None,
-    typer.Option("--held-out", help="recording for validation after the verdict (repeatable)"),
+    typer.Option("--held-out", help="validation recording, used after the verdict (repeatable)"),
 ]
 Effects = Annotated[
     Path | None, typer.Option("--effects", help="folder of effects instead of the library")
@@ -56,9 +52,7 @@ Thresholds = Annotated[
         help="acceptance thresholds: kept (of an earlier bootstrap), bootstrap, usual, or a file",
     ),
 ]
-Budget = Annotated[
-    str, typer.Option("--budget", help="time limit: '90 s', '10min'")
-]
+Budget = Annotated[str, typer.Option("--budget", help="time limit: '90 s', '10min'")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="also use recordings with errors")]
 FailOn = Annotated[
     str | None, typer.Option("--fail-on", help="exit with code 1 for this verdict, e.g. effect")

@@ -7,6 +7,7 @@ import typer
 from modewright.cli.common.console import console
 from modewright.cli.common.exit_codes import PROBLEMS, TOOL
 from modewright.cli.common.options import Json
+from modewright.runtime.json_format import format_entry
 
 
 def doctor(as_json: Json = False) -> None:
@@ -27,7 +28,8 @@ def doctor(as_json: Json = False) -> None:
         if not as_json:
             show.print_health_check(console(), finding)
     if as_json:
-        show.print_json({"findings": [vars(finding) for finding in found]})
+        findings = [vars(finding) for finding in found]
+        show.print_json({**format_entry("doctor"), "findings": findings})
     faults = [finding for finding in found if finding.verdict == "fault"]
     if faults:
         others = ("modewright", "cache", "self-test", "python")

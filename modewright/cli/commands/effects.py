@@ -8,6 +8,7 @@ import typer
 
 from modewright.cli.common.console import console, report_written_files
 from modewright.cli.common.options import Json, Plot, picture_format, usage_errors
+from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import require_writable, write_files
 
 
@@ -45,7 +46,8 @@ def effects(
         with usage_errors():
             write_files({plot: library.draw_signature(name, at, step=step).data(form)})
     if as_json:
-        show.print_json({"effects": [show_effects.effect_json(one) for one in listed]})
+        entries = [show_effects.effect_json(one) for one in listed]
+        show.print_json({**format_entry("effects"), "effects": entries})
     elif name:
         show_effects.print_effect(console(), listed[0], at)
     else:

@@ -1,4 +1,4 @@
-"""Command explain: a spec after each pass, with the place that every value came from."""
+"""Command explain: print a spec after each pass, with the origin of each value."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import typer
 from modewright.cli.common.options import Json, Sets, values_of
 
 PASSES = ("document", "model", "lowered", "parameters", "inputs", "program", "numbers")
+"""The passes after which a spec can be printed."""
 
 
 def explain(
     spec: Annotated[str, typer.Argument(help="a spec: name or file")],
     other: Annotated[
-        str | None, typer.Argument(help="a second one: what differs between the two")
+        str | None, typer.Argument(help="a second spec: print the differences")
     ] = None,
     stage: Annotated[
         str,
@@ -28,7 +29,10 @@ def explain(
     sets: Sets = None,
     as_json: Json = False,
 ) -> None:
-    """Print a spec with all variants and effects laid, and where each value came from.
+    """Print a spec with variants and effects applied, and the origin of each value.
+
+    With two specs, print their differences. Other passes print the checked model, the Program or
+    the solved numbers.
 
     \b
     modewright explain driveline_load

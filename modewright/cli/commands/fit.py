@@ -1,4 +1,4 @@
-"""Command fit: parameters of a spec from recordings."""
+"""Command fit: fit parameters of a spec to recordings."""
 
 from __future__ import annotations
 
@@ -14,54 +14,62 @@ from modewright.cli.common.exit_codes import PROBLEMS
 from modewright.cli.common.options import Json, calibration_title, usage_errors
 from modewright.runtime.output_files import write_files
 
-Anyway = Annotated[bool, typer.Option("--anyway", help="fit to recordings with errors too")]
+Anyway = Annotated[bool, typer.Option("--anyway", help="also use recordings with errors")]
 
 
 def fit(
     spec: Annotated[str, typer.Argument(help="an automaton: name or file")],
     train: Train,
     parameters: Annotated[
-        str | None, typer.Option("--parameters", help="those that may move: 'k_hs,c_hs'")
+        str | None,
+        typer.Option(
+            "--parameters", help="parameters to fit: 'k_hs,c_hs'; by default all with a range"
+        ),
     ] = None,
     mapping: Map = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="write a calibration: .yaml")
     ] = None,
     name: Annotated[
-        str | None, typer.Option("--name", help="of the calibration; that of its file if absent")
+        str | None,
+        typer.Option("--name", help="name of the calibration; by default that of its file"),
     ] = None,
-    date: Annotated[str, typer.Option("--date", help="of the recordings: '2026-11-21'")] = "",
+    date: Annotated[str, typer.Option("--date", help="date of the recordings: '2026-11-21'")] = "",
     anyway: Anyway = False,
     as_json: Json = False,
 ) -> None:
-    """Fit parameters within their ranges to recordings; tell what these cannot determine.
+    """Fit parameters within their ranges to recordings; report those that are not identifiable.
 
     \b
     modewright fit blind_driveline --train runs/*.csv --parameters k,c --out rig_7.yaml
     modewright fit emps --train run.csv --map my_columns --json
     """
-    from modewright.api.diagnosis import UnusableRecordings, fit as fitted
+    from modewright.api.diagnosis import UnusableRecordings, fit as fit_parameters
     from modewright.render import diagnosis as show_diagnosis, run as show
 
     title = calibration_title(out, name, date)
     chosen = names_of(parameters) if parameters is not None else None
     try:
         with usage_errors():
-            found = fitted(spec, train, chosen, mapping, anyway=anyway, tell=report_progress)
+            result = fit_parameters(
+                spec, train, chosen, mapping, anyway=anyway, tell=report_progress
+            )
     except UnusableRecordings as error:
-        print(f"error: {error} (`--anyway` fits all the same)", file=sys.stderr)
+        print(f"error: {error} (`--anyway` uses them nevertheless)", file=sys.stderr)
         raise typer.Exit(PROBLEMS) from None
     if out:
-        write_files({out: found.calibration(title, date).encode()})
+        write_files({out: result.calibration(title, date).encode()})
     if as_json:
-        show.print_json(show_diagnosis.fit_json(found))
+        show.print_json(show_diagnosis.fit_json(result))
     else:
-        show_diagnosis.print_fit(console(), found)
+        show_diagnosis.print_fit(console(), result)
         report_written_files([out] if out else [])
 
 
 def names_of(text: str) -> list[str]:
-    """Return the names of --parameters."""
+    """Return the comma-separated names of --parameters. Raises BadParameter for empty and double
+    names.
+    """
     names = [part.strip() for part in text.split(",")]
     if not all(names):
         raise typer.BadParameter(f"`{text}` has an empty name", param_hint="--parameters")

@@ -1,4 +1,4 @@
-"""Command fmu: an automaton for simulation tools of others, by the Functional Mock-up Interface."""
+"""Command fmu: export an automaton as a functional mock-up unit (FMI)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from codegen.exchange.fmi.variable import Version
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
-FmiVersion = Annotated[int, typer.Option("--version", min=2, max=3, help="of FMI: 2 or 3")]
+FmiVersion = Annotated[int, typer.Option("--version", min=2, max=3, help="version of FMI: 2 or 3")]
 Out = Annotated[
-    Path | None, typer.Option("--out", "-o", help="file to write; default is its name with .fmu")
+    Path | None, typer.Option("--out", "-o", help="file to write; by default the name with .fmu")
 ]
-SourceOnly = Annotated[bool, typer.Option("--source-only", help="no binary for this machine")]
+SourceOnly = Annotated[bool, typer.Option("--source-only", help="sources only, no binary")]
 
 
 def fmu(
@@ -30,7 +30,7 @@ def fmu(
     sets: Sets = None,
     calibrations: Calibrations = None,
 ) -> None:
-    """Pack an automaton, sampled or continuous, as an FMU for co-simulation, with sources.
+    """Export an automaton as an FMU for co-simulation, with C sources and a binary.
 
     \b
     modewright fmu estimator --out estimator.fmu

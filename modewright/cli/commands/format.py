@@ -1,4 +1,4 @@
-"""Command format: specs laid out by rules."""
+"""Command format: format the layout of specs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from modewright.runtime.output_files import require_writable_location, write_fil
 def format(
     files: Annotated[list[Path], typer.Argument(help="specs, or folders of specs")],
     check: Annotated[
-        bool, typer.Option("--check", help="write nothing; exit code 1 if a file would change")
+        bool, typer.Option("--check", help="write nothing; exit with code 1 if a file would change")
     ] = False,
 ) -> None:
-    """Lay specs out: indentation, blanks, alignment; comments, quotes and meaning stay.
+    """Format specs: indentation, blanks, alignment. Comments, quotes and meaning do not change.
 
     \b
     modewright format spec
@@ -31,7 +31,7 @@ def format(
     paths = [path for file in files for path in _find_specs(file)]
     made: dict[Path, bytes] = {}
     for path in paths:
-        read_text(path)  # refuses what is no text
+        read_text(path)  # raises SpecError for binary files
         before = path.read_bytes()
         data = format_text(before.decode(), str(path)).encode()
         if data != before:
@@ -50,7 +50,7 @@ def format(
 
 
 def _write_note(path: Path) -> str:
-    """Return what else comes of writing a file: it is a new one, other hard links keep the old."""
+    """Return a note if writing breaks hard links to a file; else an empty text."""
     others = path.stat().st_nlink - 1
     return (
         f" (no longer one file with its {pluralise(others, 'other hard link')})" if others else ""
@@ -58,4 +58,5 @@ def _write_note(path: Path) -> str:
 
 
 def _find_specs(path: Path) -> list[Path]:
+    """Return the YAML files below a folder in order, or the file itself."""
     return sorted(path.rglob("*.yaml")) if path.is_dir() else [path]

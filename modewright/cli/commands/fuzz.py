@@ -1,4 +1,4 @@
-"""Command fuzz: sequences that libFuzzer finds, on generated C and on the engine."""
+"""Command fuzz: compare generated C and engine on sequences that libFuzzer finds."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from modewright.cli.common.options import Calibrations, Json, Numbers, Sets, val
 
 def fuzz(
     automaton: Annotated[str, typer.Argument(help="a sampled automaton: its name or file")],
-    runs: Annotated[int, typer.Option(min=1, help="how many sequences are tried")] = 20_000,
-    ticks: Annotated[int, typer.Option(min=1, max=64, help="the most of a sequence")] = 24,
-    seed: Annotated[int, typer.Option(min=1, help="of the fuzzer")] = 1,
+    runs: Annotated[int, typer.Option(min=1, help="number of sequences")] = 20_000,
+    ticks: Annotated[
+        int, typer.Option(min=1, max=64, help="largest number of ticks of a sequence")
+    ] = 24,
+    seed: Annotated[int, typer.Option(min=1, help="seed of the fuzzer")] = 1,
     numbers: Numbers = None,
     sets: Sets = None,
     calibrations: Calibrations = None,
     as_json: Json = False,
 ) -> None:
-    """Let libFuzzer look for every way through the C of an automaton, and compare with the engine.
+    """Search paths through the C of an automaton with libFuzzer and compare with the engine.
 
-    The C runs under sanitizers; each sequence of inputs is done again by the engine, and every bit
-    that both carry has to be the same.
+    The C runs under sanitizers. The engine repeats each sequence of inputs; all bits of outputs and
+    retained variables must be equal.
 
     \b
     modewright fuzz estimator

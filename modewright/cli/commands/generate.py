@@ -1,4 +1,4 @@
-"""Command generate: C sources of sampled automata."""
+"""Command generate: write the C of automata."""
 
 from __future__ import annotations
 
@@ -15,21 +15,26 @@ from modewright.runtime.output_files import make_folder, write_files
 
 
 def generate(
-    automaton: Annotated[str | None, typer.Argument(help="a sampled automaton")] = None,
+    automaton: Annotated[str | None, typer.Argument(help="an automaton: name or file")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="folder to write to")] = Path(
         "generated"
     ),
     sets: Sets = None,
     calibrations: Calibrations = None,
-    every: Annotated[bool, typer.Option("--all", help="all of spec/ into generated/")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="all automata below spec/ into generated/")
+    ] = False,
     only_check: Annotated[
-        bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
+        bool,
+        typer.Option(
+            "--check", help="with --all: write nothing; exit with code 1 if a file is stale"
+        ),
     ] = False,
     with_cmake: Annotated[
-        bool, typer.Option("--cmake", help="a CMakeLists.txt beside it, with the flags it needs")
+        bool, typer.Option("--cmake", help="also write CMakeLists.txt with the required flags")
     ] = False,
 ) -> None:
-    """Print an automaton, sampled or continuous, as C99.
+    """Generate C99 code of an automaton, sampled or continuous.
 
     \b
     modewright generate estimator --out build
@@ -60,6 +65,7 @@ def generate(
 
 
 def _exit_if_stale() -> None:
+    """Print the stale files below `generated/` and exit with code 1 if there are any."""
     from modewright.api.stale_generated import stale_files
 
     lines = stale_files(Path())

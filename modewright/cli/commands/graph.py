@@ -1,4 +1,4 @@
-"""Command graph: the modes and transitions of an automaton as a diagram."""
+"""Command graph: draw modes and transitions of an automaton."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ if TYPE_CHECKING:
     from modewright.diagram.diagram import Diagram
 
 FORMATS = (".svg", ".mmd", ".md")
+"""Suffixes of diagram files."""
 
 
 def graph(
     automaton: Annotated[str, typer.Argument(help="an automaton: name or file")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="write .svg, .mmd or .md; else Mermaid is printed"),
+        typer.Option("--out", "-o", help="write .svg, .mmd or .md; by default print Mermaid"),
     ] = None,
     tests: Annotated[
-        bool, typer.Option("--tests", help="an .svg, coloured by what tests of the project reach")
+        bool, typer.Option("--tests", help="colour an .svg by the coverage of the project's tests")
     ] = False,
 ) -> None:
-    """Draw modes, guards, waits, priorities and resets.
+    """Draw the modes of an automaton with guards, waits, priorities and resets.
 
     \b
     modewright graph estimator
@@ -49,6 +50,7 @@ def graph(
 
 
 def _load_diagram(automaton: str, tests: bool) -> Diagram:
+    """Return the diagram of an automaton, shaded by test coverage if requested."""
     if tests:
         from modewright.api.test_coverage import project_coverage_diagram
 

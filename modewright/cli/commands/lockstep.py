@@ -1,4 +1,4 @@
-"""Command lockstep: engine and compiled C compared bit by bit."""
+"""Command lockstep: compare engine and compiled C bit by bit."""
 
 from __future__ import annotations
 
@@ -17,14 +17,19 @@ from modewright.cli.common.options import (
     exit_if_failed,
     values_of,
 )
+from modewright.runtime.json_format import format_entry
 
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--change", help="a tunable from a time on: '1.5 s: k_hs = 6000 N*m/rad'"),
+    typer.Option(
+        "--change", help="change a tunable parameter at a time: '1.5 s: k_hs = 6000 N*m/rad'"
+    ),
 ]
-Compiler = Annotated[str | None, typer.Option(help="a C compiler, like gcc or clang; default CC")]
+Compiler = Annotated[
+    str | None, typer.Option(help="C compiler such as gcc or clang; by default $CC")
+]
 Optimise = Annotated[
-    Literal["O0", "O1", "O2", "O3", "Os"], typer.Option(help="level of the C compiler")
+    Literal["O0", "O1", "O2", "O3", "Os"], typer.Option(help="optimisation level of the C compiler")
 ]
 
 Target = Annotated[
@@ -45,7 +50,9 @@ def lockstep(
     target: Target = "host",
     as_json: Json = False,
 ) -> None:
-    """Compare engine and compiled C, tick by tick and bit by bit.
+    """Compare engine and compiled C at each tick, bit by bit.
+
+    Exit code 1 if a bit differs, nothing was compared, or the run stopped.
 
     \b
     modewright lockstep ev_driveline -s tip_out --numbers float32 --optimise O3
@@ -68,7 +75,7 @@ def lockstep(
         )
     if as_json:
         found = {"lockstep": [show.verdict_json(verdict) for verdict in verdicts]}
-        show.print_json({**show.trajectory_json(trajectory), **found})
+        show.print_json({**show.trajectory_json(trajectory), **format_entry("lockstep"), **found})
     else:
         show.print_verdicts(console(), verdicts)
     is_compared = any(verdict.ticks for verdict in verdicts)

@@ -1,4 +1,4 @@
-"""Command lsp: the language server, started by an editor."""
+"""Command lsp: run the language server."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from language.text.diagnostic import MissingToolError
 
 
 def lsp() -> None:
-    """Answer an editor's questions about specs on stdin and stdout (docs/editing.md).
+    """Run the language server for specs on stdin and stdout (docs/editing.md).
+
+    An editor starts this command.
 
     \b
     modewright lsp
@@ -18,5 +20,5 @@ def lsp() -> None:
     except ModuleNotFoundError as error:
         hint = "pip install 'modewright[lsp]'"
         raise MissingToolError(f"the language server needs {error.name}: {hint}") from None
-    with os.fdopen(os.dup(0), "rb") as asked, os.fdopen(os.dup(1), "wb") as answered:
-        create_server().start_io(asked, answered)
+    with os.fdopen(os.dup(0), "rb") as requests, os.fdopen(os.dup(1), "wb") as responses:
+        create_server().start_io(requests, responses)

@@ -1,4 +1,4 @@
-"""Command mcdc: which conditions of generated C the tests of a project show to matter."""
+"""Command mcdc: measure MC/DC of generated C in the tests of a project."""
 
 from __future__ import annotations
 
@@ -12,19 +12,16 @@ from modewright.cli.common.options import Calibrations, Json, Numbers, Sets, val
 
 def mcdc(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
-    runs: Annotated[
-        int, typer.Option(min=0, help="runs in which libFuzzer looks for other ways")
-    ] = 0,
+    runs: Annotated[int, typer.Option(min=0, help="runs of libFuzzer for further paths")] = 0,
     proofs: Annotated[
-        bool, typer.Option(help="look for proofs that no input can show what was not shown")
+        bool, typer.Option(help="prove which uncovered conditions are infeasible")
     ] = True,
     numbers: Numbers = None,
     sets: Sets = None,
     calibrations: Calibrations = None,
     as_json: Json = False,
 ) -> None:
-    """Measure MC/DC of the C of an automaton on the tests of the project and at their borders,
-    by clang.
+    """Measure MC/DC of the C of an automaton in the project's tests and at boundary values (clang).
 
     \b
     modewright mcdc supervisor

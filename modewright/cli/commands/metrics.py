@@ -1,4 +1,4 @@
-"""Command metrics: what generated C takes of an ECU."""
+"""Command metrics: measure memory and instructions of generated C on a microcontroller."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ if TYPE_CHECKING:
     from codegen.harness.instruction_count import InstructionCounts
 
 FORMATS = (".html", ".json")
+"""Suffixes of files of metrics."""
 
 
 def metrics(
     automata: Annotated[list[str], typer.Argument(help="automata: names or files")],
     system: Annotated[
-        str | None, typer.Option(help="a system with instances of them: counts instructions")
+        str | None,
+        typer.Option(help="a system with instances of the automata, to count instructions"),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option("--scenario", "-s", help="what the system goes through")
+        str | None, typer.Option("--scenario", "-s", help="a scenario of the system: name or file")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="write .html or .json")] = None,
     numbers: Numbers = None,
@@ -34,7 +36,8 @@ def metrics(
 ) -> None:
     """Measure the C of automata on a Cortex-M4F: ROM, RAM, stack, instructions of a step.
 
-    Instructions are counted in a scenario; the most that a step can take is always told.
+    With a system and a scenario the instructions are counted. The largest number of instructions of
+    a step is always computed.
 
     \b
     modewright metrics estimator_float32 supervisor --out metrics.html
@@ -70,7 +73,10 @@ def metrics(
 def _count_instructions(
     automaton: str, system: str | None, scenario: str | None, given: Any
 ) -> InstructionCounts | None:
-    """Return the instructions of steps where a system is named that has the automaton."""
+    """Return the instruction counts in a scenario; None without system and scenario.
+
+    Raises BadParameter if the system has no instance of the automaton.
+    """
     from modewright.api import code_generation as code
 
     if not (system and scenario):

@@ -1,4 +1,4 @@
-"""Command new: a project that works at once."""
+"""Command new: create a project."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from modewright.cli.common.options import usage_errors
 def new(
     name: Annotated[str, typer.Argument(help="name of the project and of its system")],
     folder: Annotated[
-        Path | None, typer.Option("--out", "-o", help="folder to make [default: the name]")
+        Path | None, typer.Option("--out", "-o", help="folder to create [default: the name]")
     ] = None,
 ) -> None:
-    """Make a project: a plant, a controller, a scenario and a test.
+    """Create a project with a plant, a controller, a scenario and a test.
 
     \b
     modewright new warm_room

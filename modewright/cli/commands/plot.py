@@ -1,4 +1,4 @@
-"""Command plot: a picture of one run or two."""
+"""Command plot: draw one or two runs."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ RunArgument = typer.Argument(help="a run: .csv, .parquet, or system:scenario to 
 def plot(
     a: Annotated[str, RunArgument],
     b: Annotated[str | None, RunArgument] = None,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="the picture: .png, .svg or .pdf")
-    ] = Path("plot.png"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="the figure: .png, .svg or .pdf")] = Path(
+        "plot.png"
+    ),
     signals: Signals = None,
     start: From = None,
     end: To = None,
 ) -> None:
-    """Draw one run, or two over each other.
+    """Draw one run, or two runs in the same axes.
 
     \b
     modewright plot run.csv --out run.png

@@ -1,4 +1,4 @@
-"""Command prove: generated C under the tools that an ECU's code has to pass."""
+"""Command prove: check generated C with external tools."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import typer
 from modewright.cli.common.console import console, progress_spinner
 from modewright.cli.common.exit_codes import PROBLEMS
 from modewright.cli.common.options import Calibrations, Json, Sets, values_of
+from modewright.runtime.json_format import format_entry
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
 Only = Annotated[
     str | None,
-    typer.Option(help="some of warnings,misra,stack,sanitizers,values,contract; all by default"),
+    typer.Option(help="a list of warnings,misra,stack,sanitizers,values,contract; by default all"),
 ]
 
 
@@ -24,7 +25,9 @@ def prove(
     calibrations: Calibrations = None,
     as_json: Json = False,
 ) -> None:
-    """Check the C of an automaton by compilers, cppcheck (MISRA C:2012) and Frama-C.
+    """Check the C of an automaton with compilers, cppcheck (MISRA C:2012) and Frama-C.
+
+    Exit code 1 if a check fails.
 
     \b
     modewright prove estimator_simple
@@ -40,15 +43,18 @@ def prove(
         known = ", ".join(CHECKS)
         raise typer.BadParameter(f"{unknown[0]}: not one of {known}", param_hint="--only")
     with progress_spinner(f"checking the C of {automaton}"):
-        made = code.prove(
-            automaton, values_of(sets), calibrations=calibrations or (), checks=checks
+        verdicts = list(
+            code.prove(automaton, values_of(sets), calibrations=calibrations or (), checks=checks)
         )
-        found = list(made)
     if as_json:
         show.print_json(
-            {"automaton": automaton, "proofs": [show_code.proof_json(p) for p in found]}
+            {
+                **format_entry("proofs"),
+                "automaton": automaton,
+                "proofs": [show_code.proof_json(verdict) for verdict in verdicts],
+            }
         )
     else:
-        show_code.print_proofs(console(), found)
-    if not all(proof.holds for proof in found):
+        show_code.print_proofs(console(), verdicts)
+    if not all(verdict.holds for verdict in verdicts):
         raise typer.Exit(PROBLEMS)

@@ -1,4 +1,4 @@
-"""Command recording: what recorded data are worth, before anything is concluded from them."""
+"""Command recording: check the quality of recordings."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from modewright.render.text import pluralise
 from modewright.runtime.output_files import require_writable, write_files
 
 recording = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Look at recordings.", epilog=EXIT_CODES
+    no_args_is_help=True, rich_markup_mode=None, help="Check recordings.", epilog=EXIT_CODES
 )
 
 
 @recording.callback()
 def _recording() -> None:
-    """Look at recordings."""
+    """Check recordings."""
 
 
 @recording.command(epilog=EXIT_CODES)
@@ -29,23 +29,23 @@ def check(
         list[Path], typer.Argument(help="CSV(.gz), Parquet, MF4, or CAN logs: BLF, ASC, candump")
     ],
     mapping: Annotated[
-        str | None, typer.Option("--map", "-m", help="a map of columns: name or file")
+        str | None, typer.Option("--map", "-m", help="map of columns: name or file")
     ] = None,
     spec: Annotated[
         str | None, typer.Option("--spec", "-s", help="an automaton, to check units and clocks")
     ] = None,
     databases: Annotated[
-        list[str] | None, typer.Option("--dbc", help="what CAN frames mean, without a map")
+        list[str] | None, typer.Option("--dbc", help="CAN database for logs, if there is no map")
     ] = None,
     plot: Plot = None,
     as_json: Json = False,
 ) -> None:
-    """Tell rates, gaps, noise and odd values, and which effects these recordings can test.
+    """Report rates, gaps, noise and outliers, and which effects recordings can test.
+
+    Exit code 1 if an error makes the recordings unusable for a diagnosis.
 
     \b
     modewright recording check drive.csv --spec leaf_motor_side --plot drive.png
-
-    Exit code 1 if something makes a verdict about physics worthless.
     """
     from modewright.api.recordings import check_recordings
     from modewright.render import recording as show_recording, run as show

@@ -1,4 +1,4 @@
-"""Command replay: an estimator on a recording."""
+"""Command replay: run an estimator on a recording."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from modewright.runtime.output_files import require_writable, write_files
 def replay(
     estimator: Annotated[str, typer.Argument(help="a sampled automaton: name or file")],
     recording: Annotated[Path, typer.Argument(help="a CSV file, may be gzipped")],
-    mapping: Annotated[str, typer.Option("--map", "-m", help="a map of columns: name or file")],
+    mapping: Annotated[str, typer.Option("--map", "-m", help="map of columns: name or file")],
     variant: Annotated[
-        str | None, typer.Option("--variant", help="a variant laid over the estimator")
+        str | None, typer.Option("--variant", help="a variant of the estimator: name or file")
     ] = None,
     sets: Sets = None,
     calibrations: Calibrations = None,

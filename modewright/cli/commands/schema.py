@@ -1,4 +1,4 @@
-"""Command schema: the JSON Schema of specs, for editors."""
+"""Command schema: print the JSON Schema of specs."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from modewright.runtime.output_files import require_writable, write_files
 
 
 def schema(
-    kind: Annotated[str | None, typer.Argument(help="of one kind of file: automaton ...")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="write it to a file")] = None,
+    kind: Annotated[str | None, typer.Argument(help="one kind of file, e.g. automaton")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="write to a file")] = None,
 ) -> None:
-    """Print the JSON Schema of specs (draft-07), from which editors complete and explain keys.
+    """Print the JSON Schema (draft-07) of specs, with which editors complete and explain keys.
 
     \b
     modewright schema --out modewright.schema.json

@@ -1,4 +1,4 @@
-"""Command sensitivity: which of the things that a study draws move its measures."""
+"""Command sensitivity: print the sensitivity indices of a study."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def sensitivity(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Tell which of the things that a study draws move its measures, with intervals.
+    """Print the influence of each random variable of a study on its measures, with intervals.
 
-    Its points are a design: `sampling: {saltelli: 256, seed: 1}` for Sobol indices (shares of
-    the variance), or, with fewer runs, `sampling: {morris: 50, seed: 1}` for elementary effects.
+    The study needs a design: `sampling: {saltelli: 256, seed: 1}` for Sobol indices (fractions of
+    the variance), or with fewer runs `sampling: {morris: 50, seed: 1}` for elementary effects.
 
     \b
     modewright sweep my_study.yaml --out results

@@ -1,4 +1,4 @@
-"""Command simulate: a system through a scenario."""
+"""Command simulate: simulate a system in a scenario."""
 
 from __future__ import annotations
 
@@ -36,18 +36,20 @@ def simulate(
     out: Out = None,
     plot: Plot = None,
     reference: Annotated[
-        bool, typer.Option("--reference", help="integrate with scipy, observe with filterpy")
+        bool, typer.Option("--reference", help="independent reference: scipy and filterpy")
     ] = False,
     method: Annotated[
-        str, typer.Option("--method", help="RK4, or scipy's DOP853, Radau or LSODA")
+        str, typer.Option("--method", help="RK4, or DOP853, Radau, LSODA of scipy")
     ] = "RK4",
     compiled: Annotated[
         bool | None,
-        typer.Option("--compiled/--interpreted", help="by C or by the interpreter: the same bits"),
+        typer.Option(
+            "--compiled/--interpreted", help="use C or the interpreter; results are equal"
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a system, or an automaton alone, through a scenario.
+    """Simulate a system, or an automaton alone, in a scenario.
 
     \b
     modewright simulate ev_driveline -s tip_out --plot tip_out.png
@@ -76,6 +78,7 @@ def simulate(
 
 
 def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:
+    """Print a run as JSON or as a table of events; exit with code 1 if it stopped."""
     from modewright.render import run as show
 
     if as_json:
@@ -88,6 +91,7 @@ def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> Non
 
 
 def _draw_plot(trajectory: Trajectory, title: str, plot: Path) -> bytes:
+    """Return the figure of a run in the format of the path."""
     from engine.results.plot import draw_overview
 
     return draw_overview([trajectory], title=title).data(picture_format(plot))

@@ -1,4 +1,4 @@
-"""Command sweep: many variants of a system, run into a folder."""
+"""Command sweep: run the variants of a study into a folder."""
 
 from __future__ import annotations
 
@@ -25,62 +25,65 @@ if TYPE_CHECKING:
     from sweep.execution.study_run import StudyRun
 
 PLOTS = "plots"
+"""The folder of figures in the folder of results."""
 FORMATS = ("svg", "png", "pdf")
+"""Formats of figures."""
 RUN_OPTIONS = {
     "out": "--out", "workers": "--workers", "cluster": "--cluster", "tls_ca": "--tls-ca",
     "tls_cert": "--tls-cert", "tls_key": "--tls-key", "sets": "--set", "samples": "--samples",
     "seed": "--seed", "block": "--block",
 }  # fmt: skip
-"""Options that have no influence on a summary, by parameter."""
+"""Options that have no effect with --summary, by parameter."""
 OPEN_WARNING = (
-    "warning: {} is not encrypted, and workers run whatever reaches their scheduler (pickles): "
-    "use tls:// wherever others share the network"
+    "warning: {} is not encrypted, and workers execute all data that reaches their scheduler "
+    "(pickles): use tls:// in shared networks"
 )
+"""Warning for an unencrypted cluster."""
 TlsFile = Annotated[
-    Path | None, typer.Option(help="PEM, for tls://; without it what Dask's configuration says")
+    Path | None, typer.Option(help="PEM file for tls://; by default from Dask's configuration")
 ]
 
 
 def sweep(
     context: typer.Context,
-    study: Annotated[str | None, typer.Argument(help="a study: its name or its file")] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="the folder of the results")
-    ] = None,
+    study: Annotated[str | None, typer.Argument(help="a study: name or file")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for the results")] = None,
     workers: Annotated[
         int, typer.Option("--workers", "-j", min=0, help="processes; 0: one for each core")
     ] = 0,
     cluster: Annotated[
-        str | None, typer.Option(help="Dask's workers: local:4, tcp://host:8786, tls://host:8786")
+        str | None, typer.Option(help="Dask cluster: local:4, tcp://host:8786, tls://host:8786")
     ] = None,
     tls_ca: TlsFile = None,
     tls_cert: TlsFile = None,
     tls_key: TlsFile = None,
     sets: Sets = None,
     summary: Annotated[
-        Path | None, typer.Option("--summary", help="sum up a folder, run nothing")
+        Path | None, typer.Option("--summary", help="summarise a folder of results, run nothing")
     ] = None,
     samples: Annotated[
-        int | None, typer.Option(min=1, help="drawn points, in place of the study's number")
+        int | None, typer.Option(min=1, help="number of samples instead of the study's")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="of drawn points, in place of the study's")
+        int | None, typer.Option(min=0, help="seed of samples instead of the study's")
     ] = None,
     block: Annotated[
-        int | None, typer.Option(min=1, max=1_000_000, help="variants that are kept at once")
+        int | None, typer.Option(min=1, max=1_000_000, help="variants that are stored together")
     ] = None,
     table: Annotated[
         Path | None, typer.Option("--csv", help="write the summary as CSV, numbers in SI")
     ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", help="write one HTML page of all that came out")
+        Path | None, typer.Option("--report", help="write an HTML report of the results")
     ] = None,
-    form: Annotated[str, typer.Option("--format", help="of the pictures: svg, png or pdf")] = "svg",
+    form: Annotated[
+        str, typer.Option("--format", help="format of figures: svg, png or pdf")
+    ] = "svg",
     as_json: Json = False,
 ) -> None:
-    """Run a study into a folder of Parquet files; the same command goes on where it ended.
+    """Run a study into a folder of Parquet files; the same command continues an interrupted run.
 
-    Pictures that the study asks for are in the folder `plots` there.
+    The plots of the study are written into the folder `plots` there.
 
     \b
     modewright sweep tip_out_stiffness_and_gap --out build/tip_out
@@ -105,7 +108,7 @@ def sweep(
 
 
 def _require_nothing_to_run(context: typer.Context) -> None:
-    """Refuse options that have no influence where nothing is run."""
+    """Raise BadParameter if options of a run are used with --summary."""
     given = {name: context.get_parameter_source(name) for name in RUN_OPTIONS}
     used = [
         RUN_OPTIONS[name] for name, source in given.items() if source and source.name != "DEFAULT"
@@ -116,7 +119,7 @@ def _require_nothing_to_run(context: typer.Context) -> None:
 
 
 def _require_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
-    """Return the folder that is written or summed up."""
+    """Return the folder of --out or --summary. Raises BadParameter for contradictory options."""
     if (study is None) == (summary is None):
         raise typer.BadParameter("name a study, or a folder with --summary", param_hint="STUDY")
     if study is not None and out is None:
@@ -131,7 +134,10 @@ def _require_folder(study: str | None, out: Path | None, summary: Path | None, f
 def _cluster_options(
     cluster: str | None, workers: int, files: tuple[Path | None, ...]
 ) -> dict[str, Any]:
-    """Return where the study is computed; warn of a connection that others can read."""
+    """Return address and credentials of a cluster; warn of an unencrypted connection.
+
+    Raises BadParameter for contradictory options, and OutputError for a missing TLS file.
+    """
     from sweep.execution.dask_address import Credentials, parse_address
 
     if cluster is None:
@@ -160,7 +166,7 @@ def _run_study(
     options: Mapping[str, Any],
     as_json: bool,
 ) -> int:
-    """Run the study; return how many blocks could not be computed."""
+    """Run the study and return the number of lost blocks."""
     from modewright.api import studies
 
     done = [0, 0]
@@ -189,16 +195,18 @@ def _run_study(
 
 
 def _report_kept(out: Path, now: int, total: int) -> None:
+    """Print how many variants are stored after an interruption."""
     if total:
         print_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
 
 
 def _print_warning(text: str) -> None:
-    """Print a warning; a problem says itself that it is one."""
+    """Print a warning to stderr; the text of a problem already contains its severity."""
     print_error(text if ": warning: " in text.split("\n")[0] else f"warning: {text}")
 
 
 def _report_run(found: StudyRun) -> None:
+    """Print the numbers of computed and reused variants."""
     before = f", {found.reused} were there" if found.reused else ""
     console().print(f"{pluralise(found.computed, 'variant')} computed{before}", highlight=False)
 
@@ -213,7 +221,7 @@ def print_error(text: str) -> None:
 def _report_results(
     folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool
 ) -> None:
-    """Tell the summary; then write what is drawn, and what is asked for."""
+    """Print the summary of a study and write plots, table and report."""
     from modewright.api import studies
     from modewright.render import study as show_study
     from modewright.render.run import print_json
@@ -234,7 +242,7 @@ def _report_results(
 
 
 def _write_pictures(folder: Path, form: str) -> list[Path]:
-    """Write the pictures of a study; where that cannot be, the summary was told all the same."""
+    """Write the plots of a study and return the paths; warn if they cannot be written."""
     from modewright.api import studies
 
     drawn = studies.study_pictures(folder)

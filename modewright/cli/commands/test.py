@@ -1,4 +1,4 @@
-"""Command test: tests of specs on the engine and in C."""
+"""Command test: run the tests of specs on the engine and in C."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 from modewright.cli.common.console import console, progress_spinner, report_written_files
 from modewright.cli.common.exit_codes import PROBLEMS
 from modewright.cli.common.options import Json
+from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import make_folder, require_writable, write_files
 
 if TYPE_CHECKING:
@@ -20,31 +21,34 @@ if TYPE_CHECKING:
 
 def test(
     tests: Annotated[
-        list[str] | None, typer.Argument(help="tests: names or files; all of the project")
+        list[str] | None,
+        typer.Argument(help="tests: names or files; by default all of the project"),
     ] = None,
     junit: Annotated[
         Path | None, typer.Option("--junit", help="write the results as JUnit XML")
     ] = None,
     interpreted: Annotated[
-        bool, typer.Option("--interpreted", help="on the engine alone: no compiler is needed")
+        bool, typer.Option("--interpreted", help="use the engine only, without a compiler")
     ] = False,
     coverage: Annotated[
         bool,
-        typer.Option("--coverage", help="tell which modes, transitions, conditions are tested"),
+        typer.Option("--coverage", help="report the coverage of modes, transitions, conditions"),
     ] = False,
     graphs: Annotated[
-        Path | None, typer.Option("--graphs", help="a folder for the modes, coloured by coverage")
+        Path | None, typer.Option("--graphs", help="folder for mode diagrams coloured by coverage")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run tests of specs on the engine and in C; both have to give one verdict.
+    """Run tests of specs on the engine and in C; both must give the same results.
+
+    Exit code 1 if a test fails.
 
     \b
     modewright test
     modewright test tip_out_is_detected --junit build/tests.xml
     modewright test --coverage --graphs build
     """
-    from expectation.coverage_measurement import measure_coverage as covered, merge_coverages
+    from expectation.coverage_measurement import measure_coverage, merge_coverages
     from modewright.api.spec_tests import run_tests
     from modewright.render.spec_tests import spec_test_lines
 
@@ -54,7 +58,7 @@ def test(
     with progress_spinner("running tests"):
         for run in run_tests(tests or (), compiled=not interpreted):
             runs.append(run)
-            parts += covered(run.test) if coverage or graphs else ()
+            parts += measure_coverage(run.test) if coverage or graphs else ()
             _print_lines(() if as_json else spec_test_lines(run))
     sums = merge_coverages(parts)
     pictures = _write_results(runs, sums, junit, graphs)
@@ -70,7 +74,7 @@ def test(
 def _write_results(
     runs: Sequence[TestRun], sums: Sequence[Coverage], junit: Path | None, graphs: Path | None
 ) -> list[Path]:
-    """Write the results and the pictures that are wanted; return the files of the pictures."""
+    """Write JUnit XML and coverage diagrams if requested; return the paths of the diagrams."""
     from modewright.api.test_coverage import coverage_diagram
     from modewright.render import spec_tests as show_tests
 
@@ -84,15 +88,17 @@ def _write_results(
 
 
 def _print_json(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
+    """Print tests, and coverage if measured, as JSON."""
     from modewright.api.test_coverage import coverage_json
     from modewright.render.run import print_json
     from modewright.render.spec_tests import spec_test_json
 
-    told = {"tests": [spec_test_json(run) for run in runs]}
-    print_json(told | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
+    results = {**format_entry("tests"), "tests": [spec_test_json(run) for run in runs]}
+    print_json(results | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
 
 
 def _report_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
+    """Print the coverage and the numbers of passed and failed tests."""
     from modewright.api.test_coverage import coverage_lines
     from modewright.render.spec_tests import spec_tests_summary
 
@@ -102,5 +108,6 @@ def _report_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
 
 
 def _print_lines(lines: Iterable[str]) -> None:
+    """Print lines without markup."""
     for line in lines:
         console().print(line, soft_wrap=True, highlight=False, markup=False)

@@ -1,4 +1,4 @@
-"""Command trace: requirements with specs, lines of C and tests."""
+"""Command trace: trace requirements to specs, lines of C and tests."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from modewright.cli.common.options import Json
 from modewright.runtime.output_files import OutputError, require_writable, write_files
 
 FORMATS = (".html", ".csv", ".json")
+"""Suffixes of trace files."""
 
 
 def trace(
@@ -22,18 +23,20 @@ def trace(
         Path | None, typer.Option("--out", "-o", help="write .html, .csv or .json")
     ] = None,
     requirements: Annotated[
-        Path | None, typer.Option("--requirements", help="a CSV of requirements: name, text")
+        Path | None, typer.Option("--requirements", help="CSV file of requirements: name, text")
     ] = None,
-    run: Annotated[bool, typer.Option("--run", help="run the tests: with their verdicts")] = False,
+    run: Annotated[
+        bool, typer.Option("--run", help="run the tests and include their results")
+    ] = False,
     strict: Annotated[
-        bool, typer.Option("--strict", help="leave with 1 if a requirement is not traced")
+        bool, typer.Option("--strict", help="exit with code 1 if a requirement is not traced")
     ] = False,
     keys: Annotated[
-        bool, typer.Option("--keys", help="trace each key of the specs to lines of C instead")
+        bool, typer.Option("--keys", help="trace keys of the specs to lines of C instead")
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Trace requirements (`req:`) through specs, the lines of their C, and tests.
+    """Trace requirements (`req:`) to specs, lines of their C, and tests.
 
     \b
     modewright trace ev_driveline
@@ -67,7 +70,7 @@ def trace(
 
 
 def _report_key_trace(specs: list[str], out: Path | None, form: str, as_json: bool) -> None:
-    """Trace keys to lines of C: a page with both side by side, or plain data."""
+    """Trace keys to lines of C and write a page with both, or JSON."""
     from modewright.api import traces
     from modewright.render import key_trace as show_keys
 

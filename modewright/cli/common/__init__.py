@@ -1,1 +1,1 @@
-"""What commands share: options, console, exit codes, interruption."""
+"""Shared parts of commands: options, console, exit codes, interruption."""

@@ -1,4 +1,4 @@
-"""Console: where results go; a bar is shown, and colours are used, on terminals only."""
+"""Console: print results and progress; progress bars and colours appear on terminals only."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 PIPE_WIDTH = 160
-"""Columns of a table in a pipe or a file, where there is no window to fit."""
+"""Width of tables [characters] if the output is no terminal."""
 
 REPORT_INTERVAL = 20.0
-"""Seconds between two lines that tell how far a work is, where there is no terminal."""
+"""Time [s] between two lines of progress if the output is no terminal."""
 
 log = logging.getLogger("modewright")
 
 
 @cache
 def console() -> Console:
-    """Return the console for results: stdout, without colours in pipes and under NO_COLOR."""
-    from rich.console import Console  # a quarter of the time of --help, which needs none
+    """Return the console for stdout, without colours in pipes and under NO_COLOR."""
+    from rich.console import Console  # deferred: the import is slow and --help does not need it
 
     has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
     return Console(width=None if has_width else PIPE_WIDTH)
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
-    """Set how much is told: --quiet only problems, --verbose each step, --log-file all of it."""
+    """Set the verbosity: --quiet prints problems only, --verbose each step; --log-file gets all."""
     if quiet or console.cache_info().currsize:
         console().quiet = quiet
     for handler in list(log.handlers):
@@ -54,7 +54,7 @@ def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None 
 
 @contextmanager
 def progress_spinner(description: str) -> Iterator[None]:
-    """Show on a terminal that work goes on, and for how long; log when it is done."""
+    """Show a spinner with the elapsed time on a terminal; log the duration at the end."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -70,10 +70,10 @@ def progress_spinner(description: str) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Show on a terminal how much of a work is done, its rate and the time left.
+    """Show a progress bar with rate and remaining time on a terminal; elsewhere print lines.
 
-    Elsewhere, in the log of a build, a line tells it now and then. What is yielded is told: how
-    much is done, how much of it was before, how much it is in all.
+    Yields a function of three numbers: finished, finished before the start, and total. Lines are
+    printed each REPORT_INTERVAL.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -84,38 +84,39 @@ def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, in
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[count]}"),
         TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
     )  # fmt: skip
-    start = told = time.monotonic()
+    start = reported_at = time.monotonic()
     with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
 
-        def tell(done: int, before: int, total: int) -> None:
+        def report(done: int, before: int, total: int) -> None:
             if not progress.tasks:
                 progress.add_task(description, total=total, completed=before, count="", rate="")
             rate = (done - before) / max(time.monotonic() - start, 1e-9)
             shown = f"{rate:.3g} {noun}/s" if done > before else ""
             count, bar = f"{done}/{total}", progress.tasks[0].id
             progress.update(bar, total=total, completed=done, count=count, rate=shown)
-            nonlocal told
+            nonlocal reported_at
             if (
                 not (screen.is_terminal or console().quiet)
-                and time.monotonic() - told > REPORT_INTERVAL
+                and time.monotonic() - reported_at > REPORT_INTERVAL
             ):
-                told = time.monotonic()
+                reported_at = time.monotonic()
                 print(
                     f"{description}: {done} of {total} {noun}, {shown}", file=sys.stderr, flush=True
                 )
 
-        yield tell
+        yield report
     log.info("%s: %.2f s", description, time.monotonic() - start)
 
 
 def report_written_files(files: Sequence[Path]) -> None:
-    """Tell which files were written."""
+    """Print and log the paths of written files."""
     for path in files:
         log.info("wrote %s", path)
         console().print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def _set_formatter(handler: logging.Handler, form: str) -> logging.Handler:
+    """Set the format of a log handler, with UTC times, and return the handler."""
     formatter = logging.Formatter(form, "%Y-%m-%dT%H:%M:%SZ")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)

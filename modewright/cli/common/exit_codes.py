@@ -1,4 +1,4 @@
-"""Exits: what each exit code means, and how an exception becomes one."""
+"""Exit codes: map exceptions of a command to messages and exit codes."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ from sweep.execution.dask_error import ClusterError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
 MAX_SHOWN = 100
-"""Problems that are shown to a person; `check --json` has all of them."""
+"""Largest number of problems that are printed; `check --json` prints all."""
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""The class of all usage errors; typer brings its own copy of click's."""
+"""The base class of all usage errors; typer contains its own copy of click."""
 EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
 differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
 modewright (one line and a report file); 130 interrupted."""
+"""The text about exit codes below the help of each command."""
 
 
 def run_with_exit_code(run: Callable[[], object]) -> int:
-    """Run a command line and return its exit code; every message goes to stderr."""
+    """Run a command line and return its exit code; messages of exceptions go to stderr."""
     try:
         code = run()
         _flush_stdout()
@@ -67,17 +68,20 @@ def run_with_exit_code(run: Callable[[], object]) -> int:
 
 
 def _report_defect(error: Exception) -> int:
+    """Write the report file of an unexpected exception, print its path and return the exit code."""
     print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
     print(f"a report is in {_write_defect_report()}", file=sys.stderr)
     return DEFECT
 
 
 def _flush_stdout() -> None:
+    """Flush stdout if it exists."""
     if sys.stdout is not None:
         sys.stdout.flush()
 
 
 def _flush_with_code(code: int) -> int:
+    """Flush stdout and return the exit code; ignore a reader that is gone."""
     try:
         _flush_stdout()
     except BrokenPipeError:
@@ -86,13 +90,13 @@ def _flush_with_code(code: int) -> int:
 
 
 def _discard_output() -> int:
-    """Who reads our output has gone (`| head`): the rest goes nowhere, which is no failure."""
+    """Redirect stdout to the null device because its reader is gone (`| head`); return DONE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return DONE
 
 
 def report_problems(error: SpecError) -> None:
-    """Print the problems and their number."""
+    """Print the problems of a SpecError and the number of errors to stderr."""
     problems = sort_problems(error.problems)
     count = sum(problem.severity == "error" for problem in problems)
     print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)
@@ -102,15 +106,17 @@ def report_problems(error: SpecError) -> None:
 
 
 USER_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.ENAMETOOLONG, errno.EIO}
-"""Errors of the system that the user can do something about: a full disk, a wrong path."""
+"""System errors that the user can solve, such as a full disk or a wrong path."""
 
 
 def _first_line(error: Exception) -> str:
+    """Return the type of an exception and the first line of its message."""
     text = str(error).strip().split("\n")[0]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _write_defect_report() -> Path:
+    """Write command line, Python version and traceback to a temporary file; return its path."""
     text = f"command: {' '.join(sys.argv)}\npython: {sys.version}\n\n{traceback.format_exc()}"
     with tempfile.NamedTemporaryFile(
         "w", prefix="modewright-report-", suffix=".txt", delete=False

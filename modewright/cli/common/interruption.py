@@ -1,4 +1,4 @@
-"""Interruption: Ctrl-C once, however often it is pressed."""
+"""Interruption: handle repeated Ctrl-C as one interrupt."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 GRACE_PERIOD = 15.0
-"""Time [s] that a work has to end after Ctrl-C; then another one interrupts that too."""
+"""Time [s] after a Ctrl-C in which further ones are ignored."""
 
 
 @contextmanager
 def debounce_interrupts() -> Iterator[None]:
-    """Let the first Ctrl-C interrupt; those that follow do not disturb how the work ends."""
+    """Raise KeyboardInterrupt at the first Ctrl-C and ignore others for GRACE_PERIOD.
+
+    This does nothing outside the main thread or with another handler of SIGINT.
+    """
     is_ours = threading.current_thread() is threading.main_thread()
     if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield

@@ -1,4 +1,4 @@
-"""Options: arguments that several commands share, and what is done with them."""
+"""Options: arguments that several commands share, and their validation."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from engine.results.trajectory import Trajectory
 
 GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
+"""Suffixes of figures."""
 
-System = Annotated[str, typer.Argument(help="a system: its name or its file")]
+System = Annotated[str, typer.Argument(help="a system or automaton: name or file")]
 Scenario = Annotated[str, typer.Option("--scenario", "-s", help="a scenario: name or file")]
 Sets = Annotated[
     list[str] | None,
@@ -34,7 +35,7 @@ Out = Annotated[
     typer.Option("--out", "-o", help="write the run: .csv (with a side file) or .parquet"),
 ]
 Plot = Annotated[
-    Path | None, typer.Option("--plot", "-p", help="write a picture: .png, .svg or .pdf")
+    Path | None, typer.Option("--plot", "-p", help="write a figure: .png, .svg or .pdf")
 ]
 Signals = Annotated[
     list[str] | None, typer.Option(help="only signals that match: 'plant.*' (repeatable)")
@@ -43,13 +44,13 @@ From = Annotated[float | None, typer.Option("--from", help="start of the window 
 To = Annotated[float | None, typer.Option("--to", help="end of the window [s]")]
 Numbers = Annotated[
     Literal["float64", "float32"] | None,
-    typer.Option(help="compute in this type, whatever the automata say"),
+    typer.Option(help="number type, instead of that of the automata"),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 
 def values_of(sets: Sequence[str] | None) -> dict[str, str]:
-    """Return the values of --set by parameter."""
+    """Return the values of --set by parameter. Raises BadParameter."""
     found = {}
     for text in sets or []:
         name, equals, value = text.partition("=")
@@ -60,7 +61,7 @@ def values_of(sets: Sequence[str] | None) -> dict[str, str]:
 
 
 def span_of(start: float | None, end: float | None) -> tuple[float, float] | None:
-    """Return the window of --from and --to [s]; None if neither is given."""
+    """Return the time window [s] of --from and --to; None without both. Raises BadParameter."""
     if start is None and end is None:
         return None
     span = (-math.inf if start is None else start, math.inf if end is None else end)
@@ -71,7 +72,7 @@ def span_of(start: float | None, end: float | None) -> tuple[float, float] | Non
 
 @contextmanager
 def usage_errors() -> Iterator[None]:
-    """Tell a ValueError of the API as wrong usage (exit code 2)."""
+    """Convert a ValueError in the context to a usage error (exit code 2)."""
     try:
         yield
     except ValueError as error:
@@ -79,7 +80,10 @@ def usage_errors() -> Iterator[None]:
 
 
 def calibration_title(out: Path | None, name: str | None, date: str) -> str:
-    """Return the name of the calibration, which can be written as it is asked for."""
+    """Return the name of a calibration: --name, the stem of the file, or `fitted`.
+
+    Raises OutputError if the file cannot be written, and BadParameter for an invalid name or date.
+    """
     from language.expressions.name_rules import NAME_PATTERN
     from language.overlays.calibration import DATE
 
@@ -96,20 +100,20 @@ def calibration_title(out: Path | None, name: str | None, date: str) -> str:
 
 
 def require_run_format(path: Path | None) -> None:
-    """Raise OutputError, before any work is done, for a run in a format that is not known."""
+    """Raise OutputError for a run file that is neither .csv nor .parquet."""
     if path and path.suffix.lower() not in (".csv", ".parquet"):
         raise OutputError(f"{path}: a run ends with .csv or .parquet")
 
 
 def picture_format(path: Path) -> str:
-    """Return the format of a picture by the ending of its name. Raises OutputError."""
+    """Return the format of a figure by its suffix. Raises OutputError for unknown ones."""
     if path.suffix.lower() not in GRAPHIC_FORMATS:
         raise OutputError(f"{path}: a picture ends with {', '.join(GRAPHIC_FORMATS)}")
     return path.suffix.lower()[1:]
 
 
 def exit_if_failed(failed: bool, trajectory: Trajectory) -> None:
-    """Warn of latched faults, tell why a run stopped; leave with exit code 1 if it failed."""
+    """Print latched faults and the reason of a stop; exit with code 1 if `failed`."""
     for fault in trajectory.faults:
         print(f"warning: a fault bit is set: {fault}", file=sys.stderr)
     if trajectory.stopped:

@@ -1,4 +1,4 @@
-"""Watching: when specs below some folders change, by the times and sizes of their files."""
+"""Watching: detect changed specs by modification time and size."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 POLL_INTERVAL = 0.2
-"""Seconds between two looks: an edit is seen at once, and looking costs nothing."""
+"""Time [s] between two checks."""
 FileStamps = dict[Path, tuple[int, int]]
+"""Modification time [ns] and size of each file."""
 
 
 def wait_for_poll() -> None:
-    """Wait until the next look."""
+    """Sleep for POLL_INTERVAL."""
     time.sleep(POLL_INTERVAL)
 
 
 def watch_changes(
     folders: Collection[Path], wait: Callable[[], None] | None = None
 ) -> Iterator[list[Path]]:
-    """Yield the files that were written, made or removed, as often as there are some."""
+    """Yield the files that were written, created or removed, whenever there are any; never ends."""
     before = read_stamps(folders)
     while True:
         (wait or wait_for_poll)()
@@ -31,7 +32,7 @@ def watch_changes(
 
 
 def read_stamps(folders: Collection[Path]) -> FileStamps:
-    """Return when each spec below some folders was written [ns], and its size."""
+    """Return modification time [ns] and size of each YAML file below the folders."""
     found: FileStamps = {}
     for folder in folders:
         for path in folder.rglob("*.yaml"):
@@ -44,7 +45,7 @@ def read_stamps(folders: Collection[Path]) -> FileStamps:
 
 
 def spec_folders(names: Collection[str]) -> list[Path]:
-    """Return the folders of specs: `spec/` of the project, and those of files that are named."""
+    """Return the folders to watch: `spec/`, and the folders of named files outside it."""
     named = {Path(name).parent for name in names if name.endswith(".yaml")}
     inside = [folder for folder in sorted(named) if Path("spec") not in (folder, *folder.parents)]
     return [Path("spec"), *inside]

@@ -1,1 +1,1 @@
-"""Semantic differences between two versions of a spec."""
+"""Semantic differences of two specs: comparison and rendering."""

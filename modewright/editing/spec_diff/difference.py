@@ -1,4 +1,4 @@
-"""Difference: what distinguishes two specs, in terms of modes, transitions, guards, parameters."""
+"""Difference: compare two specs in terms of modes, transitions, guards and parameters."""
 
 from __future__ import annotations
 
@@ -23,18 +23,23 @@ from modewright.editing.spec_diff.subject import (
 )
 
 NUMBERED_SECTIONS = {"modes": "numbers of modes move", "faults": "bits of faults move"}
-"""Sections whose names are numbered as they come, each after all before it."""
+"""Sections whose entries are numbered in their order, with the effect of another order."""
 
 ORDERED_SECTIONS = {
-    "events": "what comes at once is heard in another order",
-    "regions": "what is done at once is done in another order",
-    "instances": "what is done at once is done in another order",
+    "events": "simultaneous events are processed in another order",
+    "regions": "simultaneous actions are executed in another order",
+    "instances": "simultaneous actions are executed in another order",
 }
-"""Sections in which it counts who stands before whom; `instances` are regions of an automaton."""
+"""Sections whose order matters, with the effect of another order.
+
+`instances` are ordered as regions of an automaton only.
+"""
 
 
 def describe_reordering(section: str, old: MappingNode, new: MappingNode) -> str:
-    """Return what the other order of the keys of a section changes; empty for nothing."""
+    """Return the effect of another order of the common keys of a section; empty if there is
+    none.
+    """
     before, after = _numbered_keys(section, old), _numbered_keys(section, new)
     both = [key for key in before if key in after]
     if section in NUMBERED_SECTIONS and _indices_of(both, before) != _indices_of(both, after):
@@ -45,11 +50,12 @@ def describe_reordering(section: str, old: MappingNode, new: MappingNode) -> str
 
 
 def _indices_of(keys: Sequence[str], among: Sequence[str]) -> list[int]:
+    """Return the indices of keys in a list."""
     return [among.index(key) for key in keys]
 
 
 def _numbered_keys(section: str, table: MappingNode) -> list[str]:
-    """Return the keys whose order counts: modes that say their number do without."""
+    """Return the keys whose order counts: all except modes with an explicit number."""
     is_mode = section == "modes"
     return [
         e.key
@@ -59,7 +65,7 @@ def _numbered_keys(section: str, table: MappingNode) -> list[str]:
 
 
 def expand_templates(root: MappingNode) -> MappingNode:
-    """Return the tree of a spec in which no mode is `like` a template any more."""
+    """Return the tree of a spec with all templates applied to modes and removed."""
     templates = root.get("templates")
     known = templates if isinstance(templates, MappingNode) else MappingNode({}, root.span)
     made = _expand_node(without_keys(root, "templates"), known)
@@ -67,6 +73,7 @@ def expand_templates(root: MappingNode) -> MappingNode:
 
 
 def _expand_node(node: YamlNode, templates: MappingNode) -> YamlNode:
+    """Return a node with templates applied to the modes in it."""
     if not isinstance(node, MappingNode):
         return node
     found = {}
@@ -82,6 +89,7 @@ def _expand_node(node: YamlNode, templates: MappingNode) -> YamlNode:
 
 
 def _expand_regions(node: YamlNode, templates: MappingNode) -> YamlNode:
+    """Return regions with templates applied."""
     if not isinstance(node, MappingNode):
         return node
     regions = {e.key: Entry(e.key, e.span, _expand_node(e.node, templates)) for e in node}
@@ -89,6 +97,7 @@ def _expand_regions(node: YamlNode, templates: MappingNode) -> YamlNode:
 
 
 def _expand_mode(node: YamlNode, templates: MappingNode) -> YamlNode:
+    """Return a mode with its template applied."""
     if not isinstance(node, MappingNode):
         return node
     like = node.get("like")
@@ -99,14 +108,14 @@ def _expand_mode(node: YamlNode, templates: MappingNode) -> YamlNode:
 
 
 MIN_RATIO_SHOWN = 5
-"""From this ratio on it is told itself."""
+"""Smallest ratio that is printed as a factor instead of a percentage."""
 
 ChangeKind = Literal["added", "removed", "changed"]
 
 
 @dataclass(frozen=True)
 class SpecChange:
-    """One difference: of what, in which respect, the texts before and after with their places."""
+    """One difference: kind, subject and aspect, texts before and after with their places."""
 
     kind: ChangeKind
     group: str
@@ -120,7 +129,10 @@ class SpecChange:
 
 
 def diff_documents(before: Document, after: Document) -> tuple[SpecChange, ...]:
-    """Return what differs between two expanded documents, by groups. Raises SpecError."""
+    """Return the differences of two expanded documents, grouped; texts come last.
+
+    Raises SpecError if the kinds differ.
+    """
     if before.kind != after.kind:
         problems = Problems()
         label = f"`{after.name}` is of kind {after.kind}, `{before.name}` of kind {before.kind}"
@@ -143,7 +155,7 @@ def diff_documents(before: Document, after: Document) -> tuple[SpecChange, ...]:
 
 @dataclass(frozen=True)
 class _DocumentPair:
-    """Both trees, templates applied."""
+    """Both trees with templates applied."""
 
     before: MappingNode
     after: MappingNode
@@ -151,7 +163,7 @@ class _DocumentPair:
     def iter_changes(
         self, path: KeyPath, old: YamlNode | None, new: YamlNode | None
     ) -> Iterator[SpecChange]:
-        """Yield what differs below a path; a mode that is new is told with what is in it."""
+        """Yield the differences below a path; a new or removed mode includes its content."""
         subject = subject_of(path, self.after if new is not None else self.before)
         if isinstance(old, MappingNode) and isinstance(new, MappingNode):
             if path != ("instances",) or "automaton" in self.after.entries:
@@ -177,7 +189,7 @@ class _DocumentPair:
 
 
 def _order_changes(path: KeyPath, old: MappingNode, new: MappingNode) -> Iterator[SpecChange]:
-    """Yield that the keys of a section have another order, where that means something."""
+    """Yield the change of the order of a section if it has an effect."""
     section = path[-1]
     effect = describe_reordering(section, old, new) if is_section(path) else ""
     if effect:
@@ -190,11 +202,12 @@ def _order_changes(path: KeyPath, old: MappingNode, new: MappingNode) -> Iterato
 
 
 def _union_keys(old: MappingNode, new: MappingNode) -> list[str]:
+    """Return the keys of both mappings, first those of the new one."""
     return list(dict.fromkeys((*new.entries, *old.entries)))
 
 
 def _subsections(node: YamlNode) -> list[tuple[str, YamlNode]]:
-    """Return what is told on its own: of a mode its transitions and the like, else everything."""
+    """Return the parts of a node that are separate subjects; of a mode its transitions etc."""
     if not isinstance(node, MappingNode):
         return []
     is_mode = any(entry.key in SUBSECTIONS for entry in node)
@@ -204,6 +217,7 @@ def _subsections(node: YamlNode) -> list[tuple[str, YamlNode]]:
 def _make_change(
     kind: ChangeKind, subject: Subject, old: YamlNode | None, new: YamlNode | None
 ) -> SpecChange:
+    """Return the change of a subject with the texts of both nodes."""
     left_out = SUBSECTIONS if subject.group == "modes" else ()
     return SpecChange(
         kind=kind,
@@ -219,11 +233,12 @@ def _make_change(
 
 
 def _format_place(node: YamlNode | None) -> str:
+    """Return `file:line` of a node; empty for None."""
     return f"{node.span.source.name}:{node.span.line}" if node else ""
 
 
 def _format_node(node: YamlNode, excluded: tuple[str, ...] = (), is_inner: bool = False) -> str:
-    """Return a node on one line, without the brackets around all of it."""
+    """Return a node on one line, without outer brackets and excluded keys."""
     match node:
         case ScalarNode():
             return node.text
@@ -238,7 +253,7 @@ def _format_node(node: YamlNode, excluded: tuple[str, ...] = (), is_inner: bool 
 
 
 def _is_equivalent(old: YamlNode, new: YamlNode) -> bool:
-    """Tell whether two values say the same; blanks in expressions do not count."""
+    """Return whether two values are equal; the spelling of expressions does not count."""
     match old, new:
         case ScalarNode(), ScalarNode():
             if old.text == new.text or old.text.split() == new.text.split():
@@ -253,6 +268,7 @@ def _is_equivalent(old: YamlNode, new: YamlNode) -> bool:
 
 
 def _parse_or_none(scalar: ScalarNode) -> SyntaxTree | None:
+    """Return the tree of an expression; None if it is invalid."""
     try:
         return parse_expression(scalar)
     except SpecError:
@@ -260,9 +276,9 @@ def _parse_or_none(scalar: ScalarNode) -> SyntaxTree | None:
 
 
 def _quantity_note(old: YamlNode, new: YamlNode, is_value: bool) -> str:
-    """Return how much a quantity changed, or that it is the same in another unit.
+    """Return the relative change of a quantity, `same value` or `other unit`; else empty.
 
-    Of bare numbers that is told where they are values: a priority has no size.
+    Numbers without unit are compared if they are values of parameters only.
     """
     first, second = _si_quantity(old), _si_quantity(new)
     if first is None or second is None:
@@ -282,7 +298,7 @@ def _quantity_note(old: YamlNode, new: YamlNode, is_value: bool) -> str:
 
 
 def _si_quantity(node: YamlNode) -> tuple[Fraction, Dimension] | None:
-    """Return a literal in SI and its dimension, None for other values."""
+    """Return the SI value and the dimension of a literal; None for other nodes."""
     tree = _parse_or_none(node) if isinstance(node, ScalarNode) else None
     sign = -1 if isinstance(tree, Negation) else 1
     number = tree.operand if isinstance(tree, Negation) else tree

@@ -1,4 +1,4 @@
-"""Revision: a spec as it is, or as it was in a revision of the project's Git repository."""
+"""Git revision: load specs from the working folder or from a revision of the repository."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from language.text.project_files import Project
 
 @contextmanager
 def load_documents(*references: str) -> Iterator[list[Document]]:
-    """Yield specs by names or files, `REVISION:` before them perhaps, with all that is laid.
+    """Yield expanded specs by name or file, with an optional prefix `REVISION:`.
 
-    A revision is taken as a whole: bases and models are those of then. Raises SpecError.
+    Bases and models come from the same revision. Raises SpecError.
     """
     with tempfile.TemporaryDirectory() as folder:
         yield [
@@ -35,6 +35,7 @@ def load_documents(*references: str) -> Iterator[list[Document]]:
 
 
 def _load_document(reference: str, folder: Path) -> Document:
+    """Return an expanded spec; the places of a revision's spec name the revision."""
     revision, colon, spec = reference.partition(":")
     if not colon or Path(reference).exists():
         return _load_expanded(reference, Project(Path()))
@@ -47,6 +48,7 @@ def _load_document(reference: str, folder: Path) -> Document:
 
 
 def _load_expanded(reference: str, project: Project) -> Document:
+    """Return an expanded spec with the parameters of its model. Raises SpecError."""
     problems = Problems()
     made = expand_document(project.read(project.path_of(reference)), project, problems)
     problems.raise_if_errors()
@@ -54,7 +56,7 @@ def _load_expanded(reference: str, project: Project) -> Document:
 
 
 def _add_model_parameters(document: Document, project: Project) -> Document:
-    """Return a document with the parameters of its model, as far as it does not give them anew."""
+    """Return a document with the parameters of its model, unless it defines them itself."""
     model = document.root.get("model")
     if not isinstance(model, ScalarNode):
         return document
@@ -67,11 +69,12 @@ def _add_model_parameters(document: Document, project: Project) -> Document:
 
 
 def _table_or_empty(node: YamlNode | None) -> MappingNode:
+    """Return a mapping node, or an empty one for other nodes."""
     return node if isinstance(node, MappingNode) else MappingNode({}, NO_SPAN)
 
 
 def _relabel_source(node: YamlNode, folder: str, revision: str) -> YamlNode:
-    """Return a tree whose places name the revision, not the folder that it was written to."""
+    """Return a tree whose places name a revision instead of a temporary folder."""
 
     def moved(span: Span) -> Span:
         name = span.source.name.replace(folder, revision, 1)
@@ -92,7 +95,10 @@ def _relabel_source(node: YamlNode, folder: str, revision: str) -> YamlNode:
 
 
 def _extract_revision(reference: str, revision: str, folder: Path) -> None:
-    """Write the specs of a revision, those below the working folder, into a folder."""
+    """Write the specs of a revision below the working folder into a folder.
+
+    Raises SpecError if Git does not know the revision.
+    """
     try:
         command = ["git", "archive", "--format=tar", revision, "--", "*.yaml"]
         data = subprocess.run(command, capture_output=True, check=True).stdout

@@ -1,4 +1,4 @@
-"""Show difference: what differs between two specs as text, as plain data, as a page."""
+"""Rendering: print the differences of specs as text, as JSON data and as an HTML page."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from typing import Any
 import jinja2
 
 from modewright.editing.spec_diff.difference import SpecChange
+from modewright.runtime.json_format import format_entry
 
 MAX_VALUE_LENGTH = 72
-"""Characters of a value in a line of text; the page and the plain data have all of it."""
+"""Longest value in a line of text; JSON and page have all of it."""
 SIGNS = {"added": "+", "removed": "-", "changed": "~"}
+"""Signs of the kinds of changes."""
 
 
 def diff_text(changes: Sequence[SpecChange]) -> str:
-    """Return the changes as lines, by groups; empty where nothing differs."""
+    """Return the changes as lines of text by group; empty without changes."""
     return "".join(f"{line}\n" for line in _diff_lines(changes))
 
 
 def _diff_lines(changes: Sequence[SpecChange]) -> Iterator[str]:
+    """Yield the lines of the text."""
     if changes:
         yield diff_summary(changes)
     for group, members in itertools.groupby(changes, lambda change: change.group):
@@ -31,25 +34,29 @@ def _diff_lines(changes: Sequence[SpecChange]) -> Iterator[str]:
         yield group
         width = max(len(_change_title(change)) for change in together)
         for change in together:
-            yield f"  {SIGNS[change.kind]} {_change_title(change):{width}}  {_change_values(change)}".rstrip()
+            title, values = f"{_change_title(change):{width}}", _change_values(change)
+            yield f"  {SIGNS[change.kind]} {title}  {values}".rstrip()
 
 
 def _change_title(change: SpecChange) -> str:
+    """Return subject and aspect of a change."""
     return f"{change.thing}: {change.aspect}" if change.aspect else change.thing
 
 
 def _change_values(change: SpecChange) -> str:
+    """Return the shortened values before and after, with the note."""
     values = [_shorten(text) for text in (change.before, change.after) if text]
     note = f"  ({change.note})" if change.note else ""
     return " -> ".join(values) + note
 
 
 def _shorten(text: str) -> str:
+    """Return a text cut to MAX_VALUE_LENGTH with an ellipsis."""
     return text if len(text) <= MAX_VALUE_LENGTH else text[: MAX_VALUE_LENGTH - 3] + "..."
 
 
 def diff_summary(changes: Sequence[SpecChange]) -> str:
-    """Return how many things of each group differ, in one line."""
+    """Return the number of changed subjects of each group in one line."""
     things: dict[str, set[str]] = {}
     for change in changes:
         things.setdefault(change.group, set()).add(change.thing)
@@ -57,12 +64,15 @@ def diff_summary(changes: Sequence[SpecChange]) -> str:
 
 
 def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
-    """Return the changes as plain data."""
-    return {"changes": [dataclasses.asdict(change) for change in changes]}
+    """Return the changes as a dict for JSON."""
+    return {
+        **format_entry("diff"),
+        "changes": [dataclasses.asdict(change) for change in changes],
+    }
 
 
 def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
-    """Return the changes as one HTML page that needs no other file."""
+    """Return the changes as a self-contained HTML page."""
     folder = resources.files("modewright.editing.spec_diff").joinpath("templates")
     environment = jinja2.Environment(
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=True

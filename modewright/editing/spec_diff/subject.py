@@ -1,4 +1,4 @@
-"""Thing: what a key path of a spec is about - a parameter, a mode, a transition, a guard."""
+"""Subject: determine what a key path of a spec describes - a parameter, a mode, a guard etc."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from language.text.node_edit import find_node
 KeyPath = tuple[str, ...]
 
 TEXT_GROUP = "texts"
-"""The group of what has no influence."""
+"""The group of texts without influence on results."""
 SUBSECTIONS = (
     *("transitions", "equations", "flow", "terms", "entry", "exit", "update", "invariant"),
     *("modes", "regions", "observer", "runs"),
 )
-"""Keys of a mode that are told on their own."""
+"""Keys of a mode whose entries are separate subjects."""
 MODE_SECTION_GROUPS = {
     "equations": "equations",
     "flow": "flow",
@@ -25,21 +25,21 @@ MODE_SECTION_GROUPS = {
     "update": "actions",
     "invariant": "invariants",
 }
-"""The groups of what is named inside a mode."""
+"""The groups of the named entries of a mode, by section."""
 ASPECT_NAMES = {"when": "guard", "to": "target"}
-"""Words for keys, where the field has another one."""
+"""Terms for keys that have another name in the field."""
 NAMED_SECTIONS = (
     *("parameters", "inputs", "states", "discrete", "equations", "flow", "terms", "faults"),
     *("events", "tables", "elements", "places", "instances", "sensors", "connections", "outputs"),
     *("initial", "columns", "constants", "measures", "plots", "vary", "set", "variants", "pages"),
     *("expect", "effects", "redirect"),
 )
-"""Sections whose keys are names of things."""
+"""Sections whose keys are names."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What a path is about, and in which respect; the respect of the thing itself is empty."""
+    """The subject of a path and the aspect of it; the aspect is empty for the subject itself."""
 
     group: str
     title: str
@@ -47,7 +47,7 @@ class Subject:
 
 
 def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
-    """Return the thing of a path; None for a section, which is none itself."""
+    """Return the subject of a path; None for a section."""
     subject = _find_subject(path, root)
     if subject and path[-1] in ("about", "req"):
         return Subject(TEXT_GROUP, subject.title, subject.aspect)
@@ -55,11 +55,14 @@ def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
 
 
 def is_section(path: KeyPath) -> bool:
-    """Tell whether what a path leads to holds named things: at the root, or in a mode or region."""
+    """Return whether a path leads to a section of named entries: at the root, in a mode or
+    region.
+    """
     return len(_split_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
 
 
 def _find_subject(path: KeyPath, root: MappingNode) -> Subject | None:
+    """Return the subject of a path without regard to texts."""
     mode, rest = _split_mode(path)
     if not mode:
         return _section_subject(rest, root)
@@ -82,7 +85,7 @@ def _find_subject(path: KeyPath, root: MappingNode) -> Subject | None:
 
 
 def _split_mode(path: KeyPath) -> tuple[str, KeyPath]:
-    """Return the mode that a path goes through, dotted, and the rest of the path."""
+    """Return the dotted mode at the start of a path, and the rest of the path."""
     found: list[str] = []
     k = 0
     while k + 1 < len(path) and path[k] in ("modes", "regions"):
@@ -92,6 +95,7 @@ def _split_mode(path: KeyPath) -> tuple[str, KeyPath]:
 
 
 def _section_subject(path: KeyPath, root: MappingNode) -> Subject | None:
+    """Return the subject of a path in a section at the root."""
     section, *rest = path
     node = root.get(section)
     if section in ("modes", "regions"):
@@ -106,6 +110,7 @@ def _section_subject(path: KeyPath, root: MappingNode) -> Subject | None:
 def _transition_subject(
     mode: str, path: KeyPath, inner: list[str], root: MappingNode
 ) -> Subject | None:
+    """Return the subject of a path in a transition, titled `mode -> target`."""
     if not inner:
         return None
     name, *aspect = inner
