@@ -12,7 +12,12 @@ PACKAGES = (
     "language", "engine", "codegen", "diagnosis", "sweep", "expectation", "lockstep", "modewright",
 )  # fmt: skip
 READMES = [f"{package}/README.md" for package in (*PACKAGES, "spec", "tests")]
-PAGES = [*READMES, "README.md", *sorted(f"docs/{page.name}" for page in ROOT.glob("docs/*.md"))]
+PAGES = [
+    *READMES,
+    "README.md",
+    *sorted(page.relative_to(ROOT).as_posix() for page in ROOT.glob("docs/**/*.md")),
+    *sorted(page.relative_to(ROOT).as_posix() for page in ROOT.glob("tests/*/**/README.md")),
+]
 PATH = re.compile(
     rf"`((?:{'|'.join((*PACKAGES, 'spec', 'tests', 'docs', 'tools'))})/[\w./-]*\w/?)`"
 )
