@@ -16,9 +16,9 @@ from tests.semantics.refused.kinds import kinds
 PAGE = ROOT / "docs" / "problems.md"
 HEAD = """# Problems and their codes
 
-Each kind of problem has a code, which stays. `modewright check` tells it behind the message;
-`--json`, `--sarif` and `--github` have it too. Warnings do not fail a check. The examples are those
-of `tests/semantics/refused/`, where a repaired neighbour stands beside each; this page is made from
+Each kind of problem has a permanent code. `modewright check` prints it after the message, and
+`--json`, `--sarif` and `--github` contain it. Warnings do not fail a check. The examples are those
+of `tests/semantics/refused/`, where a corrected copy is beside each. This page is generated from
 them (`pytest tests/docs/test_problems_page.py --update`).
 """
 TITLES = {
