@@ -92,8 +92,8 @@ def _training_cost(
 
 
 def _fold_squares(prediction: PredictionResult, fold: int, is_training: bool) -> Reals:
-    """Return the sums of squares (recordings, outputs) of a fold, or of all others for
-    `is_training`.
+    """Return the sums of squares (recordings, outputs) of a fold,
+    or of all others for `is_training`.
     """
     squares = prediction.robust_squares
     found = np.zeros((len(prediction.slices), squares.shape[1]))

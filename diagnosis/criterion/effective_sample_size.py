@@ -37,8 +37,8 @@ def integrated_autocorrelation_by_recording(
 
 
 def _integrated_autocorrelation(innovations: Sequence[Reals], period: float) -> float:
-    """Return the integrated autocorrelation over some recordings; unknown innovations are
-    dropped.
+    """Return the integrated autocorrelation over some recordings;
+    unknown innovations are dropped.
     """
     lags = max(1, round(MAX_LAG / period))
     by_output = []

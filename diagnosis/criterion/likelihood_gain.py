@@ -82,8 +82,8 @@ def add_gains(base_gain: LikelihoodGain, added_gain: LikelihoodGain) -> Likeliho
 
 
 def _parameter_count(model: Estimate, recordings: int) -> int:
-    """Return the number of parameters of a model, those per recording counted for each
-    recording.
+    """Return the number of parameters of a model,
+    those per recording counted for each recording.
     """
     return sum(recordings if one.per_recording else 1 for one in model.candidate.free_parameters)
 

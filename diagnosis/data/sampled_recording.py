@@ -58,8 +58,8 @@ class SampledRecording:
 
     @cached_property
     def noise(self) -> tuple[Reals, Reals]:
-        """The noise standard deviations of the compared outputs (outputs,) and the inputs
-        (inputs,).
+        """The noise standard deviations of the compared
+        outputs (outputs,) and the inputs (inputs,).
         """
         seen, inputs = (
             [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
@@ -210,8 +210,8 @@ def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> Sam
 
 
 def grid_period(times: Reals) -> Fraction:
-    """Return the median difference [s] of time stamps, as the inverse of a whole rate if within 2
-    %.
+    """Return the median difference [s] of time stamps,
+    as the inverse of a whole rate if within 2 %.
     """
     usual = float(np.median(np.diff(times)))
     rate = round(1.0 / usual)
@@ -234,8 +234,8 @@ def _first_common_stamp(
 
 
 def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
-    """Return the index of the nearest sample of the grid for each value of a channel; may be
-    outside.
+    """Return the index of the nearest sample of the grid for each value of a channel;
+    may be outside.
     """
     return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
 

@@ -139,15 +139,15 @@ def _propose_formulas(
 
 
 def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
-    """Return the parameters [SI] that were fitted together with the free disturbance of a
-    location.
+    """Return the parameters [SI] that were fitted
+    together with the free disturbance of a location.
     """
     return (location.free_model or base).values(0)
 
 
 def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
-    """Return the base at its own parameters or at those beside the free disturbance, which costs
-    less.
+    """Return the base at its own parameters or at those beside the free disturbance,
+    which costs less.
     """
     point = vector_of(
         base.candidate, len(model_set.series), _values_beside_disturbance(base, location)

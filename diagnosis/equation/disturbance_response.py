@@ -46,8 +46,8 @@ class DisturbanceResponse:
     steady_state_gains: Reals = field(repr=False)
 
     def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
-        """Return the predictions of all recordings under a disturbance, (samples,) for each
-        recording.
+        """Return the predictions of all recordings under a disturbance,
+        (samples,) for each recording.
         """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
@@ -68,8 +68,8 @@ class DisturbanceResponse:
         return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
 
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
-        """Return calibration pages, and the recordings with the disturbance as a measured
-        output.
+        """Return calibration pages, and the recordings
+        with the disturbance as a measured output.
         """
         together, candidate = stack_recordings(self.series), self.candidate
         recorded, seen = together.recorded, candidate.predictor.outputs
@@ -87,8 +87,8 @@ class DisturbanceResponse:
         return [self.model.values(k) for k in range(len(self.series))]
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
-        """Return the innovations of the compared outputs after the burn-in, (samples, outputs)
-        each.
+        """Return the innovations of the compared outputs after the burn-in, (samples,
+        outputs) each.
         """
         return self._after_burn_in([one.innovations for one in predictions])
 

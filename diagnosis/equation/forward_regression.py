@@ -46,8 +46,8 @@ class RegressionProblem:
 
 @dataclass(frozen=True)
 class SelectedTerm:
-    """A selected term with its penalised gain and its cross-validated gain over earlier terms
-    [nats].
+    """A selected term with its penalised gain and its
+    cross-validated gain over earlier terms [nats].
     """
 
     columns: TermColumns
@@ -165,8 +165,8 @@ def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermCol
 
 @dataclass(frozen=True)
 class _LeastSquaresFit:
-    """The shared coefficients, those per recording (recordings, n), and the residual squares with
-    priors.
+    """The shared coefficients, those per recording (recordings, n),
+    and the residual squares with priors.
     """
 
     shared: Reals

@@ -92,8 +92,8 @@ def _weighted_response(
     values: Sequence[Reals],
     weights: _HuberWeights,
 ) -> tuple[Reals, ...]:
-    """Return the weighted decrease of innovations per unit of a disturbance `values`, by
-    recording.
+    """Return the weighted decrease of innovations per unit of a disturbance `values`,
+    by recording.
     """
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
     after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])

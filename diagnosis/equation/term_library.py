@@ -50,8 +50,8 @@ class LibraryTerm:
 
 @dataclass(frozen=True)
 class Signals:
-    """The signals of terms: values (samples,) of each recording and units by name, and
-    their roles.
+    """The signals of terms: values (samples,) of each recording and units by name,
+    and their roles.
     """
 
     values: Mapping[str, Sequence[Reals]] = field(repr=False)

@@ -110,8 +110,8 @@ def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> b
 
 
 def select_equation(selection: Selection, equation: DiscoveredEquation) -> Selection:
-    """Return a selection in which a formula is the accepted effect and no library effect is
-    likely.
+    """Return a selection in which a formula is the
+    accepted effect and no library effect is likely.
     """
     tried = CandidateFit(
         equation.formula.placed_effect,

@@ -29,8 +29,8 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
 
 
 def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
-    """Return the correlations of pairs of shared parameters, in descending order of their
-    magnitude.
+    """Return the correlations of pairs of shared parameters,
+    in descending order of their magnitude.
     """
     covariance, names = covariance_of(model)
     sizes = np.sqrt(np.diag(covariance))

@@ -217,8 +217,8 @@ def predict_at(
 def predict_with_gains_of(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> PredictionResult:
-    """Return the prediction of recordings by the estimate's candidate at a point, with its
-    gains.
+    """Return the prediction of recordings by the estimate's candidate at a point,
+    with its gains.
     """
     return predict_at(estimate.candidate, series, point, estimate.gains, estimate.noise_levels)
 

@@ -60,8 +60,8 @@ def choose_initial_inputs(
 
 
 def _initial_input_hypotheses(series: SampledRecording, noise: Reals) -> list[SampledRecording]:
-    """Return copies of a recording in which one of its first inputs is larger or smaller by 4
-    sigma.
+    """Return copies of a recording in which one of
+    its first inputs is larger or smaller by 4 sigma.
     """
     hypotheses = []
     for column in range(series.inputs.shape[1]):

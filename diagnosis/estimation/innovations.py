@@ -138,8 +138,8 @@ class PredictionResult:
         return np.asarray(near * (2.0 * size - near), dtype=np.float64)
 
     def robust_std(self) -> Reals:
-        """Return the standard deviation of the innovations from their median magnitude
-        (outputs,).
+        """Return the standard deviation of the innovations
+        from their median magnitude (outputs,).
         """
         return MAD_TO_STD * np.nanmedian(np.abs(self.stacked), axis=0)
 

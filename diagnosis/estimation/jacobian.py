@@ -1,5 +1,5 @@
-"""Jacobian: derivatives of the innovations with respect to coordinates, by differences or
-updates.
+"""Jacobian: derivatives of the innovations with respect to coordinates,
+by differences or updates.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ LINEAR_RANGE = 0.05
 The phase of a driveline order changes quickly with its parameter.
 """
 MIN_AGREEMENT = 0.5
-"""Correlation from which the derivative over the wide step is preferred to that over the narrow
-one.
+"""Correlation from which the derivative over the
+wide step is preferred to that over the narrow one.
 """
 MIN_SQUARED_STEP = 1e-12
 """Squared length below which a step does not update the Jacobian, because of rounding."""
@@ -95,8 +95,8 @@ def _agrees(first: Reals, second: Reals) -> bool:
 
 
 def _rms_change(changes: Reals) -> float:
-    """Return the root mean square of the known changes; infinite without any or beyond
-    `MAX_CHANGE`.
+    """Return the root mean square of the known changes;
+    infinite without any or beyond `MAX_CHANGE`.
     """
     is_known = ~np.isnan(changes)
     known = changes.ravel() if is_known.all() else changes[is_known]

@@ -61,8 +61,8 @@ def linearise(
 
 
 def _pseudoinverse(matrix: Reals) -> Reals:
-    """Return the Moore-Penrose pseudoinverse, bit-identical to `numpy.linalg.pinv` in half its
-    time.
+    """Return the Moore-Penrose pseudoinverse,
+    bit-identical to `numpy.linalg.pinv` in half its time.
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     large = sizes > RCOND * sizes[0]

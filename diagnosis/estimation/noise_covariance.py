@@ -121,8 +121,8 @@ def _append_noise_parameters(extended: Candidate, estimate: Estimate) -> Paramet
 
 
 def _drop_noise_parameters(candidate: Candidate, extended: Estimate) -> Estimate:
-    """Return an estimate without its noise parameters as coordinates; their values stay in its
-    levels.
+    """Return an estimate without its noise parameters as coordinates;
+    their values stay in its levels.
     """
     count = len(candidate.free_parameters)
     point = ParameterVector(

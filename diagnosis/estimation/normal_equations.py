@@ -112,8 +112,8 @@ def damped_step(
 def predicted_gain(
     candidate: Candidate, start: ParameterVector, normal: NormalEquations, end: ParameterVector
 ) -> float:
-    """Return the decrease of the cost [nats] from `start` to `end` by the quadratic model, with
-    priors.
+    """Return the decrease of the cost [nats] from `start` to `end` by the quadratic model,
+    with priors.
     """
     step = np.where(
         normal.own, (end.per_recording - start.per_recording)[normal.of], end.shared - start.shared
@@ -153,8 +153,8 @@ def _solve_step(
 
 
 def solve(matrix: Reals, right: Reals) -> Reals:
-    """Return the solution of a linear system, or its minimum-norm solution if the matrix is
-    singular.
+    """Return the solution of a linear system,
+    or its minimum-norm solution if the matrix is singular.
     """
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)

@@ -1,5 +1,5 @@
-"""Operating points: where each mode was active in a prediction, and the linearised
-candidate there.
+"""Operating points: where each mode was active in a prediction,
+and the linearised candidate there.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def _compute_linearised_modes(
 def linearise_near(
     candidate: Candidate, calibration_page: Reals, mode: int, states: Reals, inputs: Reals
 ) -> LinearModel | None:
-    """Return the candidate linearised over one sample in a mode near a point, or None if
-    invalid.
+    """Return the candidate linearised over one sample in a mode near a point,
+    or None if invalid.
     """
     substeps, sizes = candidate.compiled.substeps, STATE_STEP_FRACTION * candidate.state_ranges
     return linearise(candidate.predictor, calibration_page, mode, substeps, states, inputs, sizes)

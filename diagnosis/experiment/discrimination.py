@@ -138,8 +138,8 @@ def _expected_log_bayes_factor(
 def _normalised_innovations(
     model: Estimate, record: SampledRecording, point: ParameterVector
 ) -> Reals | None:
-    """Return innovations over their standard deviations (samples * outputs,); None if it
-    diverges.
+    """Return innovations over their standard deviations (samples * outputs,);
+    None if it diverges.
     """
     values = {
         one.name: one.value(float(point.shared[k]))

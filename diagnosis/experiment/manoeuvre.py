@@ -24,8 +24,8 @@ FORCE_UNITS = ("N*m", "N")
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A manoeuvre as a sampled recording; only its first measurements are known, as initial
-    state.
+    """A manoeuvre as a sampled recording; only its first measurements are known,
+    as initial state.
     """
 
     name: str
@@ -119,8 +119,8 @@ def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
 
 
 def _initial_outputs(model_set: ModelSet, part: float) -> Reals:
-    """Return recorded outputs at a sample where the first one is nearest to a part of its
-    largest.
+    """Return recorded outputs at a sample where the
+    first one is nearest to a part of its largest.
     """
     rows = np.concatenate([one.measured for one in model_set.series])
     rows = rows[np.all(np.isfinite(rows), axis=1)]

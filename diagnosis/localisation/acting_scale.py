@@ -1,5 +1,5 @@
-"""Acting scale: the size of the torque, force or signal at a place, for comparison with a
-disturbance.
+"""Acting scale: the size of the torque, force or signal at a place,
+for comparison with a disturbance.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def disturbance_unit(model_set: ModelSet, section: str, place: str) -> str:
 
 
 def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, str]:
-    """Return the names and texts that a disturbance effect binds at a place; empty if it does not
-    match.
+    """Return the names and texts that a disturbance effect binds at a place;
+    empty if it does not match.
     """
     kind = DISTURBANCE_KIND_BY_SECTION.get(section)
     if kind is None:

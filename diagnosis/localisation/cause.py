@@ -78,8 +78,8 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return `flow.state` of the balance in which an input or an inertia acts, else
-    `section.place`.
+    """Return `flow.state` of the balance in which an input or an inertia acts,
+    else `section.place`.
     """
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:
@@ -130,8 +130,8 @@ def _is_constant(model_set: ModelSet, location: Location) -> bool:
 
 
 def _has_both_signs(model_set: ModelSet, path: str) -> bool:
-    """Return whether an input takes both signs; a brake has one sign and cannot be constant at
-    rest.
+    """Return whether an input takes both signs;
+    a brake has one sign and cannot be constant at rest.
     """
     column = list(model_set.automaton.inputs).index(path.partition(".")[2])
     values = np.concatenate([one.inputs[:, column] for one in model_set.series])

@@ -48,8 +48,8 @@ def find_correlates(
 
 
 def order_features(rate: str) -> dict[str, int]:
-    """Return the names of features that are orders of the angle of a rate, with their periods per
-    turn.
+    """Return the names of features that are orders of the angle of a rate,
+    with their periods per turn.
     """
     return {f"order {order} of the angle of {rate}": order for order in ORDERS}
 
@@ -123,8 +123,8 @@ def angle_rates(model_set: ModelSet) -> list[str]:
 
 
 def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> float:
-    """Return the multiple correlation with the sine and cosine of angles, fitted for each
-    recording.
+    """Return the multiple correlation with the sine and cosine of angles,
+    fitted for each recording.
     """
     whole, explained = 0.0, 0.0
     for values, angle in zip(target, angles, strict=True):
@@ -137,8 +137,8 @@ def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> floa
 
 
 def _recording_correlation(disturbances: Sequence[Reals]) -> float:
-    """Return the correlation of a disturbance with its mean in each recording; 0 for one
-    recording.
+    """Return the correlation of a disturbance with its mean in each recording;
+    0 for one recording.
     """
     if len(disturbances) < 2:
         return 0.0

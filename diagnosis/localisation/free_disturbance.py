@@ -23,8 +23,8 @@ SMALL_LEVEL = INITIAL_LEVELS[0]
 """Level of the other disturbances, in their units."""
 INITIAL_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)
-"""Levels that are tried before the parameters are fitted: a sensor error can be 100 times its
-noise.
+"""Levels that are tried before the parameters are fitted:
+a sensor error can be 100 times its noise.
 """
 NEAR_LEVELS = (3.0, 30.0, 300.0)
 """Levels that are tried after the parameters are fitted."""

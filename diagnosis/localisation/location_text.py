@@ -49,8 +49,8 @@ def _format_percent(part: float) -> str:
 
 
 def _format_windows(location: Location) -> list[str]:
-    """Return the share of the main mode (if there are several) and the longest windows, as
-    phrases.
+    """Return the share of the main mode (if there are several) and the longest windows,
+    as phrases.
     """
     found = []
     mode = max(location.modes, key=lambda name: location.modes[name], default="")

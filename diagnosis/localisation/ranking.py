@@ -63,8 +63,8 @@ def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Lo
 
 
 def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
-    """Return section and disturbance for each balance of forces, elastic element and compared
-    output.
+    """Return section and disturbance for each balance of forces,
+    elastic element and compared output.
     """
     locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
     elements = model_set.document.root.get("elements")

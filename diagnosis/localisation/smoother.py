@@ -170,8 +170,8 @@ def _forward_pass(
 def _measurement_update(
     output_row: Reals, innovation: Reals, mean: Reals, p: Reals, variance: float
 ) -> _MeasurementUpdate:
-    """Return the Kalman update of one output, with gain and weight 0 where the innovation is
-    unknown.
+    """Return the Kalman update of one output,
+    with gain and weight 0 where the innovation is unknown.
     """
     known = np.isfinite(innovation)
     across = _batch_matvec(p, output_row)

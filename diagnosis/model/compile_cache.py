@@ -127,8 +127,8 @@ def _package_folder(package: ModuleType) -> Path:
 
 
 def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
-    """Yield the source files below a folder (Python, templates, YAML, grammars) with a stem like
-    `name`.
+    """Yield the source files below a folder (Python, templates, YAML,
+    grammars) with a stem like `name`.
     """
     for ending in ("py", "jinja", "yaml", "lark"):
         yield from folder.glob(f"**/{name}.{ending}")

@@ -9,8 +9,8 @@ from language.model.declaration import Parameter
 
 
 def format_value(value: float, parameter: Parameter) -> str:
-    """Return a value [SI] with six digits and its unit; a rounded value outside the range is
-    clipped.
+    """Return a value [SI] with six digits and its unit;
+    a rounded value outside the range is clipped.
     """
     text = f"{value:.6g}"
     if parameter.range:

@@ -98,8 +98,8 @@ def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> d
 
 
 def all_values_at(candidate: Candidate, point: ParameterVector) -> list[dict[str, float]]:
-    """Return the values [SI] for every recording; the same dict object if all parameters are
-    shared.
+    """Return the values [SI] for every recording;
+    the same dict object if all parameters are shared.
     """
     shared, recordings = values_at(candidate, point, 0), range(len(point.per_recording))
     own = [(k, one) for k, one in enumerate(candidate.free_parameters) if one.per_recording]

@@ -234,8 +234,8 @@ def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fracti
 
 
 def _place_kinds(document: Document) -> dict[str, set[str]]:
-    """Return the names in a document to which effects could apply, with the possible kinds of
-    place.
+    """Return the names in a document to which effects could apply,
+    with the possible kinds of place.
     """
     found: dict[str, set[str]] = {}
     for section, kind in PLACE_KIND_BY_SECTION.items():

@@ -82,8 +82,8 @@ def build_model_set(
     series: Sequence[SampledRecording],
     output_names: tuple[str, ...],
 ) -> ModelSet:
-    """Return the model set of a case for sampled recordings, with the shipped effects by
-    default.
+    """Return the model set of a case for sampled recordings,
+    with the shipped effects by default.
     """
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_disturbances(case.document, automaton)

@@ -63,8 +63,8 @@ UNKNOWN_FACTOR = 8.0
 
 @dataclass(frozen=True)
 class DiagnosisDecision:
-    """The result of the selection; `model_set` has the recordings on which the decision is
-    based.
+    """The result of the selection; `model_set` has
+    the recordings on which the decision is based.
     """
 
     model_set: ModelSet

@@ -160,8 +160,8 @@ def _oscillations(selection: Selection, model_set: ModelSet) -> tuple[Oscillatio
 
 
 def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFit]:
-    """Return the candidates of the first round with a gain above `min_gain` [nats], best score
-    first.
+    """Return the candidates of the first round with a gain above `min_gain` [nats],
+    best score first.
     """
     rounds = selection.first_round
     near = [
@@ -238,8 +238,8 @@ def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[Ranked
 
 
 def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffect, ...]:
-    """Return the rivals under their names in a verdict, without the accepted names and
-    repetitions.
+    """Return the rivals under their names in a verdict,
+    without the accepted names and repetitions.
     """
     taken = [_verdict_name(one.placed_effect, automaton) for one in selection.accepted]
     found: dict[tuple[str, str], NamedEffect] = {}

@@ -192,8 +192,8 @@ def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _stuck_interval(
     times: Reals, values: Reals, quantum: float, noise: float
 ) -> tuple[float, float] | None:
-    """Return the longest interval in which a noisy channel keeps one nonzero value; None if
-    short.
+    """Return the longest interval in which a noisy channel keeps one nonzero value;
+    None if short.
     """
     if noise <= 0.5 * quantum or noise <= 0.0:
         return None

@@ -94,8 +94,8 @@ def find_clock_and_sign_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding] | None:
-    """Return findings on wrong clocks and signs, or None if the model cannot be used for the
-    search.
+    """Return findings on wrong clocks and signs,
+    or None if the model cannot be used for the search.
     """
     seen = compared_outputs(mapping, automaton)
     series = [
@@ -272,8 +272,8 @@ def _high_pass(innovations: Reals, period: float) -> Reals:
 
 
 def _finite_gains(before: Reals, after: Reals) -> Reals:
-    """Return the gains (recordings,), -inf where the model diverges with or without the
-    hypothesis.
+    """Return the gains (recordings,), -inf where the
+    model diverges with or without the hypothesis.
     """
     known = np.isfinite(before) & np.isfinite(after)
     found = np.where(known, before, 0.0) - np.where(known, after, 0.0)

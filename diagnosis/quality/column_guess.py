@@ -70,8 +70,8 @@ def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:
-    """Return the first column with a name of time, else the first increasing one; "" with a
-    problem.
+    """Return the first column with a name of time, else the first increasing one;
+    "" with a problem.
     """
     named = [name for name in file.names if TIME_NAME.fullmatch(name)]
     for name in (*named, *file.names):
@@ -86,8 +86,8 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
 
 
 def _is_number(file: RecordedFile, name: str) -> bool:
-    """Return whether more than 20 % of the cells of a column are finite numbers and few are not
-    finite.
+    """Return whether more than 20 % of the cells of a
+    column are finite numbers and few are not finite.
     """
     values = file.read(name).values
     number = sum(value is not None and math.isfinite(value) for value in values)
@@ -96,8 +96,8 @@ def _is_number(file: RecordedFile, name: str) -> bool:
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
-    """Return the mapping of a column: an input if its unit is one of `INPUT_UNITS`, else an
-    output.
+    """Return the mapping of a column: an input if its unit is one of `INPUT_UNITS`,
+    else an output.
     """
     unit = _guess_unit(name, written)
     drives = any(are_compatible(unit.dimension, parse_unit(text).dimension) for text in INPUT_UNITS)

@@ -1,5 +1,5 @@
-"""Excitation: the steps, bands and ranges of recorded signals, and the effects that they
-can show.
+"""Excitation: the steps, bands and ranges of recorded signals,
+and the effects that they can show.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
 
 @dataclass(frozen=True)
 class SignalExcitation:
-    """The excitation of one signal: range [SI], sign changes, step sizes [SI] and bandwidth
-    [Hz].
+    """The excitation of one signal: range [SI], sign changes,
+    step sizes [SI] and bandwidth [Hz].
     """
 
     name: str

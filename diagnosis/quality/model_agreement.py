@@ -98,8 +98,8 @@ def compare_with_simulation(
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
-    """Return the most excited part of a recording of length `max_length` [s]; all of it if
-    shorter.
+    """Return the most excited part of a recording of length `max_length` [s];
+    all of it if shorter.
     """
     if piece.end - piece.start <= max_length:
         return piece
@@ -123,8 +123,8 @@ def _decimate_inputs(piece: Recording) -> Recording:
 
 
 def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
-    """Return the sum over inputs of the spread of their changes relative to that of their
-    values.
+    """Return the sum over inputs of the spread of
+    their changes relative to that of their values.
     """
     total = 0.0
     for channel in piece.channels.values():

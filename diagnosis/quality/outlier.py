@@ -31,8 +31,8 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def drop_huge_values(recording: Recording) -> Recording:
-    """Return a recording without values above `MAX_VALUE`; channels without other values are
-    dropped.
+    """Return a recording without values above `MAX_VALUE`;
+    channels without other values are dropped.
     """
     channels = {}
     for name, channel in recording.channels.items():

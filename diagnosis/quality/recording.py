@@ -193,8 +193,8 @@ def _find_missing_signals(
 
 
 def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns that an automaton reads or compares; all of them without one or without
-    any.
+    """Return the columns that an automaton reads or compares;
+    all of them without one or without any.
     """
     if automaton is None:
         return list(mapping.columns)

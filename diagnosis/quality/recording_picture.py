@@ -37,8 +37,8 @@ COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
 def draw_recordings(recordings: Sequence[Recording], check: RecordingCheck, title: str) -> Picture:
-    """Return the picture of checked recordings: channels on the left, summary right, findings
-    below.
+    """Return the picture of checked recordings:
+    channels on the left, summary right, findings below.
     """
     names = list(dict.fromkeys(one.name for one in check.channels))[:MAX_CHANNELS]
     count = max(1, len(format_findings(check.findings)[:MAX_FINDINGS]))

@@ -1,5 +1,5 @@
-"""Reference model: the automaton with which recordings are checked, simulated under their
-inputs.
+"""Reference model: the automaton with which recordings are checked,
+simulated under their inputs.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
-"""Clock offsets [s] that are an error and a warning; actuators and sensors have lags up to
-0.05 s.
+"""Clock offsets [s] that are an error and a warning;
+actuators and sensors have lags up to 0.05 s.
 """
 SINGLE_RECORDING_MARGIN = 0.1
 """Increase of the correlation from which a lag in a single recording of several is reported."""
@@ -127,8 +127,8 @@ def _is_shared(
     by_recording: Mapping[str, Sequence[Finding]],
     agreements: Sequence[OutputAgreement],
 ) -> bool:
-    """Return whether most of the recordings with a clear agreement of the channel have this
-    finding.
+    """Return whether most of the recordings with a
+    clear agreement of the channel have this finding.
     """
     clear = {r.recording for r in agreements if r.is_clear and r.channel == finding.channel}
     count = sum(_has_similar(findings, finding) for findings in by_recording.values())
@@ -204,8 +204,8 @@ class _AgreementsByChannel:
         ]
 
     def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
-        """Return the channel to report and its name in a sentence: an input if all outputs are
-        affected.
+        """Return the channel to report and its name in a sentence:
+        an input if all outputs are affected.
         """
         if len(channels) == len(self.gains) and self.inputs:
             if len(channels) > 1:
@@ -248,8 +248,8 @@ class _AgreementsByChannel:
         return found
 
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
-        """Return the finding on all outputs: a wrong scale of the input, or a unit that
-        they share.
+        """Return the finding on all outputs: a wrong scale of the input,
+        or a unit that they share.
         """
         size = median(abs(self.gains[name]) for name in outputs)
         if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
@@ -266,8 +266,8 @@ class _AgreementsByChannel:
         return self._scale_finding(channel, subject, 1.0 / size, False)
 
     def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
-        """Return a unit error if a factor of units explains the size, else a warning on the
-        scale.
+        """Return a unit error if a factor of units explains the size,
+        else a warning on the scale.
         """
         dimension = column_dimension(self.mapping.columns[channel])
         share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
@@ -318,8 +318,8 @@ def _varies(recording: Recording, name: str) -> bool:
 def _unit_error_reason(
     size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
 ) -> str:
-    """Return the unit error that explains a ratio of measured to simulated, or "" if there
-    is none.
+    """Return the unit error that explains a ratio of measured to simulated,
+    or "" if there is none.
     """
     near = [
         (abs(math.log(size / factor)), reason)

@@ -217,8 +217,8 @@ SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 
 SVG_IDENTIFIER = re.compile(r'(\bid="|href="#|url\(#)')
-"""Places where an SVG defines or uses an identifier; these must differ between figures of a
-page.
+"""Places where an SVG defines or uses an identifier;
+these must differ between figures of a page.
 """
 
 
@@ -351,8 +351,8 @@ def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> l
 
 
 def embed_svg(figure: ReportFigure, data: bytes) -> str:
-    """Return an SVG as an element of a page, with a label and identifiers that are unique to the
-    figure.
+    """Return an SVG as an element of a page, with a
+    label and identifiers that are unique to the figure.
     """
     label = html.escape(figure.alternative_text, quote=True)
     text = SVG_IDENTIFIER.sub(rf"\g<1>{figure.name}-", METADATA.sub("", data.decode()))

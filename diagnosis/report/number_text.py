@@ -33,8 +33,8 @@ def format_quantity(quantity: Quantity) -> str:
 
 
 def format_significant(value: float, digits: int = 3) -> str:
-    """Return a number with significant digits, without exponent from 1e-4 to 1e6; `-` if not
-    finite.
+    """Return a number with significant digits, without exponent from 1e-4 to 1e6;
+    `-` if not finite.
     """
     if not math.isfinite(value):
         return "-"

@@ -12,15 +12,15 @@ from diagnosis.selection.forward_selection import Selection
 from language.text.document import MappingNode, ScalarNode
 
 MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
-"""Relative bias and standard deviations from which a parameter is biased, and how many are
-named.
+"""Relative bias and standard deviations from which a parameter is biased,
+and how many are named.
 """
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A parameter with its values as texts, its change from the declared value, and its
-    description.
+    """A parameter with its values as texts, its change from the declared value,
+    and its description.
     """
 
     name: str
@@ -34,8 +34,8 @@ class ParameterRow:
 
 
 def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return a row for each parameter of the final model: declared, recalibrated and final
-    value.
+    """Return a row for each parameter of the final model:
+    declared, recalibrated and final value.
     """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {

@@ -92,8 +92,8 @@ def format_rounded(value: float) -> str:
 
 
 def format_improvement(report: DiagnosisReport) -> str:
-    """Return the misfits of free simulation and the confirmation in one sentence; ""
-    without a fit.
+    """Return the misfits of free simulation and the confirmation in one sentence;
+    "" without a fit.
     """
     fit = report.verdict.fit
     parts = [
@@ -223,8 +223,8 @@ def summary_lines(report: DiagnosisReport) -> list[str]:
 
 
 def _format_caveat(report: DiagnosisReport) -> str:
-    """Return the worst finding on recordings, or effects that are nearly as good; ""
-    without any.
+    """Return the worst finding on recordings, or effects that are nearly as good;
+    "" without any.
     """
     worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
     if worst:

@@ -23,8 +23,8 @@ def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
 
 
 def withdraw_nothing_missing(verdict: Verdict, unfollowed: Sequence[str]) -> Verdict:
-    """Return the verdict, with `nothing_missing` changed to `unknown` if signals are not
-    followed.
+    """Return the verdict, with `nothing_missing`
+    changed to `unknown` if signals are not followed.
     """
     if unfollowed and verdict.verdict == "nothing_missing":
         return dataclasses.replace(verdict, verdict="unknown")

@@ -53,8 +53,8 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
-    """Return comments on effects that must be copied into the project before the variant is
-    read.
+    """Return comments on effects that must be copied
+    into the project before the variant is read.
     """
     names = [effect.body.span.source.name for effect in missing_effects(report)]
     return [

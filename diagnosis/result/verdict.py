@@ -27,8 +27,8 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """A candidate with its probability and its penalised gain [nats], with standard deviation
-    `std`.
+    """A candidate with its probability and its penalised gain [nats],
+    with standard deviation `std`.
     """
 
     id: str

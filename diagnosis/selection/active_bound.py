@@ -22,8 +22,8 @@ MIN_CORRELATION = 0.2
 
 
 def active_bound_locations(model: Estimate, automaton: Automaton) -> frozenset[str]:
-    """Return the balances with parameters at a bound that act there alone, and the inputs
-    of these.
+    """Return the balances with parameters at a bound that act there alone,
+    and the inputs of these.
     """
     where = _single_balances(automaton)
     ends = {where[name] for name in _active_bounds(model) if name in where}

@@ -42,8 +42,8 @@ def eliminate_backward(
     thresholds: Thresholds,
     log: LogCallback,
 ) -> AcceptedEffects:
-    """Return the effects without unnecessary ones, and with the most valuable one at a
-    place first.
+    """Return the effects without unnecessary ones,
+    and with the most valuable one at a place first.
     """
     for tried in accepted.effects[:-1]:
         without = _fit_without(model_set, accepted, tried, units)
@@ -115,8 +115,8 @@ def _reassign_gain(
 def update_first_round(
     first: Sequence[CandidateFit], before: Sequence[CandidateFit], retained: Sequence[CandidateFit]
 ) -> list[CandidateFit]:
-    """Return the first round: removed effects are not fitted, the first retained one has its new
-    gain.
+    """Return the first round: removed effects are not fitted,
+    the first retained one has its new gain.
     """
     out = {t.placed_effect.id for t in before} - {t.placed_effect.id for t in retained}
     left = [

@@ -54,8 +54,8 @@ GroupGains = Mapping[str, float]
 
 
 def threshold_key(model_set: ModelSet, full_rate_series: Sequence[SampledRecording]) -> str:
-    """Return the cache key of thresholds: code, spec, effects, outputs, rate and rounded total
-    length.
+    """Return the cache key of thresholds: code, spec, effects, outputs,
+    rate and rounded total length.
     """
     length = sum(float(one.period) * one.count for one in full_rate_series)
     effects = [f"{one.name} {node_text(one.body)}" for one in model_set.effects]
@@ -83,8 +83,8 @@ def round_to_preferred(value: float) -> float:
 def cached_thresholds(
     model_set: ModelSet, full_rate_series: Sequence[SampledRecording]
 ) -> Thresholds | None:
-    """Return the thresholds of an earlier bootstrap from the user's cache, None without a complete
-    one.
+    """Return the thresholds of an earlier bootstrap from the user's cache,
+    None without a complete one.
     """
     found = _read_replicates(_replicates_file(threshold_key(model_set, full_rate_series)))
     return thresholds_of(found[:REPLICATES]) if len(found) >= REPLICATES else None

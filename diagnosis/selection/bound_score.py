@@ -45,8 +45,8 @@ def bound_score(model: Estimate, accepted: Sequence[CandidateFit]) -> float:
 
 
 def prefer_interior(best: CandidateFit, candidate_fits: Sequence[CandidateFit]) -> CandidateFit:
-    """Return the best candidate, or one at its place that is at no bound and gains nearly
-    as much.
+    """Return the best candidate, or one at its place
+    that is at no bound and gains nearly as much.
     """
     if best.likelihood_gain is None or not is_at_bound(best.estimate, best.placed_effect):
         return best

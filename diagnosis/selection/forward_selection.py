@@ -222,8 +222,8 @@ def _strains_bounds(
     accepted: Sequence[CandidateFit],
     model: Estimate,
 ) -> bool:
-    """Tell whether effects are pulled out of their ranges by the last of them: it imitates, the
-    others did not.
+    """Tell whether effects are pulled out of their ranges by the last of them:
+    it imitates, the others did not.
     """
     return rejects_bounds(model_with_effects, effects) and not rejects_bounds(model, accepted)
 

@@ -64,8 +64,8 @@ def restricted_candidates(
 def promote_restricted(
     first: CandidateFit, candidate_fits: Sequence[CandidateFit]
 ) -> tuple[CandidateFit, list[CandidateFit]]:
-    """Return a candidate with a lead over others at its place, and all candidates, best score
-    first.
+    """Return a candidate with a lead over others at its place, and all candidates,
+    best score first.
     """
     path = place_path(first.placed_effect)
     others = [t for t in candidate_fits if t.placed_effect.id != first.placed_effect.id]
@@ -78,8 +78,8 @@ def promote_restricted(
 def accepts_restriction(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> bool:
-    """Return whether recordings do not reject a restricted value of an effect's parameter (Wald
-    test).
+    """Return whether recordings do not reject a
+    restricted value of an effect's parameter (Wald test).
     """
     if model.normal_equations is None:
         return False
@@ -94,8 +94,8 @@ def accepts_restriction(
 
 
 def has_restricted_form(placed_effect: PlacedEffect) -> bool:
-    """Return whether an effect declares a `plain` value of a parameter, at which it is a simpler
-    one.
+    """Return whether an effect declares a `plain` value of a parameter,
+    at which it is a simpler one.
     """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()

@@ -52,8 +52,8 @@ One = TypeVar("One")
 
 @dataclass(frozen=True)
 class ScreeningResult:
-    """The screening gain [nats] of a candidate, and its estimate; None if not screened on all
-    recordings.
+    """The screening gain [nats] of a candidate, and its estimate;
+    None if not screened on all recordings.
     """
 
     placed_effect: PlacedEffect
@@ -298,8 +298,8 @@ def _continue_screening(subset: ScreeningSubset, screened: Estimate) -> Estimate
 
 
 def start_values(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the starts of a candidate's fit: values of the parameters that the base does
-    not have.
+    """Return the starts of a candidate's fit:
+    values of the parameters that the base does not have.
     """
     own = [one for one in candidate.free_parameters if one.name not in base]
     most = max((len(one.starts) for one in own if not one.per_recording), default=1)

@@ -72,8 +72,8 @@ def disturbance_gain(
     disturbances: Sequence[PlacedEffect],
     fixed_places: Collection[str] = (),
 ) -> float:
-    """Return the gain [nats] of free disturbances, except at `fixed_places`; -inf if not
-    compilable.
+    """Return the gain [nats] of free disturbances, except at `fixed_places`;
+    -inf if not compilable.
     """
     try:
         candidate = model_set.compile_candidate(model.candidate.placed_effects, disturbances)

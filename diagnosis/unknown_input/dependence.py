@@ -47,8 +47,8 @@ def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[
 def standstill_dependence(
     series: Sequence[SampledRecording], disturbances: Sequence[Reals]
 ) -> float:
-    """Return the largest correlation of a disturbance's amplitude with an output near
-    standstill.
+    """Return the largest correlation of a disturbance's
+    amplitude with an output near standstill.
     """
     most = 0.0
     for column in range(series[0].measured.shape[1]):

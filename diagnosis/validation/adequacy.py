@@ -95,8 +95,8 @@ def free_disturbance_gain(model_set: ModelSet, selection: Selection) -> float:
 def _disturbance_gain(
     model_set: ModelSet, selection: Selection, disturbances: Sequence[PlacedEffect]
 ) -> float:
-    """Return the effective gain [nats] of some free disturbances; -inf if they cannot be
-    combined.
+    """Return the effective gain [nats] of some free disturbances;
+    -inf if they cannot be combined.
     """
     held = {
         tried.placed_effect.place

@@ -39,8 +39,8 @@ def compare_misfits(
 
 
 def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the root mean square error of free simulation over the standard deviation
-    (outputs,).
+    """Return the root mean square error of free
+    simulation over the standard deviation (outputs,).
     """
     squares, counts = [], []
     for one, simulated in zip(series, simulate_free(model, series), strict=True):
@@ -60,8 +60,8 @@ def output_stds(series: Sequence[SampledRecording]) -> Reals:
 
 
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
-    """Return the outputs of a model for each recording (samples, outputs), observed and free in
-    turn.
+    """Return the outputs of a model for each recording (samples, outputs),
+    observed and free in turn.
     """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))

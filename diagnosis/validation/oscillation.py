@@ -58,8 +58,8 @@ class Cycles:
         return float(np.mean(late)) if len(late) else float("nan")
 
     def frequency_trend(self) -> float:
-        """Return the relative frequency of small cycles over large ones, minus 1; NaN
-        without both.
+        """Return the relative frequency of small cycles over large ones, minus 1;
+        NaN without both.
         """
         part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
         large, little = (
@@ -71,8 +71,8 @@ class Cycles:
         return float(np.mean(little) / np.mean(large) - 1.0)
 
     def damping_ratio(self) -> float:
-        """Return the damping ratio from the logarithmic decrement; NaN for fewer than three
-        cycles.
+        """Return the damping ratio from the logarithmic decrement;
+        NaN for fewer than three cycles.
         """
         if len(self.amplitudes) < 3:
             return float("nan")
@@ -121,8 +121,8 @@ class Oscillation:
         return text + self._format_trend() + self._format_damping()
 
     def _format_trend(self) -> str:
-        """Return the trend of frequency with amplitude, recorded and simulated; "" if they
-        agree.
+        """Return the trend of frequency with amplitude, recorded and simulated;
+        "" if they agree.
         """
         more = [one.frequency_trend() for one in (self.recorded, self.simulated)]
         if not all(np.isfinite(more)) or abs(more[0] - more[1]) < FREQUENCY_TOLERANCE:

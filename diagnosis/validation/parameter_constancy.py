@@ -58,8 +58,8 @@ def rejects_constancy(
 
 
 def is_lag_or_delay(placed_effect: PlacedEffect) -> bool:
-    """Return whether an effect has a parameter that is a time and whose neutral value is
-    `absent`.
+    """Return whether an effect has a parameter that
+    is a time and whose neutral value is `absent`.
     """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
@@ -149,8 +149,8 @@ class _RecordingStep:
         return np.clip(self.start + part * self.step, low, high)
 
     def values(self, model: Estimate, z: Reals) -> dict[str, float]:
-        """Return the values [SI] of the recording with the effect's parameters at
-        coordinates `z`.
+        """Return the values [SI] of the recording with
+        the effect's parameters at coordinates `z`.
         """
         known = [model.candidate.free_parameters[k] for k in self.indices]
         own = {one.name: one.value(float(at)) for one, at in zip(known, z, strict=True)}
@@ -187,8 +187,8 @@ def _recording_steps(
 
 
 def _recording_costs(model: Estimate, prediction: PredictionResult) -> Reals:
-    """Return half the normalised squares of each recording (recordings,), infinite if it
-    diverges.
+    """Return half the normalised squares of each recording (recordings,),
+    infinite if it diverges.
     """
     costs = 0.5 * np.sum(prediction.runs.squared_sums / model.prediction.variances, axis=1)
     return np.where(prediction.runs.completed == np.diff(prediction.runs.starts), costs, np.inf)

@@ -46,7 +46,7 @@ def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(
     assert format_separation(doubtful) == [f"{named}: passage through zero speed"]
     page = re.sub(r"<[^>]+>", " ", report_files(doubtful, "")["report.html"].decode())
     assert "These recordings cannot tell apart: coulomb friction" in page
-    assert "best, but not told from others" in page
+    assert "best, but not separated from others" in page
     assert "confirmed on" not in page and "better on held-out recordings" in page
 
 
