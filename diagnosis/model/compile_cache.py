@@ -27,6 +27,9 @@ from codegen.toolchain.build_cache import cache_subfolder
 from diagnosis.model.parameter import FreeParameter
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 
+FORMAT = "modewright-candidate/1"
+"""Format and schema version of the metadata of a compiled candidate."""
+
 COMPILATION_MODULES = (
     "candidate",
     "compile_cache",
@@ -88,11 +91,13 @@ def load_or_compile(
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
     with suppress(OSError, ValueError, TypeError, KeyError):
         metadata = json.loads(recipe_path.read_text())
+        metadata.pop("format", None)
         if hashlib.sha256(library.read_bytes()).hexdigest() == metadata.pop("library"):
             return _from_json(metadata), library
     recipe, data = compile_model()
     library_digest = hashlib.sha256(data).hexdigest()
-    text = json.dumps({**dataclasses.asdict(recipe), "library": library_digest})
+    entries = {**dataclasses.asdict(recipe), "library": library_digest}
+    text = json.dumps({"format": FORMAT, **entries})
     write_atomically(library, data)
     write_atomically(recipe_path, text.encode())
     return recipe, library

@@ -45,6 +45,9 @@ MAX_THRESHOLD = 300.0
 SCALE_QUANTILE = 0.9
 MIN_SCALE = 2.0
 """The least that an effect gains so often [nats]; what is below it is not told from nothing."""
+FORMAT = "modewright-replicates/1"
+"""Format and schema version of the file of bootstrap replicates."""
+
 SEED = 5
 PREFERRED_NUMBERS = (1.0, 2.0, 5.0)
 """Rates and lengths are rounded to these, and their tenfold."""
@@ -121,7 +124,8 @@ def bootstrap_thresholds(
         known.append({} if made is None else accidental_gains(model_set, base, units, made))
         if file is not None:
             with suppress(OSError):
-                write_atomically(file, json.dumps(known).encode())
+                entries = {"format": FORMAT, "replicates": known}
+                write_atomically(file, json.dumps(entries).encode())
         log(f"bootstrap {number + 1} of {REPLICATES}: {_format_best(known[-1])}")
     return thresholds_of(known[:REPLICATES])
 
@@ -216,8 +220,9 @@ def _replicates_file(key: str) -> Path | None:
 
 
 def _read_replicates(file: Path | None) -> list[GroupGains]:
-    with suppress(OSError, ValueError, TypeError, AttributeError):
+    with suppress(OSError, ValueError, TypeError, AttributeError, KeyError):
         if file is not None:
             known = json.loads(file.read_text())
-            return [{str(k): float(v) for k, v in gains.items()} for gains in known]
+            replicates = known["replicates"] if isinstance(known, dict) else known
+            return [{str(k): float(v) for k, v in gains.items()} for gains in replicates]
     return []

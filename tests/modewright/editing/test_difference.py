@@ -214,7 +214,7 @@ instances: {x: {of: z}, y: {of: z}}
         (
             "e: {from: input}, f: {from: input}",
             "f: {from: input}, e: {from: input}",
-            ["events | order | e, f | f, e | what comes at once is heard in another order"],
+            ["events | order | e, f | f, e | simultaneous events are processed in another order"],
         ),
         (
             "{left: {}, right: {}}",
@@ -237,7 +237,7 @@ instances: {x: {of: z}, y: {of: z}}
         (
             "x: {of: z}, y: {of: z}",
             "y: {of: z}, x: {of: z}",
-            ["instances | order | x, y | y, x | what is done at once is done in another order"],
+            ["instances | order | x, y | y, x | simultaneous actions are executed in another order"],
         ),
         ("right: {}", "right: {}, new: {}", ["faults | new |  |  | "]),
         ("e: {from: input}, f", "g: {}, e: {from: input}, f", ["events | g |  |  | "]),
