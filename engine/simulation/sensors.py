@@ -55,7 +55,8 @@ class FirstOrderLag:
     def evaluate(self, time: Fraction, value: float) -> float:
         """Return the output at a time [s] for a value of the input there; the lag is not advanced.
 
-        A time that is not after the last one gives the present output.
+        Without a lag this is the value. A time that is not after the last one gives the present
+        output.
         """
         if self._lag == 0.0:
             return value

@@ -285,7 +285,10 @@ class _Simulation:
         self._require_finite(name, time)
 
     def _report_range_violations(self, name: str, time: Fraction) -> None:
-        """Record an event for each signal at its first saturation in the run (rule 18)."""
+        """Accumulate the fault bits and record an event for each newly saturated signal (rule 18).
+
+        A signal is reported once in a run, with its time and mode.
+        """
         stepper, program = self.steppers[name], self.programs[name]
         self.fault_words[name] = self.fault_words.get(name, 0) | stepper.get("memory.faults")
         for signal in stepper.pop_range_violations():

@@ -25,7 +25,6 @@ EQUALITY_TOLERANCE = 1.0e-9
 """Relative tolerance of equalities: z3 solves them exactly, and the solution is rounded."""
 SECANT_STEP = 1.0e-3
 """Relative distance from the equilibrium at which resets are evaluated for a secant."""
-NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 """Relation that holds where the relation of the key does not."""
 
 

@@ -138,9 +138,10 @@ class QueryEngine:
         return wider is None or _is_proven_unsatisfiable(QueryKey(wider.key, wider))
 
     def find_confirmed_witness(self, exact: SolverQuery, near: SolverQuery) -> Witness | None:
-        """Return a solution of `exact` by z3 at which `near` holds; None if there is none.
+        """Return a solution of the first query by z3 that satisfies the second one, else None.
 
-        `near` is `exact` with equalities relaxed to a tolerance, because the solution is rounded.
+        The second query is the first with equalities relaxed to a tolerance, because solutions are
+        rounded. The result is None, too, once `MAX_SOLVER_QUERIES` is exceeded.
         """
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or narrow_domains(exact) is None:
