@@ -78,8 +78,9 @@ class ConditionReader:
         self.literals = _enumeration_literals(self.kinds)
 
     def read_condition(self, scalar: ScalarNode, formula: Formula) -> Condition | None:
-        """Return the condition of an expression that is true or false; None if a problem was
-        reported.
+        """Return the condition of an expression that is true or false.
+
+        Return None if a problem was reported.
         """
         return self._read(scalar.text, formula.tree, formula.key, truth=True)
 
@@ -118,8 +119,10 @@ class ConditionReader:
         )
 
     def full_name(self, name: str) -> str:
-        """Return the full name of a signal: a single instance needs no prefix, an output has a
-        source.
+        """Return the full name of a signal.
+
+        A signal of a single instance gets its prefix; an output that is a mode signal is replaced
+        by its source.
         """
         alone = self.system.sole_instance
         if alone and "." not in name and f"{alone}.{name}" in {**self.kinds, **self.regions}:
@@ -133,8 +136,9 @@ class ConditionReader:
 
 
 class _NameResolver:
-    """Resolver of the names in one expression; its attributes collect what the expression refers
-    to.
+    """Resolver of the names in one expression.
+
+    Its attributes collect the signals, mode predicates, fault bits and running statistics.
     """
 
     def __init__(self, reader: ConditionReader) -> None:
@@ -175,8 +179,9 @@ class _NameResolver:
         return self.reader.regions.get(self.reader.full_name(tree.path))
 
     def _resolve_mode_comparison(self, region_ref: RegionRef, tree: SyntaxTree) -> SyntaxTree:
-        """Return the name of the predicate `region.mode == mode`; an error node if the mode is
-        unknown.
+        """Return the name of the predicate `region.mode == mode`.
+
+        Return an error node if the mode is unknown.
         """
         instance, region = region_ref
         if isinstance(tree, Name):
@@ -277,8 +282,9 @@ class _NameResolver:
         return Fraction(0)
 
     def _resolve_signal(self, tree: Name) -> SyntaxTree:
-        """Return a name node with the full name of a signal; an error node for unknown names and
-        modes.
+        """Return a name node with the full name of a signal.
+
+        Return an error node for unknown names and for modes.
         """
         name = self.reader.full_name(tree.path)
         if name in self.reader.kinds:

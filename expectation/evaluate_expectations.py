@@ -94,8 +94,9 @@ class _ExpectationEvaluator:
         ]
 
     def _window(self, when: TimeConstraint) -> tuple[float, float]:
-        """Return start and end [s] of the constraint `from` and `until`; by default the whole
-        run.
+        """Return start and end [s] of the constraint `from` and `until`.
+
+        By default this is the whole run.
         """
         low = 0.0 if when.since is None else float(when.since)
         high = self.seen.end if when.until is None else float(when.until)
@@ -111,8 +112,10 @@ class _ExpectationEvaluator:
     # Conditions.
 
     def _evaluate_that(self, truths: TruthSeries, when: TimeConstraint) -> Outcome:
-        """Return the outcome of `that`: at a time, near a time, before a time or after a
-        trigger.
+        """Return the outcome of `that`.
+
+        The condition must hold at a time, become true near a time, hold once before a time, or hold
+        once after each trigger.
         """
         if when.at is not None and when.within is None:
             return self._check_at(truths, float(when.at))
@@ -155,8 +158,9 @@ class _ExpectationEvaluator:
         return self._fail(text, at if nearest is None else nearest)
 
     def _check_eventually(self, truths: TruthSeries, spans: TimeSpans, text: str) -> Outcome:
-        """Return whether the condition is true at a point in each interval; fails at the first
-        without.
+        """Return whether the condition is true at a point in each interval.
+
+        The outcome fails at the first interval without such a point.
         """
         first = None
         for low, high in spans:
@@ -218,8 +222,10 @@ class _ExpectationEvaluator:
     # Events and modes.
 
     def _evaluate_event(self, when: TimeConstraint) -> Outcome:
-        """Return the outcome of `event`: near a time, before a time, after a trigger, or its
-        count.
+        """Return the outcome of `event`.
+
+        The event must occur near a time, before a time, after each trigger, or as often as expected
+        in the window.
         """
         subject = self.expectation.subject
         assert isinstance(subject, ModeEntryEvent)
@@ -299,8 +305,9 @@ class _ExpectationEvaluator:
         return Outcome(self.expectation.name, True, "", time)
 
     def _fail(self, text: str, time: float | None = None, point: int | None = None) -> Outcome:
-        """Return a failed outcome with modes and signals at a point (default: the last one before
-        `time`).
+        """Return a failed outcome with modes and signals at a point.
+
+        By default this is the last point that is not later than `time`.
         """
         if point is None and time is not None:
             point = point_at_or_before(self.seen, time)
@@ -320,8 +327,9 @@ class _ExpectationEvaluator:
         return self._fail(f"`{when.after_text}` never happened")
 
     def _signal_values(self, point: int) -> dict[str, Any]:
-        """Return the signals of the conditions in the last row at or before a point; empty without
-        rows.
+        """Return the signals of the conditions in the last row at or before a point.
+
+        The result is empty without rows.
         """
         rows = [p.row for p in self.seen.points[: point + 1] if p.row >= 0]
         if not rows:

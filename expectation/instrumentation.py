@@ -131,8 +131,9 @@ class _ProbeInserter:
         yield op
 
     def _store_combination(self, key: str, guard: Expr) -> Iterator[Op]:
-        """Yield a store of the combination of a guard's conditions; nothing if the guard has no
-        match.
+        """Yield a store of the combination of a guard's conditions.
+
+        Yield nothing if the decision is not recorded or its structure does not match.
         """
         decision = self._by_key.get(key)
         parts = match_conditions(decision.structure, guard) if decision else None

@@ -99,8 +99,9 @@ def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
 
 
 def fault_words(system: System) -> dict[str, str]:
-    """Return the instances by fault-word signal; signals of instances before outputs of the
-    system.
+    """Return the instances by the signals that hold their fault words.
+
+    Signals of instances come before outputs of the system.
     """
     found = {
         f"{name}.{output}": name
@@ -133,8 +134,9 @@ def require_mode_output(system: System, instance: str, at: Span, problems: Probl
 
 
 def suggest_output(system: System, name: str) -> str:
-    """Return the hint to make an internal variable of an instance an output; empty if it has
-    none.
+    """Return the hint to make an internal variable of an instance an output.
+
+    The result is empty if it has none.
     """
     head, _, own = name.rpartition(".")
     instance = system.instances.get(head or system.sole_instance or "")

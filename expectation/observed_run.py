@@ -224,8 +224,9 @@ def time_tolerance(time: float) -> float:
 
 
 def _evaluate_running(running: RunningStatistic, run: ObservedRun) -> list[Any]:
-    """Return the value of a running statistic at each point; between known values it is
-    constant.
+    """Return the value of a running statistic at each point.
+
+    Between the points where its operand is known the value is constant.
     """
     found: list[Any] = [0 if running.function == "count" else math.nan] * len(run.points)
     if isinstance(running.operand, tuple):

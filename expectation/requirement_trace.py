@@ -45,8 +45,9 @@ class Verification:
 
 @dataclass(frozen=True)
 class TracedRequirement:
-    """A requirement with its implementations and verifications; `text` is from a list of
-    requirements.
+    """A requirement with its implementations and verifications.
+
+    `text` is from a list of requirements.
     """
 
     name: str
@@ -149,8 +150,9 @@ def _citing_lines(
 
 
 def _cited_paths(document: Document, path: str) -> list[str]:
-    """Return the paths that C cites for a path; one in a template gives one for each mode that uses
-    it.
+    """Return the paths that C cites for a path.
+
+    A path in a template gives one path for each mode that uses the template.
     """
     head, _, rest = path.partition(".")
     if head != "templates":

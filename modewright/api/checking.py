@@ -26,8 +26,9 @@ from sweep.definition.study_reader import read_study
 
 @dataclass(frozen=True)
 class CheckResult:
-    """The problems of a spec including warnings; `limits` are lines about the step of an
-    automaton.
+    """The problems of a spec including warnings.
+
+    `limits` are lines about the step of an automaton.
     """
 
     problems: tuple[Problem, ...]
@@ -35,8 +36,9 @@ class CheckResult:
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec including warnings; an empty list means that the spec is
-    valid.
+    """Return all problems of a spec including warnings.
+
+    An empty list means that the spec is valid.
     """
     return list(check_spec(reference, root).problems)
 

@@ -244,8 +244,9 @@ def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
 
 
 def base_of(dossier: DiagnosisReport, spec: str, folder: Path) -> str:
-    """Return how a variant in a folder refers to its base: by name, or by path if that is
-    ambiguous.
+    """Return how a variant in a folder refers to its base.
+
+    This is the name of the base, or its relative path if the name is ambiguous.
     """
     project = dossier.case.project
     path = project.path_of(spec)

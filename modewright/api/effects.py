@@ -24,8 +24,9 @@ PREFIX_LENGTH = 4
 
 
 def list_effects(at: str | None = None, root: Path | None = None) -> list[EffectDescription]:
-    """Return all effects of the project and of the library; with a spec `at`, also their places in
-    it.
+    """Return all effects of the project and of the library.
+
+    With a spec `at` each has the places where it fits. Raises SpecError.
     """
     project = Project(root or Path())
     document = _load_base(at, project) if at else None

@@ -38,10 +38,10 @@ Values = Mapping[str, str]
 
 
 def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
-    """Return the text of a spec after a pass: `document`, `model`, one of PASSES, ... Raises
-    SpecError.
+    """Return the text of a spec after a pass. Raises SpecError.
 
-    A calibration has its own text for all passes but `document`.
+    The passes are `document`, `model`, `lowered`, those of PASSES, and `numbers`. A calibration has
+    its own text for all passes but `document`.
     """
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
@@ -66,8 +66,9 @@ def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None =
 
 
 def _calibration_text(document: Document, project: Project) -> str:
-    """Return one line for each value of a calibration: fixed or tunable, standard deviation,
-    origin.
+    """Return one line for each value of a calibration.
+
+    A line contains the value, `fixed` or `tunable`, the standard deviation, origin and date.
     """
     problems = Problems()
     calibration = read_calibration(document, problems)
@@ -109,8 +110,9 @@ def compare_specs(
 
 
 def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
-    """Return the values of an expanded spec with their places, as a dict for JSON. Raises
-    SpecError.
+    """Return the values of an expanded spec with their places, as a dict for JSON.
+
+    Raises SpecError.
     """
     document = _load_expanded(spec, Project(root or Path()))
     found = [_row_json(row) for row in provenance_entries(document.root)]

@@ -61,11 +61,11 @@ def check_recordings(
     databases: Sequence[str] = (),
     root: Path | None = None,
 ) -> CheckedRecordings:
-    """Check rates, gaps, noise and excitation of recordings; with a spec also units, signs and
-    clocks.
+    """Check rates, gaps, noise and excitation of recordings.
 
-    The map defaults to that of the spec; without a spec columns are guessed by name. Raises
-    SpecError, MissingToolError, and ValueError if a file occurs twice.
+    With a spec units, signs and clocks are checked, too. The map defaults to that of the spec;
+    without a spec columns are guessed by name. Raises SpecError, MissingToolError, and ValueError
+    if a file occurs twice.
     """
     project = Project(root or Path())
     automaton = _load_automaton(spec, project) if spec else None

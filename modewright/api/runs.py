@@ -75,11 +75,11 @@ def compare(
     signals: Sequence[str] = (),
     span: tuple[float, float] | None = None,
 ) -> RunDifference:
-    """Compare two runs signal by signal; `is_within` of the result states whether all are within
-    tolerance.
+    """Compare two runs signal by signal.
 
-    A signal may differ by `relative` times its peak, or by its entry in `tolerances` (patterns of
-    names, values in SI). Modes may disagree for `slack` [s]. Raises ValueError and SpecError.
+    `is_within` of the result states whether all are within tolerance. A signal may differ by
+    `relative` times its peak, or by its entry in `tolerances` (patterns of names, values in SI).
+    Modes may disagree for `slack` [s]. Raises ValueError and SpecError.
     """
     return compare_runs(
         read(a), read(b),

@@ -55,8 +55,9 @@ class Loaded:
 
 @dataclass(frozen=True)
 class Replayed:
-    """A replay with its lock-step verdict, None without C; `left_out` are unused columns of the
-    map.
+    """A replay with its lock-step verdict, None without C.
+
+    `left_out` are unused columns of the map.
     """
 
     result: Replay

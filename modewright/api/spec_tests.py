@@ -86,8 +86,9 @@ def run_tests(
 
 
 def run_test(test: Test, *, compiled: bool = True) -> TestRun:
-    """Return the result of a test on the engine and, if `compiled`, in C. Raises
-    MissingToolError.
+    """Return the result of a test on the engine and, if `compiled`, in C.
+
+    Raises MissingToolError.
     """
     start = time.perf_counter()
     trajectory = simulate(test.system, test.scenario)

@@ -90,8 +90,9 @@ def _shade_mode(mode: ModeBox, entered: set[ModePath]) -> ModeBox:
 
 
 def _shade_arrow(arrow: Arrow, coverage: Coverage, decisions: dict[ModePath, Decision]) -> Arrow:
-    """Return a transition shaded as missed, partly or fully covered; conditions that are not
-    covered are added.
+    """Return a transition shaded as missed, partly or fully covered.
+
+    Conditions that are not covered are added.
     """
     decision = decisions.get((*arrow.source, arrow.name))
     if decision is None:

@@ -16,8 +16,9 @@ KIND_MARKS = {"history": "(H) "}
 
 
 def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...]) -> str:
-    """Return regions as Mermaid text; a transition appears in the region that contains both
-    ends.
+    """Return regions as Mermaid text.
+
+    A transition appears in the region that contains both ends.
     """
     lines = ["stateDiagram-v2", "    direction LR"]
     if len(regions) == 1:

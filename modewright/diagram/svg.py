@@ -153,8 +153,9 @@ def _draw_arrows(
 def _draw_mode(
     mode: ModeBox, loops: Sequence[Arrow], arrows: Sequence[Arrow], colour_index: int
 ) -> _Drawing:
-    """Return a mode with its name, lines and inner regions; internal transitions are above the
-    box.
+    """Return a mode with its name, lines and inner regions.
+
+    Its internal transitions are drawn above the box.
     """
     inner = _draw_regions(mode.regions, arrows) if mode.regions else _Drawing((0.0, 0.0), ())
     longest = max(

@@ -71,8 +71,9 @@ def _line_shifts(tokenised: TokenisedText) -> dict[int, int]:
 
 
 def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]) -> int:
-    """Return the shift of a comment line: that of the next line, or of the previous one if indented
-    more.
+    """Return the shift of a comment line.
+
+    It is the shift of the next line, or of the previous one if the comment is indented more.
     """
     below = next(
         (k for k in range(number + 1, len(tokenised.lines)) if tokenised.lines[k].strip()), None

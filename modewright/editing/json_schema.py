@@ -44,8 +44,9 @@ JsonSchema = dict[str, Any]
 
 
 def json_schema(kind: str | None = None) -> JsonSchema:
-    """Return the JSON Schema of one kind of file, or of all. Raises ValueError for unknown
-    kinds.
+    """Return the JSON Schema of one kind of file, or of all.
+
+    Raises ValueError for unknown kinds.
     """
     if kind is not None and kind not in DOCUMENT_KINDS:
         raise ValueError(f"`{kind}` is not one of {', '.join(DOCUMENT_KINDS)}")

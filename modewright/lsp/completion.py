@@ -122,10 +122,10 @@ def _root_items() -> list[Item]:
 def _insert_mark(
     path: Path, text: str, position: types.Position, encoding: str
 ) -> tuple[Document, str] | None:
-    """Return the document with a mark in place of the word, and the text before it; None on
-    failure.
+    """Return the document with a mark in place of the word, and the text before it.
 
-    Incomplete text is seldom valid YAML, so missing colons and brackets are tried.
+    Return None on failure. Incomplete text is seldom valid YAML, so missing colons and brackets are
+    tried.
     """
     lines = [*(text.splitlines() or [""]), ""]
     at, line, start, column = _word_at(text, position, encoding)
@@ -212,8 +212,9 @@ def _key_items(symbols: SymbolTable, place: Place) -> Iterator[Item]:
 
 
 def _free_key_items(symbols: SymbolTable, place: Place, present: set[str]) -> Iterator[Item]:
-    """Yield the existing names that may be keys of a mapping: targets, states, assigned
-    variables.
+    """Yield the existing names that may be keys of a mapping.
+
+    By section these are targets, states, assigned variables or inputs of instances.
     """
     section = place.section
     if section == "transitions":

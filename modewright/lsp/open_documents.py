@@ -60,8 +60,10 @@ class OpenDocuments:
         return self.workspaces[root], path
 
     def update(self, uri: str, version: int | None, text: str | None) -> None:
-        """Store a new text (None: closed) and schedule checks, of this file first and then of the
-        others.
+        """Store the new text of a file and schedule checks.
+
+        The file is checked first, then the other open files of its project. None as text closes the
+        file.
         """
         workspace, path = self.workspace_of(uri)
         workspace.set_text(path, None if text is None else _replace_surrogates(text))

@@ -40,8 +40,9 @@ class Reference:
 
     @property
     def is_declaration(self) -> bool:
-        """Whether this declares the symbol; an equation is declared in each mode that defines
-        it.
+        """Whether this declares the symbol.
+
+        An equation is declared in each mode that defines it.
         """
         is_equation = self.is_key and self.path[-2:-1] == ("equations",)
         return self.span == self.symbol.span or (is_equation and self.is_in_declaring_file)

@@ -103,8 +103,9 @@ class Workspace:
 
 
 def project_root_of(path: Path) -> Path:
-    """Return the folder of a file's project: the one that contains `spec/`, else the file's
-    folder.
+    """Return the folder of the project of a file.
+
+    It is the outermost folder that contains the file below `spec/`, else the folder of the file.
     """
     above = [folder.parent for folder in path.resolve().parents if folder.name == "spec"]
     return above[-1] if above else path.resolve().parent

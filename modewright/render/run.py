@@ -47,8 +47,9 @@ def events_table(events: Sequence[Event]) -> Table:
 
 
 def _select_events(events: Sequence[Event]) -> set[int]:
-    """Return the indices of the printed events: the first and last ones, and all but
-    transitions.
+    """Return the indices of the events to print.
+
+    Of more than MAX_EVENTS these are the first and the last ones, and all that are no transitions.
     """
     numbers = range(len(events))
     if len(events) <= MAX_EVENTS:

@@ -179,8 +179,9 @@ def _failed_context(table: StudyTable) -> dict[str, Any]:
 
 
 def _variant_rows(table: StudyTable, places: Sequence[int], last: Sequence[str]) -> list[list[str]]:
-    """Return the cells of variants: number, variant, scenario, variables, and the `last`
-    columns.
+    """Return the cells of the variants at the given rows.
+
+    The columns are number, variant, scenario, the variables, and `last`.
     """
     if not places:
         return []

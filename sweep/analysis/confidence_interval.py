@@ -94,10 +94,9 @@ def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float
 
 
 def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
-    """Return the score interval (Wilson 1927) of `hits` successes in `count` trials; None for no
-    trial.
+    """Return the score interval (Wilson 1927) of `hits` successes in `count` trials.
 
-    The numbers may be fractional, because effective sample sizes are.
+    The numbers may be fractional, because effective sample sizes are. Return None without trials.
     """
     if count == 0:
         return None

@@ -97,8 +97,9 @@ def _draw_empty() -> Figure:
 
 
 def _find_column(table: StudyTable, name: str) -> StoreColumn:
-    """Return the column of a variable or a measure with this name. Raises StopIteration if
-    unknown.
+    """Return the column of a variable or a measure with this name.
+
+    Raises StopIteration if unknown.
     """
     manifest = table.store.manifest
     return next(c for c in (*manifest.varied, *manifest.measures) if c.name == name)
@@ -128,8 +129,9 @@ def _mask_undrawable(values: Reals) -> Reals:
 
 
 def _omission_text(table: StudyTable, plot: Mapping[str, Any]) -> str:
-    """Return a note with the number of values that are too large to draw; empty if there are
-    none.
+    """Return a note with the number of values that are too large to draw.
+
+    The result is empty if there are none.
     """
     drawn = [table.read_pooled(name) for name in plot["of"]]
     count = sum(
@@ -174,8 +176,9 @@ def _label_rotation(names: Sequence[str]) -> float:
 
 
 def _annotate(axis: Axes, cells: Reals) -> None:
-    """Write the finite values into the cells of a heat map; do nothing if there are too many
-    cells.
+    """Write the finite values into the cells of a heat map.
+
+    This does nothing if there are more than MAX_ANNOTATED_CELLS cells.
     """
     if cells.size > MAX_ANNOTATED_CELLS or not np.any(np.isfinite(cells)):
         return

@@ -76,8 +76,9 @@ class Sensitivity:
     indices: tuple[Index, ...]
 
     def csv(self) -> str:
-        """Return the indices as CSV text with numbers in SI; NaN and missing intervals are
-        empty.
+        """Return the indices as CSV text with numbers in SI.
+
+        NaN and missing intervals are empty.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")

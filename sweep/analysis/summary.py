@@ -35,8 +35,9 @@ NUMBER_PATTERN = re.compile(r"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*`)"
 
 @dataclass(frozen=True)
 class Failure:
-    """A reason of failure: `count` variants have `status`; `message` and `number` are of the first
-    one.
+    """A reason of failure: `count` variants have `status`.
+
+    `message` and `number` are of the first one.
     """
 
     status: str
@@ -90,10 +91,10 @@ RATE_FIELDS = ("hits", "share")
 
 @dataclass(frozen=True)
 class SummaryLine:
-    """Statistics of one measure in one group: `count` numbers [unit] from `draws` independent
-    draws.
+    """Statistics of one measure in one group.
 
-    A statistic that needs more numbers is NaN. The intervals have the confidence of the study.
+    They are of `count` numbers [unit] from `draws` independent draws. A statistic that needs more
+    numbers is NaN. The intervals have the confidence of the study.
     """
 
     group: Mapping[str, str]
@@ -115,8 +116,9 @@ class SummaryLine:
 
 @dataclass(frozen=True)
 class Rate:
-    """The frequency of an outcome in one group: `hits` of `count` trials in `draws` independent
-    draws.
+    """The frequency of an outcome in one group.
+
+    There are `hits` in `count` trials from `draws` independent draws.
     """
 
     group: Mapping[str, str]
@@ -134,8 +136,9 @@ class Rate:
 
 @dataclass(frozen=True)
 class Summary:
-    """The results of a study: number of variants by status, failures, statistics and rates by
-    group.
+    """The results of a study.
+
+    They are the number of variants by status, failures, and statistics and rates by group.
     """
 
     study: str

@@ -156,8 +156,9 @@ class MeasureReader(Reader):
         since: Bound,
         until: Bound,
     ) -> Measure | None:
-        """Return a measure of events (time, count, delay or match); None if a problem was
-        reported.
+        """Return a measure of events (time, count, delay or match).
+
+        Return None if a problem was reported.
         """
         event = self._event_name(scalar)
         if event is None:
@@ -234,10 +235,10 @@ class MeasureReader(Reader):
         )  # fmt: skip
 
     def _recorded_signal(self, name: str, scalar: ScalarNode) -> tuple[str, Dimension | None]:
-        """Return the recorded signal of a text and its dimension; None as dimension after a
-        problem.
+        """Return the recorded signal of a text and its dimension.
 
-        The text must be valid in all systems. An instance alone in a system needs no prefix.
+        The dimension is None if a problem was reported. The text must be valid in all systems. A
+        single instance in a system needs no prefix.
         """
         found: list[tuple[str, Dimension | None]] = []
         for system in self.systems:
@@ -280,8 +281,9 @@ class MeasureReader(Reader):
         return f"measured_{name}", kind
 
     def _value(self, entry: Entry, scalar: ScalarNode, is_truth: bool) -> Measure | None:
-        """Return a measure that is an expression of earlier measures; None if a problem was
-        reported.
+        """Return a measure that is an expression of earlier measures.
+
+        Return None if a problem was reported.
         """
         formula = self.read_expression(scalar, entry.key, scalar.span)
         if formula is None:

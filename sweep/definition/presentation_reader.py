@@ -50,8 +50,9 @@ class PresentationReader(Reader):
         self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: YamlNode | None, plots: YamlNode | None) -> Presentation:
-        """Return the presentation of both sections; reports unknown names and a confidence out of
-        range.
+        """Return the presentation of both sections.
+
+        Reports unknown names and a confidence out of range.
         """
         table = self.read_mapping(summary, "summary", ("by", "confidence"))
         by = self._names(table.get("by"), "by", self.groups, True)
@@ -103,8 +104,9 @@ class PresentationReader(Reader):
     def _names(
         self, node: YamlNode | None, what: str, known: Sequence[str], is_single: bool = False
     ) -> list[str]:
-        """Return the names in a list, or in a scalar if `is_single`; reports names that are not
-        known.
+        """Return the names in a list, or in a scalar if `is_single`.
+
+        Reports names that are not known.
         """
         items: list[ScalarNode] = []
         if is_single and isinstance(node, ScalarNode):

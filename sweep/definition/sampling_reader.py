@@ -81,8 +81,9 @@ class SamplingReader(Reader):
             self.problems.warning("sampling", variable.span, label, hint)
 
     def _grid_sampling(self, node: YamlNode | None, drawn: Sequence[SweepVariable]) -> Sampling:
-        """Return a full grid or one-at-a-time sampling; reports random variables, which need a
-        count.
+        """Return a full grid or one-at-a-time sampling.
+
+        Reports random variables, which need a count.
         """
         word = self.read_choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
         if drawn:
@@ -94,8 +95,9 @@ class SamplingReader(Reader):
 
 
 def find_imbalance(method: str, count: int) -> tuple[str, str] | None:
-    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method; else
-    None.
+    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method.
+
+    Return None otherwise.
     """
     if method not in ("sobol", "saltelli") or not count & (count - 1):
         return None

@@ -26,11 +26,11 @@ TIME_DECIMALS = 9
 
 @dataclass(frozen=True)
 class Target:
-    """The place to which a value is assigned: parameter, initial value, part of an input, sensor,
-    clock.
+    """The place to which a value is assigned.
 
-    `path` is (instance, parameter), (instance, state), (input, part ...), (sensor, field) or
-    (instance, period | step | offset).
+    It is a parameter, an initial value, a part of an input, a stage of a sensor or a clock. `path`
+    is (instance, parameter), (instance, state), (input, part ...), (sensor, field) or (instance,
+    period | step | offset).
     """
 
     kind: TargetKind
@@ -38,8 +38,9 @@ class Target:
 
     @property
     def is_input_time(self) -> bool:
-        """Return whether the target is a time in an input; drawn times are rounded to
-        nanoseconds.
+        """Return whether the target is a time in an input.
+
+        Drawn times are rounded to nanoseconds.
         """
         is_time = "times" in self.path[1:2] or self.path[-1] in ("from", "to")
         return self.kind == "input" and is_time
@@ -179,8 +180,9 @@ class Study:
 
     @property
     def grid_count(self) -> int:
-        """The number of grid points; 1 without axes, 1 + the sum of the sizes for one-at-a-time
-        sampling.
+        """The number of grid points; 1 without axes.
+
+        It is the product of the sizes of the axes, or 1 + their sum for one-at-a-time sampling.
         """
         sizes = [
             len(v.distribution.values)
@@ -196,7 +198,9 @@ class Study:
 
     @property
     def count(self) -> int:
-        """The number of variants: system variants * scenarios * grid points * samples *
+        """The number of variants.
+
+        It is the product of the numbers of system variants, scenarios, grid points, samples and
         replicates.
         """
         samples = max(1, self.sampling.count)

@@ -161,8 +161,9 @@ class _StudyReader(Reader):
         return found
 
     def _variant(self, entry: Entry, of: ScalarNode) -> System:
-        """Return the system of a variant: another system, or replaced automata such as `{plant:
-        worn}`.
+        """Return the system of a variant.
+
+        It is another system, or the base with replaced automata such as `{plant: worn}`.
         """
         if isinstance(entry.node, ScalarNode):
             return self._system(entry.key, entry.node, {})
@@ -208,8 +209,9 @@ class _StudyReader(Reader):
         return single_instance_system(dataclasses.replace(only, name=self.alone))
 
     def _scenarios(self, tree: MappingNode, at: Span) -> dict[str, Document]:
-        """Return the expanded scenario documents by name; store their digests and report
-        duplicates.
+        """Return the expanded scenario documents by name.
+
+        Stores their digests and reports duplicates.
         """
         found: dict[str, Document] = {}
         items = self.read_list(tree.get("scenarios"), "scenarios")

@@ -138,8 +138,10 @@ def _difference_unit(unit: Unit) -> Unit:
 
 
 def _parts(node: object, unit: Unit) -> Iterator[tuple[tuple[str, ...], Unit]]:
-    """Yield path and unit of each number in the node of an input: value, start, steps, table, ramp,
-    chirp.
+    """Yield path and unit of each number in the node of an input.
+
+    The parts are the value itself, `start`, values and times of steps and tables, and the fields of
+    `ramp` and `chirp`.
     """
     if isinstance(node, ScalarNode):
         yield (), unit

@@ -99,8 +99,10 @@ class VaryReader(Reader):
     def _distribution(
         self, entry: Entry, place: TargetInfo | None
     ) -> tuple[Axis | Distribution | None, Unit]:
-        """Return axis or distribution of an entry and its unit; None in place of it after some
-        problems.
+        """Return axis or distribution of an entry, and its unit.
+
+        The first is None if the form is missing, ambiguous or invalid. Other problems are reported
+        only.
         """
         first = place.unit if place else None
         problem_count = len(self.problems.reported)
@@ -215,8 +217,9 @@ class VaryReader(Reader):
     def _truncation(
         self, node: YamlNode | None, unit: Unit, form: str, place: TargetInfo | None
     ) -> tuple[float, float] | None:
-        """Return the bounds `within` [SI]; None without. Reports them for other than
-        (log)normals.
+        """Return the bounds `within` [SI]; None without.
+
+        Reports bounds of other distributions than normal and lognormal.
         """
         limits = self.read_range(node, unit) if node else None
         for item in self.read_list(node, "within") if limits and place and place.is_width else ():

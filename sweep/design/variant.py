@@ -78,8 +78,9 @@ def _grid_values(study: Study, place: int) -> dict[str, float]:
 def _one_at_a_time_values(
     axes: Sequence[tuple[str, tuple[float, ...]]], place: int
 ) -> dict[str, float]:
-    """Return the value at a point of one-at-a-time sampling: none at 0, then each value of each
-    axis.
+    """Return the value at a point of one-at-a-time sampling.
+
+    Point 0 has no value; the following points have the values of the first axis, then of the next.
     """
     place -= 1
     for name, values in axes:

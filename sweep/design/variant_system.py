@@ -22,8 +22,9 @@ TargetValues = Iterable[tuple[Target, float]]
 
 
 def apply_to_system(system: System, values: TargetValues) -> System:
-    """Return the system with changed sensor stages, periods, steps and offsets; other targets are
-    ignored.
+    """Return the system with changed sensor stages, periods, steps and offsets.
+
+    Other targets are ignored.
     """
     sensors, instances = dict(system.sensors), dict(system.instances)
     for target, value in values:

@@ -23,8 +23,9 @@ class Address:
 
     @property
     def is_unprotected(self) -> bool:
-        """Return whether the connection can be read by others: neither TLS nor a loopback
-        address.
+        """Return whether others can read and change the traffic.
+
+        This is the case without TLS unless the host is a loopback address.
         """
         return self.url.startswith("tcp:") and not _is_loopback(self.host)
 

@@ -92,10 +92,10 @@ def open_client(
 
 
 def _connect(scheduler: Any, security: Security | None, timeout: float) -> Client:
-    """Return a client; repeat the connection if the scheduler is busy with blocks of another
-    client.
+    """Return a client of a scheduler.
 
-    Dask asserts that the first answer is a single message, but a broadcast may accompany it.
+    The connection is repeated if the scheduler is busy with blocks of another client: Dask asserts
+    that the first answer is a single message, but a broadcast may accompany it.
     """
     for _ in range(CONNECT_ATTEMPTS - 1):
         with suppress(AssertionError):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 
 class ClusterError(Exception):
-    """No scheduler answers, no worker is present, or a worker has different code; see the
-    message.
+    """No scheduler answers, no worker is present, or a worker has different code.
+
+    See the message.
     """

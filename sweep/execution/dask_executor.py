@@ -89,8 +89,9 @@ class _DaskRun:
     threads: int = 0
 
     def iterate_results(self, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield the blocks in the order of completion; those during which workers died have a
-        `lost_reason`.
+        """Yield the blocks in the order of completion.
+
+        A block during which workers died has a `lost_reason`.
         """
         waiting = iter(blocks)
         while True:
@@ -160,8 +161,9 @@ class _DaskRun:
             raise ClusterError(f"there is no worker any more for {self.executor.timeout:g} s")
 
     def _wait_for_answer(self, future: Future) -> Answer:
-        """Return the answer of a block; check the workers at each timeout, since Dask may recompute
-        it.
+        """Return the answer of a block.
+
+        Checks the workers at each timeout, since Dask may compute the block again.
         """
         while True:
             try:

@@ -27,13 +27,15 @@ class BlockResult:
 
 
 class Executor(Protocol):
-    """Computation of blocks; the results depend neither on the executor nor on the order of
-    blocks.
+    """Computation of blocks.
+
+    The results depend neither on the executor nor on the order of blocks.
     """
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[BlockResult]:
-        """Yield the blocks in the order of completion; closing the iterator ends the
-        computation.
+        """Yield the blocks in the order of completion.
+
+        Closing the iterator ends the computation.
         """
 
 

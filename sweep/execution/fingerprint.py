@@ -40,8 +40,9 @@ def fingerprint() -> Mapping[str, str]:
 
 
 def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str]) -> str:
-    """Return the parts whose actual value differs from the expected one, as text; empty if none
-    does.
+    """Return the parts whose actual value differs from the expected one, as text.
+
+    The result is empty if none does.
     """
     parts = [
         f"{name} {actual.get(name, 'unknown')[:SHOWN_DIGITS]} instead of {value[:SHOWN_DIGITS]}"

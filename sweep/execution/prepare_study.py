@@ -69,8 +69,9 @@ def resample_study(study: Study, samples: int | None = None, seed: int | None = 
 
 
 def _with_row_period(study: Study, scenario: Scenario) -> Scenario:
-    """Return the scenario with the study's distance of rows; two rows if no measure needs a
-    signal.
+    """Return the scenario with the study's distance of rows.
+
+    If no measure needs a signal, there are two rows: start and end.
     """
     assert scenario.horizon is not None
     every = study.every or scenario.every

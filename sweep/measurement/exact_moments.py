@@ -33,8 +33,9 @@ def mean_of(values: Reals) -> float:
 
 
 def deviation_of(values: Reals) -> float:
-    """Return the sample standard deviation (divisor n - 1) of values (n,), n > 1; NaN on
-    overflow.
+    """Return the sample standard deviation (divisor n - 1) of values (n,), n > 1.
+
+    The result is NaN if it overflows.
     """
     own, exponent = scale_to_squarable(values)
     mean = math.fsum(own) / len(own)

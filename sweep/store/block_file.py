@@ -99,8 +99,9 @@ def _arrow_schema(manifest: Manifest) -> Any:
 
 
 def _split_digest(data: bytes) -> tuple[bytes, bytes]:
-    """Return the file with the placeholder instead of its digest, and the digest; empty without
-    one.
+    """Return the file with the placeholder instead of its digest, and the digest.
+
+    The digest is empty if the file has none.
     """
     place = data.rfind(DIGEST_TAG)
     first = place + len(DIGEST_TAG)

@@ -210,8 +210,9 @@ def _named_texts(value: Any, where: str) -> dict[str, str]:
 
 
 def _whole(value: Any, where: str, low: int, high: int | None) -> int:
-    """Return a value that must be an integer from `low` to `high`; None as `high` means no
-    limit.
+    """Return a value that must be an integer from `low` to `high`.
+
+    There is no upper limit if `high` is None.
     """
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     is_fine = is_whole and low <= value and (high is None or value <= high)

@@ -13,8 +13,9 @@ DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
 
 @dataclass(frozen=True)
 class Row:
-    """The results of one variant: indices in the study, values [SI], status, message and
-    measures.
+    """The results of one variant.
+
+    It has the indices in the study, the values [SI] of the variables, status, message and measures.
     """
 
     number: int

@@ -177,8 +177,9 @@ def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
 
 
 def read_store(folder: Path) -> Store:
-    """Open a store for reading. Raises SpecError, also for a damaged block, and
-    MissingToolError.
+    """Open a store for reading.
+
+    Raises SpecError, also for a damaged block, and MissingToolError.
     """
     import_arrow()
     store = Store(folder, read_manifest(folder))

@@ -67,8 +67,9 @@ def fit(
 
 
 def names_of(text: str) -> list[str]:
-    """Return the comma-separated names of --parameters. Raises BadParameter for empty and double
-    names.
+    """Return the comma-separated names of --parameters.
+
+    Raises BadParameter for empty and double names.
     """
     names = [part.strip() for part in text.split(",")]
     if not all(names):

@@ -37,8 +37,9 @@ ORDERED_SECTIONS = {
 
 
 def describe_reordering(section: str, old: MappingNode, new: MappingNode) -> str:
-    """Return the effect of another order of the common keys of a section; empty if there is
-    none.
+    """Return the effect of another order of the common keys of a section.
+
+    The result is empty if there is none.
     """
     before, after = _numbered_keys(section, old), _numbered_keys(section, new)
     both = [key for key in before if key in after]

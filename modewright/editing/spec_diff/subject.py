@@ -55,8 +55,9 @@ def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
 
 
 def is_section(path: KeyPath) -> bool:
-    """Return whether a path leads to a section of named entries: at the root, in a mode or
-    region.
+    """Return whether a path leads to a section of named entries.
+
+    Sections are keys at the root, and `modes` and `regions` in modes and regions.
     """
     return len(_split_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
 
