@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from language.checks.check_instant_cycles import Cycle, instant_transitions
-from language.expressions.syntax_tree import FunctionCall, walk
+from language.expressions.syntax_tree import NEGATED_RELATION, FunctionCall, walk
 from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value, multiply, real, subtract
 from language.model.automaton import Automaton, Transition
 from language.smt.guard_snapshot import GuardSnapshot, SymbolicPath
@@ -25,7 +25,6 @@ EQUALITY_TOLERANCE = 1.0e-9
 """Relative tolerance of equalities: z3 solves them exactly, and the solution is rounded."""
 SECANT_STEP = 1.0e-3
 """Relative distance from the equilibrium at which resets are evaluated for a secant."""
-"""Relation that holds where the relation of the key does not."""
 
 
 def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:

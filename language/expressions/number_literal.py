@@ -8,13 +8,14 @@ from fractions import Fraction
 from functools import lru_cache
 
 from language.expressions.syntax_tree import NumberLiteral
-from language.expressions.units import NO_UNIT, UNIT_PATTERN, Unit, UnitError, parse_unit, unit_hint
+from language.expressions.tokens import UNIT_PATTERN
+from language.expressions.units import NO_UNIT, Unit, UnitError, parse_unit, unit_hint
 from language.text.diagnostic import Problems, Span, SpecError
 
 UNIT_HINT = "a unit is written like `W`, `N*m`, `1/s`, a product with `*`: `2 * x`"
 DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
 PLAIN_DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?")
-QUANTITY_PATTERN = re.compile(rf"{DECIMAL_PATTERN.pattern} {UNIT_PATTERN.pattern}")
+QUANTITY_PATTERN = re.compile(rf"{DECIMAL_PATTERN.pattern} {UNIT_PATTERN}")
 MAX_QUANTITY = Fraction(sys.float_info.max)
 MAX_EXPONENT = 330
 """Largest decimal exponent that is accepted; beyond it a double overflows or underflows."""

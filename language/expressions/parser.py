@@ -20,6 +20,7 @@ from language.expressions.number_literal import (
 )
 from language.expressions.syntax_tree import Name, SyntaxTree, depth
 from language.expressions.token_shape import parse_shape
+from language.expressions.tokens import KEYWORDS
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import ScalarNode
 
@@ -27,7 +28,6 @@ FOREIGN_OPERATORS = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not",
 """Operators of other languages, and the operators of this language with the same meaning."""
 
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-KEYWORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
 MAX_EXPRESSION_LENGTH = 2000
 """Longest expression that is parsed [characters]."""
 MAX_DEPTH = 100

@@ -81,6 +81,12 @@ class Logic:
     span: Span
 
 
+NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+"""The relation that holds of two real numbers where the other one does not."""
+FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
+"""The relation of two operands that are exchanged."""
+
+
 @dataclass(frozen=True, slots=True)
 class Relation:
     """A relation `< <= > >= == !=` of two operands."""

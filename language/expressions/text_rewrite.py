@@ -8,11 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 
-NUMBER_PATTERN = r"\d(?:[eE][-+]\d|[0-9A-Za-z_.])*"
-UNIT_PATTERN = r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*"
-KEYWORDS = frozenset(["if", "then", "else", "and", "or", "not", "true", "false"])
+from language.expressions.tokens import KEYWORD_PATTERN, KEYWORDS, NUMBER_PATTERN, UNIT_PATTERN
+
 TOKEN_PATTERN = re.compile(
-    rf"(?P<number>{NUMBER_PATTERN}(?: (?!(?:{'|'.join(sorted(KEYWORDS))})\b){UNIT_PATTERN})?)"
+    rf"(?P<number>{NUMBER_PATTERN}(?: (?!{KEYWORD_PATTERN}){UNIT_PATTERN})?)"
     r"|(?P<name>\$?[A-Za-z]\w*(?: *\. *[A-Za-z]\w*)*)"
     r"|(?P<mark><=|>=|==|!=|[-+*/^()<>=,])"
     r"|(?P<blank>\s+)|(?P<other>.)"

@@ -14,15 +14,16 @@ from importlib import resources
 
 import lark
 
+from language.expressions.tokens import KEYWORD_PATTERN, NUMBER_PATTERN, UNIT_PATTERN
+
 ParseShape = tuple[str, tuple["ParseShape | int", ...]]
 """A rule of the grammar with its parts: other shapes, or the numbers of tokens."""
 
 TOKEN_PATTERN = re.compile(
-    r" *(?:(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
-    r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*)"
-    r"|(?P<number>\d(?:[eE][-+]\d|[0-9A-Za-z_.])*)"
-    r"|(?P<word>(?:if|then|else|and|or|not|true|false)\b)"
-    r"|(?P<name>\$?(?!(?:if|then|else|and|or|not|true|false)\b)[A-Za-z][A-Za-z0-9_]*)"
+    rf" *(?:(?P<quantity>{NUMBER_PATTERN} (?!(?:then|else|and|or|if|not)\b){UNIT_PATTERN})"
+    rf"|(?P<number>{NUMBER_PATTERN})"
+    rf"|(?P<word>{KEYWORD_PATTERN})"
+    rf"|(?P<name>\$?(?!{KEYWORD_PATTERN})[A-Za-z][A-Za-z0-9_]*)"
     r"|\^ *(?P<exponent>-?\d+)(?![\d.])"
     r"|(?P<sign><=|>=|==|!=|[-+*/<>=(),.]))"
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
+from language.expressions.tokens import UNIT_PATTERN
 from language.expressions.unit_symbols import BASE_SYMBOLS, MISSPELLED_UNITS, SYMBOLS
 
 CELSIUS_OFFSET = Fraction(27315, 100)
@@ -40,7 +41,6 @@ COMMON_NAMES: dict[tuple[int, ...], str] = {
 }
 """Further names, by the powers of m, kg, s, A, K; used in messages, never in a Program."""
 
-UNIT_PATTERN = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
 FACTOR_PATTERN = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
 
 
@@ -121,7 +121,7 @@ def parse_unit(text: str) -> Unit:
     """Return the unit of a text like `N*m*s/rad`, `1/s`, `kg*m^2`, `degC`. Raises UnitError."""
     if text == "1":
         return NO_UNIT
-    if not UNIT_PATTERN.fullmatch(text):
+    if not re.fullmatch(UNIT_PATTERN, text):
         raise UnitError(f"`{text}` is not written as a unit")
     body = text.removeprefix("1/")
     sign = -1 if body != text else 1

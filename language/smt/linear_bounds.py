@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
+from language.expressions.syntax_tree import FLIPPED_RELATION, NEGATED_RELATION
 from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value
 from language.smt.fourier_motzkin import Inequality, is_infeasible
 from language.smt.query import SolverQuery, VariableDomain
@@ -21,10 +22,6 @@ Direction = tuple[tuple[str, Fraction], ...]
 """Coefficients by variable, sorted by name, scaled so that the first coefficient is 1."""
 LinearForm = tuple[dict[str, Fraction], Fraction]
 """Coefficients by variable, and the constant term."""
-NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
-"""Relation that holds where the relation of the key does not."""
-FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
-"""Relation after both sides are multiplied by a negative number."""
 
 
 def is_disproved_by_bounds(query: SolverQuery) -> bool:
@@ -136,7 +133,7 @@ def _apply_relation(
     A form without variables is compared with 0. The operator `!=` changes nothing.
     """
     factors, constant = form
-    if operator not in FLIPPED_RELATION:
+    if operator == "!=":
         return False
     names = sorted(name for name, factor in factors.items() if factor)
     if not names:

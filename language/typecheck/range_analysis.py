@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Mapping
 
 from language.expressions.syntax_tree import (
+    FLIPPED_RELATION,
+    NEGATED_RELATION,
     TIME_FUNCTIONS,
     Arithmetic,
     Conditional,
@@ -36,8 +38,6 @@ from language.typecheck.interval import (
     power_or_inf,
 )
 
-NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 Constraints = Mapping[int, Interval]
 """Intervals that enclosing conditions impose on expressions, by the number of the expression."""
 NO_CONSTRAINTS: Constraints = {}
@@ -211,7 +211,7 @@ class RangeAnalysis:
                 either = self._assume(left, holds, constraints)
                 other = self._assume(right, holds, self._assume(left, not holds, constraints))
                 return {key: either[key].hull(other[key]) for key in either if key in other}
-            case Relation(operator, left, right, _) if operator in NEGATED_RELATION:
+            case Relation(operator, left, right, _) if operator not in ("==", "!="):
                 operator = operator if holds else NEGATED_RELATION[operator]
                 first, second = (
                     self.unreported.bound_of(left, constraints),
