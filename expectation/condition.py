@@ -40,7 +40,7 @@ from language.expressions.syntax_tree import (
     SyntaxTree,
 )
 from language.expressions.units import PURE_NUMBER, SECOND, are_compatible
-from language.loading.signal_types import signal_kinds
+from language.loading.signal_types import signal_types
 from language.model.declaration import Formula
 from language.model.system import System
 from language.text.diagnostic import Problems, suggest_name
@@ -70,7 +70,7 @@ class ConditionReader:
         self.problems = problems
         self.system = system
         self.words = fault_words(system)
-        self.kinds = signal_kinds(system) | dict.fromkeys(self.words, IntType(0))
+        self.kinds = signal_types(system) | dict.fromkeys(self.words, IntType(0))
         self.modes = mode_predicates(system)
         self.regions = {
             s: p for name in system.instances for s, p in mode_signals(system, name).items()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from expectation.expectations import Test
 from language.text.document import Document, MappingNode, ScalarNode
-from language.text.node_edit import entries
+from language.text.node_edit import mapping_entries
 from language.text.requirement import find_requirements
 
 CITATION = re.compile(
@@ -168,7 +168,7 @@ def _cited_paths(document: Document, path: str) -> list[str]:
 def _iterate_modes(table: MappingNode, path: tuple[str, ...]) -> Iterator[tuple[str, MappingNode]]:
     """Yield key path and node of each mode, including those in regions and in other modes."""
     for key in ("modes", "regions"):
-        for entry in entries(table.get(key)):
+        for entry in mapping_entries(table.get(key)):
             if isinstance(entry.node, MappingNode):
                 here = (*path, key, entry.key)
                 if key == "modes":

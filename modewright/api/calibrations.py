@@ -23,7 +23,7 @@ from language.overlays.expand_document import Project
 from language.overlays.literal_format import (
     format_calibration,
     format_value_in_unit,
-    is_exact_literal,
+    has_exact_literal,
 )
 from language.text.diagnostic import Problem, Problems, Source, Span
 from language.text.document import Document, ScalarNode, YamlNode
@@ -214,7 +214,7 @@ def _build_page(
         name: _stored_value(automaton, program, name)
         for name in sorted(solved_for)
         if automaton.parameters[name].type == "real"
-        and not is_exact_literal(automaton.parameters[name], program.number_type)
+        and not has_exact_literal(automaton.parameters[name], program.number_type)
     }
     if rounded:
         automaton = automaton_of(document, project, {**values, **rounded})

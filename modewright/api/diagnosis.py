@@ -31,7 +31,7 @@ from diagnosis.report.stale_files import find_stale_files
 from diagnosis.report.unfollowed_signals import unfollowed_signals, withdraw_nothing_missing
 from diagnosis.report.variant_file import format_variant, missing_effect_notes
 from engine.recordings.recording import read_recording
-from engine.recordings.recording_window import file_of
+from engine.recordings.recording_window import strip_window_suffix
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.overlays.effect_reader import Effect
@@ -163,7 +163,7 @@ def _checkpoint_folder(out: str | Path | None) -> Path | None:
         return None
     folder = Path(out) / CHECKPOINT_FOLDER
     if os.path.lexists(folder) and not folder.is_dir():
-        raise OutputError(f"{folder}: this is a file; what is found on the way is kept there")
+        raise OutputError(f"{folder}: this is a file; the folder of checkpoints has this name")
     return folder
 
 
@@ -239,7 +239,7 @@ def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list
 def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
     """Return whether a path is a recording or an effect that the diagnosis read."""
     recordings = (*dossier.case.train, *dossier.case.held_out)
-    is_recording = path.resolve() in {file_of(one).resolve() for one in recordings}
+    is_recording = path.resolve() in {strip_window_suffix(one).resolve() for one in recordings}
     return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
 
 

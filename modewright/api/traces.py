@@ -20,7 +20,7 @@ from language.model.automaton import Automaton
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.diagnostic import Problems
 from language.text.document import Document, ScalarNode, read_text
-from language.text.node_edit import entries, find_node
+from language.text.node_edit import find_node, mapping_entries
 from modewright.api.spec_tests import find_tests, load_tests, run_test
 
 HEADINGS = ("name", "id", "requirement")
@@ -143,7 +143,7 @@ def _instance_types(document: Document, project: Project) -> Iterator[str]:
     """Yield the names of the automata of which an automaton has instances."""
     made = expand_document(document, project)
     if made.kind == "automaton":
-        for entry in entries(made.root.get("instances")):
+        for entry in mapping_entries(made.root.get("instances")):
             of = find_node(made.root, ("instances", entry.key, "of"))
             assert isinstance(of, ScalarNode)
             yield read_document(project.path_of(of.text, of.span)).name

@@ -84,7 +84,7 @@ def _apply_templates(owner: MappingNode, templates: MappingNode) -> MappingNode:
     """Return a mapping whose modes, at all depths, have their templates applied."""
     template = templates.get(node_text(owner.get("like")))
     if isinstance(template, MappingNode):
-        owner = apply_overlay(template, without_keys(owner, "like"), Problems(), template=True)
+        owner = apply_overlay(template, without_keys(owner, "like"), Problems(), is_template=True)
     entries = dict(owner.entries)
     for key in ("modes", "regions"):
         node = owner.get(key)

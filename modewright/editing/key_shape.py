@@ -13,7 +13,7 @@ from importlib.resources import files
 
 from language.text.diagnostic import Source
 from language.text.document import MappingNode, ScalarNode, SequenceNode, lines_of
-from language.text.node_edit import entries
+from language.text.node_edit import mapping_entries
 from language.text.yaml_parser import parse_yaml
 
 VALUE_TYPES = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
@@ -131,7 +131,7 @@ def _read_shape(name: str, body: MappingNode) -> Shape:
 
 def _read_texts(body: MappingNode, key: str) -> Iterator[tuple[str, str]]:
     """Yield key and text of the scalar entries of a section."""
-    for entry in entries(body.get(key)):
+    for entry in mapping_entries(body.get(key)):
         if isinstance(entry.node, ScalarNode):
             yield entry.key, entry.node.text
 

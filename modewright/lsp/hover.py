@@ -11,7 +11,7 @@ from language.lowering.constants import evaluate_exactly
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode
-from language.text.node_edit import entries
+from language.text.node_edit import mapping_entries
 from modewright.editing.key_shape import Key, ShapeRef, shapes
 from modewright.editing.node_kinds import places
 from modewright.lsp.positions import contains_position, range_of
@@ -76,7 +76,7 @@ def _describe_symbol(workspace: Workspace, symbol: Symbol) -> str:
         lines += [about.text, ""]
     if isinstance(node, ScalarNode):
         lines.append(f"- `{node.text}`")
-    for entry in entries(node if isinstance(node, MappingNode) else None):
+    for entry in mapping_entries(node if isinstance(node, MappingNode) else None):
         if entry.key in SHOWN_KEYS:
             lines.append(f"- {entry.key}: `{_entry_text(entry)}`")
     if isinstance(node, MappingNode) and symbol.kind == "parameter" and "derived" in node.entries:

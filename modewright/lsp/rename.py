@@ -51,7 +51,7 @@ def rename(
     symbol = reference.symbol
     last = symbol.name.rpartition(".")[2]
     if not last:
-        raise RenameRefused("what stands inside a template is not followed")
+        raise RenameRefused("names inside a template cannot be renamed")
     spans = list(dict.fromkeys(each.span for each in references_to(workspace, symbol)))
     for span in spans:
         if source_text(span) != last:
@@ -74,7 +74,7 @@ def _require_renamable(workspace: Workspace, reference: Reference, name: str) ->
     if not workspace.is_in_project(symbol.file):
         raise RenameRefused(f"`{symbol.name}` is declared in {display_path(symbol.file)}, not here")
     if (symbol.group, symbol.name) == ("region", CHART):
-        raise RenameRefused(f"`{CHART}` is a word of the language: the region that `mode` tells of")
+        raise RenameRefused(f"`{CHART}` is a word of the language: the region of the signal `mode`")
     new = replace_last_part(symbol.name, name)
     files = {Path(each.span.source.name).resolve() for each in references_to(workspace, symbol)}
     for file in sorted(files):

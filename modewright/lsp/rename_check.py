@@ -52,7 +52,7 @@ def _require_no_new_error(workspace: Workspace, after: Workspace, path: Path) ->
     known = {each.label for each in before}
     if len(broken) > len(before):
         first = next((each for each in broken if each.label not in known), broken[0])
-        raise RenameRefused(f"it is named where this is not followed: {first.span}: {first.label}")
+        raise RenameRefused(f"a reference to it is not recognised: {first.span}: {first.label}")
 
 
 def _find_errors(workspace: Workspace, path: Path) -> list[Problem]:

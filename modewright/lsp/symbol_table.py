@@ -9,7 +9,7 @@ from pathlib import Path
 from language.ir.regions import CHART
 from language.text.diagnostic import Span
 from language.text.document import Document, Entry, MappingNode, ScalarNode
-from language.text.node_edit import entries
+from language.text.node_edit import mapping_entries
 from modewright.editing.key_shape import MappingOf
 from modewright.editing.node_kinds import places
 from modewright.lsp.workspace import Workspace, root_text
@@ -150,7 +150,7 @@ def _referenced_symbols(
 
 def _add_instances(workspace: Workspace, symbols: SymbolTable, depth: int) -> None:
     """Add the symbol tables of the instances."""
-    for entry in entries(symbols.document.root.get("instances")):
+    for entry in mapping_entries(symbols.document.root.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
         path = workspace.find_file(of.text, symbols.file) if isinstance(of, ScalarNode) else None
         inner = load_symbol_table(workspace, path, depth + 1) if path else None

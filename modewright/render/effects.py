@@ -39,7 +39,7 @@ def print_effect(screen: Console, entry: EffectDescription, at: str | None) -> N
         lines.append(f"in {at}: {', '.join(entry.places) or 'nowhere'}")
     lines += ["", *(f"  {line}" for line in entry.lines), ""]
     for place in entry.places:
-        lines += [f"laid on {place} of {at}:", *_change_lines(entry.changes[place]), ""]
+        lines += [f"applied to {place} of {at}:", *_change_lines(entry.changes[place]), ""]
     parts = {
         "signature": effect.signature,
         "confused with": ", ".join(effect.confused_with),

@@ -222,9 +222,11 @@ def difference_json(difference: RunDifference) -> dict[str, Any]:
 def _sequence_line(sequence: ModeSequence) -> str:
     """Return a line about the transition sequences of an instance in two runs."""
     counts = f"{sequence.count_a} transitions in A, {sequence.count_b} in B"
-    same = f"the same, at most {sequence.apart:.3g} s apart"
+    same = f"the same, at most {sequence.largest_time_difference:.3g} s apart"
     order_text = (
-        same if sequence.parted is None else f"not the same from number {sequence.parted + 1} on"
+        same
+        if sequence.first_difference is None
+        else f"not the same from number {sequence.first_difference + 1} on"
     )
     return f"{sequence.instance or 'automaton'}: {counts}, {order_text}"
 

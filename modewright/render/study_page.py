@@ -52,7 +52,7 @@ def render_study_page(store: Store) -> bytes:
         "expected": manifest.count,
         "counts": list(summary.counts.items()),
         "varied": [column.name for column in manifest.varied],
-        "told": _description_rows(manifest),
+        "description": _description_rows(manifest),
         **_measures_context(summary),
         **_sensitivity_context(store),
         "figures": [

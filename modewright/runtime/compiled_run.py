@@ -93,7 +93,7 @@ def _simulate_in_c(
         return trajectory, f"compiled, block by block: {reason}"
     build = partial(load_library, simd_batch=False)
     run = CompiledRun(system, scenario, programs, build).trajectory()
-    return run, "compiled" if run else "it has to tell what happened"
+    return run, "compiled" if run else "the run stopped, and C does not report the reason"
 
 
 def run_batch(batch: Batch, threads: int | None = None, min_steps: int = 0) -> BatchResult:

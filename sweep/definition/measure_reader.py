@@ -17,7 +17,7 @@ from language.expressions.units import (
     dimension_product,
 )
 from language.loading.event_names import ModeEntryEvent, read_event
-from language.loading.signal_types import signal_kinds
+from language.loading.signal_types import signal_types
 from language.model.declaration import Formula
 from language.model.system import System
 from language.reading.difference_literal import read_difference
@@ -242,7 +242,7 @@ class MeasureReader(Reader):
         """
         found: list[tuple[str, Dimension | None]] = []
         for system in self.systems:
-            known = signal_kinds(system)
+            known = signal_types(system)
             text = scalar.text
             if system.sole_instance:
                 short = {n.partition(".")[2]: n for n in known if "." in n}

@@ -104,7 +104,7 @@ def _expand_mode(node: YamlNode, templates: MappingNode) -> YamlNode:
     like = node.get("like")
     template = templates.get(like.text) if isinstance(like, ScalarNode) else None
     if isinstance(template, MappingNode):
-        node = apply_overlay(template, without_keys(node, "like"), Problems(), template=True)
+        node = apply_overlay(template, without_keys(node, "like"), Problems(), is_template=True)
     return _expand_node(node, templates)
 
 

@@ -63,7 +63,7 @@ def _add_model_parameters(document: Document, project: Project) -> Document:
     base = expand_document(project.read(project.path_of(model.text, model.span)), project)
     theirs, own = (tree.get("parameters") for tree in (base.root, document.root))
     together = apply_overlay(
-        _table_or_empty(theirs), _table_or_empty(own), Problems(), template=True
+        _table_or_empty(theirs), _table_or_empty(own), Problems(), is_template=True
     )
     return dataclasses.replace(document, root=put_node(document.root, ("parameters",), together))
 

@@ -59,7 +59,7 @@ def test_what_an_effect_changes_at_a_place_is_told_line_by_line(
     monkeypatch.chdir(tmp_path)
     assert run("effects", "torque_gain", "--at", "spinner") == 0
     told = capsys.readouterr().out
-    lines = ["laid on T of spinner:", "  flow.w", "    - J * der(w) = T - b * w"]
+    lines = ["applied to T of spinner:", "  flow.w", "    - J * der(w) = T - b * w"]
     lines += ["    + J * der(w) = u_g_T - b * w", "  equations.u_g_T", "    + gain_T * T"]
     assert "\n".join(lines) in told
     assert run("effects", "torque_gain@T", "--at", "spinner", "--json") == 0

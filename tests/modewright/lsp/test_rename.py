@@ -289,5 +289,5 @@ def test_a_rename_that_leaves_an_old_name_behind_is_refused(
     monkeypatch.setattr("modewright.lsp.rename_check.references_to", without_tables)
     line, column = position_of(DEEP, "x: {unit")
     world = Workspace(deep.parent.parent)
-    with pytest.raises(RenameRefused, match=r"not followed: .*deep.yaml:9:"):
+    with pytest.raises(RenameRefused, match=r"not recognised: .*deep.yaml:9:"):
         rename(world, deep, types.Position(line - 1, column), "zz")
