@@ -110,7 +110,7 @@ def test_hover_tells_unit_value_meaning_and_who_reads_it(talk: LspClient, heater
     assert "below this it heats" in told and "- value: `18 degC`" in told
     assert "`modes.idle.transitions.heating.when`, `modes.heating.transitions.idle.when`" in told
     assert "- value: `500` in SI" in hover(talk, heater, position_of(HEATER, "P_low"))
-    assert "the time for which the guard must hold" in hover(talk, heater, position_of(HEATER, "wait:", 1))
+    assert "the guard must hold" in hover(talk, heater, position_of(HEATER, "wait:", 1))
     assert hover(talk, heater, position_of(HEATER, "heating:")).startswith("**heating** - mode")
     assert hover(talk, heater, (1, 11)) == ""
 
