@@ -30,7 +30,7 @@ MAX_TOTAL_TICKS = 200_000
 """Maximum number of ticks of all sequences that are searched; they take some seconds."""
 MAX_BISECTIONS = 200
 """Maximum number of halvings of one interval."""
-CAST = {"real": float, "truth": bool, "whole": int}
+PYTHON_TYPES = {"real": float, "truth": bool, "whole": int}
 """The Python type of a value by the type of a variable."""
 Modes = tuple[Any, ...]
 Values = tuple[float, ...]
@@ -174,7 +174,7 @@ class _BoundarySearch:
         self._stepper.restore(snapshot)
         for values in inputs:
             for variable, value in zip(self._inputs, values, strict=False):
-                self._stepper.set(variable.name, CAST[variable.type](value))
+                self._stepper.set(variable.name, PYTHON_TYPES[variable.type](value))
             self._stepper.run("step")
         return self._current_modes()
 

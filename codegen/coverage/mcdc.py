@@ -31,7 +31,7 @@ from codegen.toolchain.external_tools import output_of
 from codegen.toolchain.machine import HOST
 from language.ir.program import Program
 
-COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
+COMPILER, PROFILE_MERGER, COVERAGE_EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERAGE_FLAGS = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 APP, EXPLORER, RAW_PROFILE, MERGED_PROFILE = (
     "app",
@@ -195,8 +195,14 @@ def measure_mcdc(
         if corpus:
             steps += _run_corpus(corpus, program, ranges or {}, folder, environment)
         profiles = sorted(path.name for path in folder.glob("counts_*.profraw"))
-        output_of([MERGER, "merge", "-sparse", *profiles, "-o", MERGED_PROFILE], folder)
-        command = [EXPORTER, "export", APP, f"-instr-profile={MERGED_PROFILE}", str(folder / file)]
+        output_of([PROFILE_MERGER, "merge", "-sparse", *profiles, "-o", MERGED_PROFILE], folder)
+        command = [
+            COVERAGE_EXPORTER,
+            "export",
+            APP,
+            f"-instr-profile={MERGED_PROFILE}",
+            str(folder / file),
+        ]
         found = json.loads(output_of(command, folder))
         text = (folder / file).read_text().split("\n")
     (coverage,) = found["data"][0]["files"]

@@ -78,7 +78,7 @@ def fault_reason(program: Program, fault: str) -> str:
     return RANGE_REASON.format(" or ".join(names)) if names else ""
 
 
-ENTRIES = ("init", "derive", "step")
+ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks that are entry points of a module."""
 
 COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")
@@ -143,7 +143,7 @@ def restrict_to_step(program: Program) -> Program:
     (rule 11b).
     """
     if program.period is None:
-        return finalise_program(program, ENTRIES)
+        return finalise_program(program, ENTRY_BLOCKS)
     blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
     variables = tuple(v for v in program.variables if not v.name.startswith(INVARIANT_PREFIX))
     return dataclasses.replace(program, blocks=blocks, variables=variables)
@@ -176,8 +176,8 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
             block: f"{block}({', '.join(usage_by_block[block].parameters)})"
             for block in usage_by_block
         },
-        "blocks": [block for block in blocks if block["name"] not in ENTRIES],
-        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "blocks": [block for block in blocks if block["name"] not in ENTRY_BLOCKS],
+        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRY_BLOCKS},
         "keywords": [
             (word, why)
             for word, why in NOT_INLINED.items()

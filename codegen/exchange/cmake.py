@@ -10,7 +10,7 @@ from language.ir.program import Program
 
 SET_BY_CMAKE = ("-std=c99", "-O2")
 """Flags that CMake sets from its own properties and from the build type."""
-FILE = "CMakeLists.txt"
+CMAKE_FILE = "CMakeLists.txt"
 """The name of the file."""
 
 
@@ -28,4 +28,4 @@ def emit_cmake_file(program: Program) -> dict[str, str]:
         "headers": [file for file in files if file.endswith(".h")],
         "flags": [flag for flag in FLAGS if flag not in SET_BY_CMAKE],
     }
-    return {FILE: render("cmake/cmake_lists.txt.jinja", context)}
+    return {CMAKE_FILE: render("cmake/cmake_lists.txt.jinja", context)}

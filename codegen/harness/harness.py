@@ -30,7 +30,7 @@ class HarnessMain:
     files: tuple[str, ...] = ()
 
 
-LOCKSTEP = HarnessMain("harness/lockstep_main.c.jinja")
+LOCKSTEP_MAIN = HarnessMain("harness/lockstep_main.c.jinja")
 """The main that writes all compared variables after each tick."""
 
 
@@ -80,7 +80,7 @@ def write_harness(
     program: Program,
     folder: Path,
     machine: Machine = HOST,
-    main: HarnessMain = LOCKSTEP,
+    main: HarnessMain = LOCKSTEP_MAIN,
     extra_context: Mapping[str, object] | None = None,
 ) -> list[Path]:
     """Write the C files of a Program and a main around them; return the C files to compile.
@@ -105,7 +105,7 @@ def build_executable(
     flags: Sequence[str] = FLAGS,
     compiler_name: str | None = None,
     machine: Machine = HOST,
-    main: HarnessMain = LOCKSTEP,
+    main: HarnessMain = LOCKSTEP_MAIN,
 ) -> Iterator[Path]:
     """Yield the path of the compiled harness of a Program, from the cache if it was built before.
 

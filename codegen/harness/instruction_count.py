@@ -12,7 +12,9 @@ from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
 from language.ir.program import Program
 
-MAIN = HarnessMain("harness/instructions_main.c.jinja", ("instructions.h", "instructions.c"))
+COUNTING_MAIN = HarnessMain(
+    "harness/instructions_main.c.jinja", ("instructions.h", "instructions.c")
+)
 """The main that counts instructions."""
 ICOUNT_OPTIONS = ("-icount", "shift=0")
 """Options of QEMU under which one instruction takes 1 ns."""
@@ -43,6 +45,6 @@ def count_instructions(
 
     QEMU counts executed instructions, without wait states. Raises MissingToolError, BuildError.
     """
-    with build_executable(program, flags, machine=CORTEX_M4F, main=MAIN) as steps:
+    with build_executable(program, flags, machine=CORTEX_M4F, main=COUNTING_MAIN) as steps:
         output = run_in_qemu(steps, records, ICOUNT_OPTIONS)
     return InstructionCounts(struct.unpack(f"<{len(output) // 8}q", output))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
 from codegen.harness.stack_usage import stack_usage
-from codegen.harness.worst_case_instructions import Unbounded, worst_case_instructions
+from codegen.harness.worst_case_instructions import UnboundedError, worst_case_instructions
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, ARM_SIZE, output_of
 from codegen.toolchain.machine import CORTEX_FLAGS
@@ -86,8 +86,8 @@ def measure_code(program: Program) -> Metrics:
         instance=sizes[".rodata.of_Self"],
         inputs=sizes[".rodata.of_In"],
         outputs=sizes[".rodata.of_Out"],
-        stack=stack.most,
-        beside=stack.beside,
+        stack=stack.stack_bound,
+        beside=stack.unknown_functions,
         longest=longest,
         unbounded=unbounded,
     )
@@ -97,7 +97,7 @@ def _worst_case(folder: Path, sources: Sequence[str], entry: str) -> tuple[int |
     """Return the maximum number of instructions of a step, or None and the reason."""
     try:
         return worst_case_instructions(folder, sources, entry), ""
-    except Unbounded as error:
+    except UnboundedError as error:
         return None, str(error)
 
 

@@ -12,7 +12,7 @@ from codegen.toolchain.external_tools import ARM_COMPILER, output_of
 from codegen.toolchain.machine import CORTEX_FLAGS
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 
-LIMIT = 256
+MAX_STEP_STACK_BYTES = 256
 """Maximum stack of a step [bytes]."""
 NODE = re.compile(
     r'node: \{ title: "(?P<name>[^"]+)" '
@@ -50,10 +50,10 @@ class StackUsage:
     variable frame size.
     """
 
-    most: int
-    beside: tuple[str, ...] = ()
-    recurring: tuple[str, ...] = ()
-    growing: tuple[str, ...] = ()
+    stack_bound: int
+    unknown_functions: tuple[str, ...] = ()
+    recursive_functions: tuple[str, ...] = ()
+    variable_frames: tuple[str, ...] = ()
 
 
 def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
@@ -85,12 +85,20 @@ def check_stack(folder: Path, sources: Sequence[str], entry: str) -> ToolVerdict
         usage = stack_usage(folder, sources, entry)
     except BuildError as error:
         return ToolVerdict("stack", tool, "no result", (str(error).partition("\n")[0],))
-    findings = [f"{name} calls itself" for name in usage.recurring]
-    findings += [f"{name} takes more or less each time" for name in usage.growing]
-    if usage.most > LIMIT:
-        findings.append(f"{entry} takes {usage.most} bytes, {LIMIT} are allowed")
-    beside = f", beside what these take: {', '.join(usage.beside)}" if usage.beside else ""
-    return ToolVerdict("stack", tool, f"{entry}: {usage.most} bytes{beside}", tuple(findings))
+    findings = [f"{name} calls itself" for name in usage.recursive_functions]
+    findings += [f"{name} takes more or less each time" for name in usage.variable_frames]
+    if usage.stack_bound > MAX_STEP_STACK_BYTES:
+        findings.append(
+            f"{entry} takes {usage.stack_bound} bytes, {MAX_STEP_STACK_BYTES} are allowed"
+        )
+    beside = (
+        f", beside what these take: {', '.join(usage.unknown_functions)}"
+        if usage.unknown_functions
+        else ""
+    )
+    return ToolVerdict(
+        "stack", tool, f"{entry}: {usage.stack_bound} bytes{beside}", tuple(findings)
+    )
 
 
 def _read(text: str) -> _Calls:

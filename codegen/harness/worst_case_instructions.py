@@ -25,7 +25,7 @@ LoopCounts = Mapping[str, int]
 """The number of iterations by C loop."""
 
 
-class Unbounded(Exception):
+class UnboundedError(Exception):
     """No bound is known for some machine code; the message tells why."""
 
 
@@ -82,7 +82,9 @@ class _LongestPaths:
         Raises Unbounded if the callee is not known.
         """
         if instruction.target not in self.names:
-            raise Unbounded(f"{instruction.name} {instruction.operands} calls what is not known")
+            raise UnboundedError(
+                f"{instruction.name} {instruction.operands} calls what is not known"
+            )
         return self.instructions_of(self.names[instruction.target])
 
 
@@ -131,7 +133,7 @@ class _ControlFlowGraph:
         """
         bounds: list[int] = []
         for head in sorted(heads):
-            with suppress(Unbounded):
+            with suppress(UnboundedError):
                 known = {**outer_loops, **self._loop_counts(nodes, head)}
                 iterations = prod(known[name] for name in known if name not in outer_loops)
                 longest, *first = (
@@ -142,7 +144,7 @@ class _ControlFlowGraph:
                         iterations * longest + max(first, default=0) + self._head_instructions(head)
                     )
         if not bounds:
-            raise Unbounded(f"{self.function} has a loop of which no end is known")
+            raise UnboundedError(f"{self.function} has a loop of which no end is known")
         return min(bounds)
 
     def _loop_counts(self, nodes: Sequence[str], head: str) -> LoopCounts:
@@ -179,7 +181,7 @@ def is_call(instruction: Instruction, is_local_target: bool) -> bool:
     """
     name = instruction.name.partition(".")[0]
     if name in ("tbb", "tbh"):
-        raise Unbounded("a table of branches is not followed")
+        raise UnboundedError("a table of branches is not followed")
     return name in ("bl", "blx") or (is_branch(instruction) and not is_local_target)
 
 

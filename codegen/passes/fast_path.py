@@ -64,7 +64,7 @@ from language.programs.model_run import RUN_MODE
 FastPathMode = Literal["on", "anew", "off"]
 """Whether fast paths are added. `anew` computes all equations in each step; it is needed where
 states are set between steps, as in a predictor, so that values of the step before are not valid."""
-ENTRIES = ("init", "derive", "step")
+ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks that are entry points of a module."""
 FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
     "leap",
@@ -283,7 +283,7 @@ def _insert_fast_path(
     )
     blocks = {**program.blocks, **blocks, block_name: dispatch, **changed}
     return finalise_program(
-        dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES
+        dataclasses.replace(program, blocks=blocks, variables=variables), ENTRY_BLOCKS
     )
 
 

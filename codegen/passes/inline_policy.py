@@ -23,7 +23,7 @@ ALWAYS_NOINLINE = ("hold", "rows_", "columns_")
 """Prefixes of blocks that are never inlined, in any number type: a covariance does not fit into
 registers."""
 
-NOINLINE_BESIDE = frozenset({"latch"})
+NOINLINE_WITH_COVARIANCE = frozenset({"latch"})
 """Blocks that are not inlined if one of ALWAYS_NOINLINE exists. The comparison of inputs with their
 ranges is computed in software too. Inlined into the step, its saved registers would add to the
 stack below a covariance (decision 0026)."""
@@ -50,7 +50,7 @@ def select_noinline_blocks(program: Program) -> frozenset[str]:
     )
     expensive |= always
     if always:
-        expensive |= NOINLINE_BESIDE & program.blocks.keys()
+        expensive |= NOINLINE_WITH_COVARIANCE & program.blocks.keys()
     return frozenset(n for n in expensive if len(callers[n]) != 1 or callers[n][0] not in expensive)
 
 

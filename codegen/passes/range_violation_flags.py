@@ -14,7 +14,7 @@ from language.ir.ops import Assign, Block, Branch, FaultBit, Loop, Op, Switch, V
 from language.ir.program import Program, Variable
 from language.ir.traversal import walk_ops
 
-RANGE_MARK = "memory.left_{}"
+RANGE_VIOLATION_FLAG = "memory.left_{}"
 """The name of the flag of a signal; `{}` is the index in `ranged_signals`."""
 
 
@@ -25,7 +25,7 @@ def ranged_signals(program: Program) -> tuple[str, ...]:
     return tuple(dict.fromkeys(signal for signal in found if signal))
 
 
-def add_range_marks(program: Program) -> Program:
+def add_range_violation_flags(program: Program) -> Program:
     """Return a Program with a truth variable for each signal that left its range; see the module.
 
     A Program without such signals is returned as it is.
@@ -33,7 +33,7 @@ def add_range_marks(program: Program) -> Program:
     signals = ranged_signals(program)
     if not signals:
         return program
-    marks = {signal: RANGE_MARK.format(k) for k, signal in enumerate(signals)}
+    marks = {signal: RANGE_VIOLATION_FLAG.format(k) for k, signal in enumerate(signals)}
     variables = (*program.variables, *(Variable(name, "truth") for name in marks.values()))
     blocks = {name: tuple(_insert_marks(b, marks)) for name, b in program.blocks.items()}
     return dataclasses.replace(program, variables=variables, blocks=blocks)

@@ -23,15 +23,15 @@ from language.ir.program import Constant, Program, Variable
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import walk_ops
 
-KERNEL = (
+KERNEL_OPTIONS = (
     *("-machdep", "gcc_x86_32", "-cpp-extra-args=-I. -Dvolatile="),
     *("-warn-special-float", "non-finite", "-warn-signed-overflow", "-warn-unsigned-overflow"),
     *("-warn-signed-downcast", "-warn-unsigned-downcast"),
 )
 """Options of Frama-C. The page is not `volatile` here, because it changes only between steps."""
-ANALYSIS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
+ANALYSIS_OPTIONS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
 """Options of the value analysis."""
-MERGED = ("-eva-slevel-function", "main:0")
+MERGED_STEP_OPTIONS = ("-eva-slevel-function", "main:0")
 """Options by which steps are not followed one by one: all states are merged, and counters begin
 with any value."""
 ALARM = re.compile(
@@ -52,8 +52,8 @@ def check_values(program: Program, folder: Path) -> ToolVerdict:
         (folder / name).write_text(text)
     sources = [name for name in files if name.endswith(".c")]
     turns = str(_turns(program))
-    unrolled = ("-eva-min-loop-unroll", turns, *(MERGED if program.run_modes else ()))
-    done = run_tool(["frama-c", *KERNEL, *ANALYSIS, *unrolled, *sources], folder)
+    unrolled = ("-eva-min-loop-unroll", turns, *(MERGED_STEP_OPTIONS if program.run_modes else ()))
+    done = run_tool(["frama-c", *KERNEL_OPTIONS, *ANALYSIS_OPTIONS, *unrolled, *sources], folder)
     tool = f"Frama-C {tool_version('frama-c', folder)}"
     alarms = {
         f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in ALARM.finditer(done.stdout)

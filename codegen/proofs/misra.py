@@ -18,11 +18,11 @@ DEVIATIONS = {
     "21.15": "the bits of a power of two are set by memcpy, which every compiler turns into a move",
 }
 """Rules from which generated C deviates, with reasons (rule C24; docs/c_code.md)."""
-KNOWN = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
+COMPILER_MACROS = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
 """Macros of compiler headers, which cppcheck does not read."""
-READING = ("--quiet", "--std=c99", "--error-exitcode=1")
+CPPCHECK_OPTIONS = ("--quiet", "--std=c99", "--error-exitcode=1")
 """Options of cppcheck."""
-ADDONS = ("usr/lib/*", "usr/share", "usr/local/share")
+ADDON_FOLDERS = ("usr/lib/*", "usr/share", "usr/local/share")
 """Folders in which the rules of cppcheck may be installed."""
 VIOLATION = re.compile(r"\[(?P<file>[^:\]]+):(?P<line>\d+)\].*\[misra-c2012-(?P<rule>[\d.]+)\]")
 """A violation in the output: file, line and rule."""
@@ -34,7 +34,7 @@ def check_misra(folder: Path, sources: Sequence[str]) -> ToolVerdict:
     Deviations are counted in `about`. Raises MissingToolError, BuildError.
     """
     tool = f"cppcheck {tool_version('cppcheck', folder)}"
-    read = run_tool(["cppcheck", "--dump", *READING, *KNOWN, *sources], folder)
+    read = run_tool(["cppcheck", "--dump", *CPPCHECK_OPTIONS, *COMPILER_MACROS, *sources], folder)
     rules = run_tool([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
     unread = [one for one in sources if f"Checking {one}.dump, config" not in rules.stdout]
     if read.returncode or unread:
@@ -54,7 +54,7 @@ def check_misra(folder: Path, sources: Sequence[str]) -> ToolVerdict:
 
 def _addon() -> str:
     """Return the path of the MISRA rules of cppcheck. Raises MissingToolError."""
-    for pattern in ADDONS:
+    for pattern in ADDON_FOLDERS:
         for path in Path("/").glob(f"{pattern}/cppcheck/addons/misra.py"):
             return str(path)
     raise MissingToolError("the rules of cppcheck (misra.py) are missing: apt-get install cppcheck")

@@ -9,7 +9,7 @@ from codegen.toolchain.compiler import FLAGS, WARNINGS
 from codegen.toolchain.external_tools import run_tool
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 
-COMPILERS = ("gcc", "clang-19")
+WARNING_COMPILERS = ("gcc", "clang-19")
 """The compilers."""
 
 
@@ -19,7 +19,7 @@ def check_compiler_warnings(folder: Path, sources: Sequence[str]) -> list[ToolVe
     Findings are the lines with warnings and errors. Raises MissingToolError, BuildError.
     """
     verdicts = []
-    for compiler in COMPILERS:
+    for compiler in WARNING_COMPILERS:
         command = [compiler, *FLAGS, *WARNINGS, "-c", *sources]
         done = run_tool(command, folder)
         lines = done.stderr.splitlines()

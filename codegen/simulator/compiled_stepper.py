@@ -19,8 +19,8 @@ from codegen.emit.c_module import module_context
 from codegen.emit.c_names import CNames, c_type
 from codegen.passes.block_usage import block_usages, locals_of
 from codegen.passes.range_violation_flags import (
-    RANGE_MARK,
-    add_range_marks as marked_program,
+    RANGE_VIOLATION_FLAG,
+    add_range_violation_flags as marked_program,
     ranged_signals,
 )
 from codegen.simulator.simulator_library import SHARED_LIBRARY_FLAGS, build_library
@@ -79,7 +79,8 @@ class CompiledStepper:
                 self._buffer, offset
             )
         self._range_marks = {
-            signal: RANGE_MARK.format(k) for k, signal in enumerate(ranged_signals(program))
+            signal: RANGE_VIOLATION_FLAG.format(k)
+            for k, signal in enumerate(ranged_signals(program))
         }
         for entry in ("default_page", "derive", "init"):
             self.run(entry)

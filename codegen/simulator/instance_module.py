@@ -9,7 +9,7 @@ from codegen.emit.c_expression import format_literal
 from codegen.emit.c_module import module_context
 from codegen.emit.c_names import CNames, c_member
 from codegen.passes.block_usage import block_usages, locals_of
-from codegen.passes.range_violation_flags import RANGE_MARK, ranged_signals
+from codegen.passes.range_violation_flags import RANGE_VIOLATION_FLAG, ranged_signals
 from codegen.simulator.signal_names import INSTANCE_NAME, SignalNameMap, row_width
 from codegen.simulator.simd_variants import simd_batch_context
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program
@@ -128,7 +128,7 @@ def _lagging_sensors(assembly: SimulationAssembly, name: str) -> list[str]:
 
 def _range_mark_members(program: Program, c_names: CNames) -> list[str]:
     """Return the C text of the flags for range violations."""
-    return [c_names(RANGE_MARK.format(k)) for k, _ in enumerate(ranged_signals(program))]
+    return [c_names(RANGE_VIOLATION_FLAG.format(k)) for k, _ in enumerate(ranged_signals(program))]
 
 
 def _is_retained(variable: str) -> bool:

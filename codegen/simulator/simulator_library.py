@@ -121,7 +121,7 @@ class SimulatorLibrary:
         self._run.argtypes = [Pointer, Pointer, Int64, Int64]
         self._run.restype = None
 
-    def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
+    def bind_plan(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return a function that runs the variants from a first index up to a last one, exclusive.
 
         `plan` is a plan of the engine (engine/batch/run_plan.py). `variants` gives the members of

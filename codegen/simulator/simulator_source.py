@@ -16,7 +16,7 @@ from codegen.emit.c_expression import format_literal
 from codegen.emit.c_math import emit_math_files
 from codegen.emit.c_names import C_REAL_TYPE, c_member, c_type
 from codegen.emit.c_struct import calibration_members
-from codegen.passes.range_violation_flags import add_range_marks
+from codegen.passes.range_violation_flags import add_range_violation_flags
 from codegen.simulator.instance_module import (
     simd_batch_of,
     simulator_module_context,
@@ -84,7 +84,7 @@ def _instance_program(name: str, program: Program) -> Program:
     """
     own = dataclasses.replace(program, name=INSTANCE_NAME.format(name))
     if program.period is not None:
-        return add_range_marks(own)
+        return add_range_violation_flags(own)
     return finalise_program(
         own, ("init", "derive", *ENGINE_BLOCKS), keep=(*STEP_INTERFACE, "work.s")
     )

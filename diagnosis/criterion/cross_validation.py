@@ -28,7 +28,7 @@ CacheKey = tuple[int, tuple[int, ...]]
 _cache: OrderedDict[CacheKey, tuple[Estimate, Sequence[SampledRecording], Reals]] = OrderedDict()
 
 
-def _cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+def cross_validated_squares(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
     """Return the sums of squares (recordings, outputs) of left-out blocks; infinite if not fitted.
 
     The result is cached, because the base is compared with every candidate.

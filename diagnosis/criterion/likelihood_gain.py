@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.criterion.cross_validation import _cross_validated_squares
+from diagnosis.criterion.cross_validation import cross_validated_squares
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.data.arrays import Reals
 from diagnosis.data.sampled_recording import SampledRecording
@@ -55,7 +55,7 @@ def likelihood_gain(
     extra_parameters = _parameter_count(model, len(series)) - _parameter_count(base, len(series))
     penalty = 0.5 * extra_parameters * np.log(max(count * effective_fraction, 2.0))
     train = effective_fraction * (base.cost - model.cost) - penalty
-    before, after = _cross_validated_squares(base, series), _cross_validated_squares(model, series)
+    before, after = cross_validated_squares(base, series), cross_validated_squares(model, series)
     each = effective_fraction * _gain_by_recording(before, after, model.prediction.counts)
     return LikelihoodGain(float(train), float(np.sum(each)), tuple(float(one) for one in each))
 

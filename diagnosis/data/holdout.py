@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from engine.recordings.recording_window import file_of, overlap
+from engine.recordings.recording_window import paths_overlap, strip_window_suffix
 
 
 def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
@@ -24,7 +24,7 @@ def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]
             other, "is held out twice: each recording counts once", one, opened=False
         )
     for file in held_out:
-        path = file_of(Path(file))
+        path = strip_window_suffix(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
             raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
         for learnt in train:
@@ -38,6 +38,8 @@ def _require_no_overlap(
 
     With `opened`, the contents are compared to recognise copies under another name.
     """
-    if overlap(Path(file), Path(other), opened):
-        same = os.path.realpath(file_of(Path(file))) == os.path.realpath(file_of(Path(other)))
+    if paths_overlap(Path(file), Path(other), opened):
+        same = os.path.realpath(strip_window_suffix(Path(file))) == os.path.realpath(
+            strip_window_suffix(Path(other))
+        )
         raise ValueError(f"{file} {reason}" if same else f"{file}, a copy of {other}, {reason}")

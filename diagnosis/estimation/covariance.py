@@ -23,7 +23,7 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
     quantities = {}
     for k, one in enumerate(model.candidate.free_parameters):
         value = float(np.mean([values[one.name] for values in each]))
-        slope = one.sd * (value if one.is_log else 1.0)
+        slope = one.prior_std * (value if one.is_log else 1.0)
         quantities[one.name] = Quantity(value, one.unit, abs(slope) * float(spread[k]))
     return quantities
 

@@ -172,7 +172,9 @@ def _noise_parameter_jacobian(
     candidate, jacobian = estimate.candidate, {}
     places = [candidate.names.index(name) for name in names]
     moved = [
-        estimate.point.perturb(candidate, k, LOG_LEVEL_STEP / candidate.free_parameters[k].sd)
+        estimate.point.perturb(
+            candidate, k, LOG_LEVEL_STEP / candidate.free_parameters[k].prior_std
+        )
         for k in places
     ]
     gains = [gains_at(estimate, series, there) for there in moved]

@@ -259,19 +259,23 @@ def search_damping(
     estimate: Estimate,
     series: Sequence[SampledRecording],
     damping: float,
-    own_only: bool = False,
+    per_recording_only: bool = False,
     min_gain: float = MIN_PREDICTED_GAIN,
 ) -> tuple[Estimate | None, float]:
     """Return an estimate of lower cost after one damped step, and the next damping.
 
     The damping grows by 10 until a step lowers the cost, and is divided by 10 after success. Steps
     with a predicted gain below `min_gain` [nats] are not evaluated. The estimate is None if the
-    damping reaches `MAX_DAMPING`. With `own_only` only coordinates per recording move.
+    damping reaches `MAX_DAMPING`. With `per_recording_only` only coordinates per recording move.
     """
     assert estimate.normal_equations is not None
     while damping < MAX_DAMPING:
         point = damped_step(
-            estimate.candidate, estimate.point, estimate.normal_equations, damping, own_only
+            estimate.candidate,
+            estimate.point,
+            estimate.normal_equations,
+            damping,
+            per_recording_only,
         )
         if (
             predicted_gain(estimate.candidate, estimate.point, estimate.normal_equations, point)

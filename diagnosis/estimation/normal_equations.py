@@ -84,16 +84,16 @@ def damped_step(
     point: ParameterVector,
     normal: NormalEquations,
     damping: float,
-    own_only: bool = False,
+    per_recording_only: bool = False,
 ) -> ParameterVector:
     """Return the point after one Levenberg-Marquardt step, clipped to the bounds.
 
     A shared coordinate at its bound that the step would push further is fixed, and the step is
-    solved again (active set). With `own_only` all shared coordinates are fixed. If `normal` has no
-    block of a recording, the coordinates of that recording do not move.
+    solved again (active set). With `per_recording_only` all shared coordinates are fixed. If
+    `normal` has no block of a recording, the coordinates of that recording do not move.
     """
     bounds = bounds_of(candidate)
-    held = np.full(len(point.shared), own_only)
+    held = np.full(len(point.shared), per_recording_only)
     step = _solve_step(point, normal, damping, held)
     for _ in held:
         trial = point.shared + step.shared

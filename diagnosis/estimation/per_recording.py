@@ -43,7 +43,7 @@ def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]
     held = {one.name: still for one in model.candidate.free_parameters if not one.per_recording}
     for _ in range(MAX_ITERATIONS if np.isfinite(now.cost) else 0):
         better, damping = search_damping(
-            with_normal_equations(now, series, held), series, damping, own_only=True
+            with_normal_equations(now, series, held), series, damping, per_recording_only=True
         )
         if better is None:
             break

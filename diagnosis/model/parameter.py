@@ -40,24 +40,24 @@ class FreeParameter:
     start: float
     low: float
     high: float
-    sd: float
+    prior_std: float
     is_log: bool
     per_recording: bool = False
     starts: tuple[float, ...] = ()
     unit: str = "1"
-    plain: float | None = None
+    restricted_value: float | None = None
 
     def value(self, z: float) -> float:
         """Return the value [SI] at a coordinate."""
         if self.is_log:
-            return self.start * math.exp(self.sd * z)
-        return self.start + self.sd * z
+            return self.start * math.exp(self.prior_std * z)
+        return self.start + self.prior_std * z
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a value [SI]."""
         if self.is_log:
-            return math.log(value / self.start) / self.sd
-        return (value - self.start) / self.sd
+            return math.log(value / self.start) / self.prior_std
+        return (value - self.start) / self.prior_std
 
     @property
     def bounds(self) -> tuple[float, float]:

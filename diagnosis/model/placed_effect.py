@@ -154,13 +154,13 @@ def lower_tunable_program(
     names: Sequence[str],
     effect_parameters: Sequence[str],
     period: Fraction,
-    at_least: int = 1,
+    min_substeps: int = 1,
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and the number of major steps in a period
     [s].
 
-    The step divides the period into at least `at_least` and at most `MAX_STEPS` parts. It is stable
-    at the declared parameters and with those of `effect_parameters` at a quarter and four times
+    The step divides the period into at least `min_substeps` and at most `MAX_STEPS` parts. It is
+    stable at the declared parameters and with those of `effect_parameters` at a quarter and four times
     their values, and not longer than any time among these: the stability limit of a limited rate is
     not known beforehand.
     """
@@ -171,7 +171,7 @@ def lower_tunable_program(
     variants = [one for one in scaled if one.parameters != automaton.parameters]
     stable = [_stable_step(one, MAX_STEP) for one in (automaton, *variants)]
     longest = min(*stable, *_time_values(automaton, effect_parameters), MAX_STEP)
-    substeps = min(max(at_least, -(-period // longest)), MAX_STEPS)
+    substeps = min(max(min_substeps, -(-period // longest)), MAX_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
         for name, parameter in automaton.parameters.items()

@@ -16,7 +16,7 @@ from diagnosis.estimation.model_set import ModelSet, balance_disturbances
 from diagnosis.model.compile_cache import node_text
 from diagnosis.model.placed_effect import shipped_effects
 from engine.recordings.recording import Recording, read_recording
-from engine.recordings.recording_window import file_of
+from engine.recordings.recording_window import strip_window_suffix
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 from language.overlays.effect_reader import Effect
@@ -106,6 +106,6 @@ def build_model_set(
 def file_digests(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
     """Return the first 16 hexadecimal digits of the SHA-256 of each file, by display name."""
     return {
-        case.name_of(path): hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]
+        case.name_of(path): hashlib.sha256(strip_window_suffix(path).read_bytes()).hexdigest()[:16]
         for path in files
     }

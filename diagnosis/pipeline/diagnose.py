@@ -39,7 +39,7 @@ from diagnosis.selection.intersample import recalibrate_by_hold
 from diagnosis.validation.free_simulation import compare_misfits
 from diagnosis.validation.misfit import Misfit
 from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
-from engine.recordings.recording_window import file_of, overlap
+from engine.recordings.recording_window import paths_overlap, strip_window_suffix
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.text.diagnostic import SpecError
@@ -134,7 +134,7 @@ def _read_held_out(
     recordings: list[SampledRecording] = []
     unread = []
     for k, path in enumerate(case.held_out):
-        known = next((o for o in (*case.train, *case.held_out[:k]) if overlap(path, o)), None)
+        known = next((o for o in (*case.train, *case.held_out[:k]) if paths_overlap(path, o)), None)
         if known is not None:
             named = f"{case.name_of(path)} was held out and cannot be used"
             unread.append(f"{named}: it is a copy of {case.name_of(known)}")
@@ -275,4 +275,4 @@ def _confirm(
 
 def _file_digest(path: Path) -> str:
     """Return the first 16 hexadecimal digits of the SHA-256 of a file."""
-    return hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(strip_window_suffix(path).read_bytes()).hexdigest()[:16]

@@ -192,5 +192,5 @@ def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
 
 def prior_std_ratio(fitted_value: Quantity, coordinate: FreeParameter) -> float:
     """Return the standard deviation of a fitted parameter over that of its prior."""
-    slope = coordinate.sd * (fitted_value.value if coordinate.is_log else 1.0)
+    slope = coordinate.prior_std * (fitted_value.value if coordinate.is_log else 1.0)
     return fitted_value.std / abs(slope) if slope else 1.0

@@ -64,7 +64,7 @@ def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
         name: _guess_column(name, file.read(name).unit, place) for name in kept[:MAX_COLUMNS]
     }
     if not columns:
-        problems.error("empty", file.head, "the recording has no column of numbers")
+        problems.error("empty", file.header_span, "the recording has no column of numbers")
     problems.raise_if_errors()
     return replace(empty, time=time, time_unit=unit, columns=columns)
 
@@ -81,7 +81,7 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
         if name in named or (len(values) > 1 and bool(np.all(np.diff(values) > 0.0))):
             return name
     hint = "`--map` says which column is the time"
-    problems.error("time", file.head, "no column of the recording looks like time", hint)
+    problems.error("time", file.header_span, "no column of the recording looks like time", hint)
     return ""
 
 

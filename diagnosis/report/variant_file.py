@@ -26,9 +26,9 @@ MIN_RELATIVE_CHANGE = 1e-6
 """Relative change below which a parameter is not written."""
 
 
-def variant_name(base: str, ending: str = NAME_SUFFIX) -> str:
+def variant_name(base: str, suffix: str = NAME_SUFFIX) -> str:
     """Return a base's name with a suffix, shortened to `MAX_NAME_LENGTH`."""
-    return base[: MAX_NAME_LENGTH - len(ending)] + ending
+    return base[: MAX_NAME_LENGTH - len(suffix)] + suffix
 
 
 def format_variant(report: DiagnosisReport, extends: str) -> str:

@@ -106,9 +106,9 @@ def _restricted_coordinates(model: Estimate, placed_effect: PlacedEffect) -> dic
     """Return the coordinates at which an effect is a plainer one, by their places."""
     brought = effect_names(placed_effect)
     return {
-        k: one.coordinate(one.plain)
+        k: one.coordinate(one.restricted_value)
         for k, one in enumerate(model.candidate.free_parameters)
-        if one.name in brought and one.plain is not None and not one.per_recording
+        if one.name in brought and one.restricted_value is not None and not one.per_recording
     }
 
 

@@ -117,7 +117,7 @@ class CompiledGroup:
             "rows": np.empty((self.library.lanes, rows, self.library.width)),
             "inputs_room": np.empty((self.library.lanes, *self.plan.inputs.shape)),
         }
-        self.library.bind(plan, members)(0, count)
+        self.library.bind_plan(plan, members)(0, count)
         for place, measure in enumerate(batch.statistics):
             result.statistics[measure.name][variants] = measured[:, place]
         for place, name in enumerate(batch.outputs):

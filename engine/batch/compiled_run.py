@@ -55,7 +55,7 @@ class RunLibrary(Protocol):
     def lanes(self) -> int:
         """Number of variants that are executed side by side."""
 
-    def bind(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
+    def bind_plan(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return a function that executes the variants from a first to before a last index."""
 
 
@@ -87,7 +87,7 @@ class CompiledRun:
         self._count = np.zeros(1, dtype=np.int64)
         self._is_left = np.zeros(1, dtype=np.uint8)
         self._faults = np.zeros(len(programs), dtype=np.uint32)
-        self._call = self.library.bind(self.plan, self._members())
+        self._call = self.library.bind_plan(self.plan, self._members())
 
     def run(self) -> bool:
         """Execute the run; return whether the library completed it.
@@ -98,7 +98,7 @@ class CompiledRun:
         count = int(self._count[0])
         if count > len(self._events):
             self._events = np.empty(2 * count, dtype=EVENT_DTYPE)
-            self._call = self.library.bind(self.plan, self._members())
+            self._call = self.library.bind_plan(self.plan, self._members())
             self._call(0, 1)
         return not self._is_left[0]
 

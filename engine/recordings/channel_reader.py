@@ -49,14 +49,14 @@ def require_names(
         if not count:
             label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
             hint = file.explain_missing(name) or suggest_name(name, file.names)
-            problems.error("column", file.head, label, hint)
+            problems.error("column", file.header_span, label, hint)
         elif count > 1:
-            problems.error("column", file.head, f"there are two {file.noun}s `{name}`")
+            problems.error("column", file.header_span, f"there are two {file.noun}s `{name}`")
     if not file.rows:
         label = "the recording has a head line and no values"
         if file.is_stamped:
             label = "the recording has no values"
-        problems.error("empty", file.head, label)
+        problems.error("empty", file.header_span, label)
 
 
 class ChannelReader:
@@ -178,7 +178,7 @@ class ChannelReader:
             values_si.append(value)
         if not times and not self.problems.has_errors:
             label = f"{self.file.noun} `{column.columns[0]}` has no values"
-            self.problems.error("empty", self.file.head, label)
+            self.problems.error("empty", self.file.header_span, label)
         return tuple(times), tuple(values_si)
 
     def _values(self, name: str, samples: Samples, column: ColumnMapping) -> list[float | None]:

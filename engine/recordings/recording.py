@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from engine.recordings.channel_reader import ChannelReader, require_names
 from engine.recordings.csv_reader import read_csv
 from engine.recordings.recording_file import RecordedFile, require_regular_file
-from engine.recordings.recording_window import file_of, windows_of
+from engine.recordings.recording_window import strip_window_suffix, windows_in_use
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source
@@ -116,7 +116,7 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     if file.is_stamped:
         ends = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
     known = [time for time in ends if time is not None]
-    windows = windows_of(path, mapping, problems)
+    windows = windows_in_use(path, mapping, problems)
     problems.raise_if_errors()
     return crop_to_windows(Recording(path.name, channels, max(known), min(known), windows), mapping)
 
@@ -134,7 +134,7 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
 
     Raises SpecError and MissingToolError.
     """
-    path = file_of(path)
+    path = strip_window_suffix(path)
     require_regular_file(path, Source(display_path(path)))
     ending = path.suffix.lower()
     if ending == ".parquet":

@@ -51,7 +51,7 @@ class RecordedFile:
     explain_missing: Callable[[str], str] = lambda name: ""
 
     @property
-    def head(self) -> Span:
+    def header_span(self) -> Span:
         """Place of the names: the first line of the file."""
         lines = self.source.lines
         return Span(self.source, 1, 1, max(1, len(lines[0])) if lines else 1)

@@ -15,12 +15,12 @@ PART_PATTERN = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+
 """Pattern of a file name with a window: name, start and end."""
 
 
-def file_of(path: Path) -> Path:
+def strip_window_suffix(path: Path) -> Path:
     """Return the path without its time window."""
-    return part_of(path)[0]
+    return split_window_suffix(path)[0]
 
 
-def part_of(path: Path) -> tuple[Path, Window | None]:
+def split_window_suffix(path: Path) -> tuple[Path, Window | None]:
     """Return the file of a path and its time window [s]; None if the path names no window.
 
     An existing file whose own name has this form is taken as a whole.
@@ -31,12 +31,12 @@ def part_of(path: Path) -> tuple[Path, Window | None]:
     return path.with_name(match["file"]), (Fraction(match["start"]), Fraction(match["end"]))
 
 
-def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[Window, ...]:
+def windows_in_use(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[Window, ...]:
     """Return the time windows [s] of a path: those of the map, intersected with that of the path.
 
     An empty tuple means the whole recording. An empty intersection is reported.
     """
-    file, part = part_of(path)
+    file, part = split_window_suffix(path)
     windows = mapping.windows_of(file.name)
     if part is None:
         return windows
@@ -50,13 +50,13 @@ def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[W
     return result
 
 
-def overlap(first: Path, second: Path, compare_contents: bool = True) -> bool:
+def paths_overlap(first: Path, second: Path, compare_contents: bool = True) -> bool:
     """Return whether two paths have values in common.
 
     They have if they name the same file, or copies of it, and their time windows overlap. Copies
     are recognised only if `compare_contents` is true.
     """
-    (first_file, a), (second_file, b) = part_of(first), part_of(second)
+    (first_file, a), (second_file, b) = split_window_suffix(first), split_window_suffix(second)
     if os.path.realpath(first_file) != os.path.realpath(second_file) and not (
         compare_contents and is_copy(first_file, second_file)
     ):

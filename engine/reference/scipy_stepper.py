@@ -82,7 +82,7 @@ def without_integration(program: Program) -> Program:
     return dataclasses.replace(program, blocks=blocks)
 
 
-def evaluated_guards(program: Program, mode: ModeInfo) -> tuple[str, ...]:
+def evaluated_guard_slots(program: Program, mode: ModeInfo) -> tuple[str, ...]:
     """Return the slots of the guards that are evaluated in a mode of the chart, each once.
 
     These are the guards of transitions from the mode and those of all parallel regions.
@@ -114,7 +114,7 @@ class ScipyStepper:
         self._guards = {}
         levels = [v.name for v in program.variables if v.name.startswith("memory.level_")]
         for mode in program.modes:
-            slots = evaluated_guards(program, mode)
+            slots = evaluated_guard_slots(program, mode)
             guards = (f"work.guard_{slot}" for slot in slots)
             before = (f"memory.armed_{slot}" for slot in slots)
             now = self._inner.make_reader(

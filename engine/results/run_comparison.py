@@ -55,8 +55,8 @@ class ModeSequence:
     instance: str
     count_a: int
     count_b: int
-    parted: int | None
-    apart: float
+    first_difference: int | None
+    largest_time_difference: float
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class RunDifference:
         the result False.
         """
         missing = self.only_a or self.only_b or self.uncovered > 0.0 or self.windows
-        parted = any(sequence.parted is not None for sequence in self.sequences)
+        parted = any(sequence.first_difference is not None for sequence in self.sequences)
         return not missing and not parted and all(item.first is None for item in self.signals)
 
     @property

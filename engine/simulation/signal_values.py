@@ -32,10 +32,10 @@ class DelayLine:
     signals the stored values are used.
     """
 
-    def __init__(self, line: DelayedSignal, input_signal: InputSignal | None) -> None:
+    def __init__(self, delayed_signal: DelayedSignal, input_signal: InputSignal | None) -> None:
         """Take the delayed signal and, if its source is a system input, that stimulus."""
-        self.line = line
-        self.course = input_signal
+        self.delayed_signal = delayed_signal
+        self.input_signal = input_signal
         self._stored: deque[tuple[Fraction, Any]] = deque()
 
     def push(self, time: Fraction, value: Any) -> None:
@@ -48,10 +48,12 @@ class DelayLine:
         `since` is the start of the present step: an input keeps the piece of its stimulus that is
         active then. Stored values that are no longer needed are removed.
         """
-        delayed = time - self.line.delay
-        if self.course:
-            delayed_since = None if since is None else max(since - self.line.delay, Fraction(0))
-            return self.course.at(max(delayed, Fraction(0)), delayed_since)
+        delayed = time - self.delayed_signal.delay
+        if self.input_signal:
+            delayed_since = (
+                None if since is None else max(since - self.delayed_signal.delay, Fraction(0))
+            )
+            return self.input_signal.at(max(delayed, Fraction(0)), delayed_since)
         while len(self._stored) > 1 and self._stored[1][0] <= delayed:
             self._stored.popleft()
         return self._stored[0][1]
@@ -82,15 +84,15 @@ class Signals:
         truths |= {name for name, thing in system.inputs.items() if thing.is_bool}
         truths |= {line.name for line in system.delayed_signals.values() if line.source in truths}
         self._wires = Interpreter(wires_program(formulas, frozenset(truths)))
-        self.courses = {
+        self.input_signals = {
             name: InputSignal(name, stimulus, self._evaluate_piece)
             for name, stimulus in scenario.inputs.items()
         }
         self.sensors = {
             name: SensorRun(sensor, scenario.seed) for name, sensor in system.sensors.items()
         }
-        self.lines = {
-            name: DelayLine(line, self.courses.get(line.source))
+        self.delay_lines = {
+            name: DelayLine(line, self.input_signals.get(line.source))
             for name, line in system.delayed_signals.items()
         }
         self._inputs: dict[str, Any] = {}
@@ -100,7 +102,7 @@ class Signals:
     def read_inputs(self, time: Fraction) -> None:
         """Set the instant and evaluate every input of the system there."""
         self.time = time
-        self._inputs = {name: signal.at(time) for name, signal in self.courses.items()}
+        self._inputs = {name: signal.at(time) for name, signal in self.input_signals.items()}
 
     def current_value(self, name: str) -> Any:
         """Return the present value of a signal.
@@ -114,7 +116,7 @@ class Signals:
             return self._inputs[name]
         sensor = self.sensors.get(name)
         if sensor is None:
-            return self.lines[name].at(self.time)
+            return self.delay_lines[name].at(self.time)
         if sensor.sensor.period is None:
             return sensor.evaluate(self.time, self.current_value(sensor.sensor.source))
         return sensor.value
@@ -124,9 +126,9 @@ class Signals:
 
         Only inputs, and delayed inputs, with a varying stimulus do.
         """
-        signal = self.courses.get(name)
-        if signal is None and name in self.lines:
-            signal = self.lines[name].course
+        signal = self.input_signals.get(name)
+        if signal is None and name in self.delay_lines:
+            signal = self.delay_lines[name].input_signal
         return signal is not None and signal.varies
 
     def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
@@ -137,11 +139,11 @@ class Signals:
         """
 
         def read(name: str) -> Any:
-            signal = self.courses.get(name)
+            signal = self.input_signals.get(name)
             if signal:
                 return signal.at(time, since)
-            line = self.lines.get(name)
-            return line.at(time, since) if line and line.course else self.current_value(name)
+            line = self.delay_lines.get(name)
+            return line.at(time, since) if line and line.input_signal else self.current_value(name)
 
         return read
 

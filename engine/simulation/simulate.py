@@ -139,9 +139,9 @@ class _Simulation:
             for variable in program.variables:
                 if variable.name.startswith("is_new."):
                     stepper.set(variable.name, True)
-        for line in self.signals.lines.values():
-            if line.course is None:
-                line.push(Fraction(0), self.signals.current_value(line.line.source))
+        for line in self.signals.delay_lines.values():
+            if line.input_signal is None:
+                line.push(Fraction(0), self.signals.current_value(line.delayed_signal.source))
         for name, flow in self.flows.items():
             self.wiring.set_inputs(name, Fraction(0))
             flow.start()
@@ -157,22 +157,22 @@ class _Simulation:
     def _record_rows(self, row_times: Sequence[Fraction]) -> None:
         """Record the rows that every continuous instance has reached."""
         environments = list(self.environments.values())
-        reached = min((len(each.looked) for each in environments), default=len(row_times))
+        reached = min((len(each.sampled_rows) for each in environments), default=len(row_times))
         pick_row = (
             self.rows.make_row_picker(environments[0].names) if len(environments) == 1 else None
         )
         if pick_row:
-            self.rows.extend(row_times[:reached], map(pick_row, environments[0].looked))
+            self.rows.extend(row_times[:reached], map(pick_row, environments[0].sampled_rows))
             reached = 0
         for number, row in enumerate(row_times[:reached]):
             values: dict[str, Any] = {}
             for environment in environments:
-                values.update(zip(environment.names, environment.looked[number], strict=True))
+                values.update(zip(environment.names, environment.sampled_rows[number], strict=True))
             self.rows.add(
                 row, partial(self._value_at_row, row, values), self.signals.evaluate_formula
             )
         for environment in environments:
-            environment.looked.clear()
+            environment.sampled_rows.clear()
 
     def _value_at_row(self, row: Fraction, values: Mapping[str, Any], name: str) -> Any:
         """Return a signal at a row [s]: the sampled value, else the value of its source then."""
@@ -229,14 +229,14 @@ class _Simulation:
             run = self.signals.sensors[name]
             run.capture(time, self.signals.current_value(run.sensor.source))
         else:
-            line = self.signals.lines[name]
-            line.push(time, self.signals.current_value(line.line.source))
+            line = self.signals.delay_lines[name]
+            line.push(time, self.signals.current_value(line.delayed_signal.source))
 
     def _push_to_lines(self, sources: Sequence[str], time: Fraction) -> None:
         """Store the present values of some sources in their delay lines."""
-        for line in self.signals.lines.values():
-            if line.line.source in sources:
-                line.push(time, self.signals.current_value(line.line.source))
+        for line in self.signals.delay_lines.values():
+            if line.delayed_signal.source in sources:
+                line.push(time, self.signals.current_value(line.delayed_signal.source))
 
     def _update_flow(self, name: str, time: Fraction) -> None:
         """Set the inputs of a continuous instance; a change is an event (rule 11a).

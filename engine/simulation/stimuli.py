@@ -27,7 +27,7 @@ class InputSignal:
         """Take the name of the input, its stimulus, and an evaluator of its formulas."""
         self.name = name
         self.pieces = stimulus.pieces
-        self.truth = stimulus.is_bool
+        self.is_bool = stimulus.is_bool
         self.varies = stimulus.varies
         self.starts = [piece.start for piece in stimulus.pieces]
         self._formulas = formulas
@@ -47,12 +47,12 @@ class InputSignal:
         if not piece.slope:
             return self.constant_value(piece)
         exact = piece.value + piece.slope * (max(time, Fraction(0)) - piece.start)
-        return bool(exact) if self.truth else exact.numerator / exact.denominator
+        return bool(exact) if self.is_bool else exact.numerator / exact.denominator
 
     def constant_value(self, piece: StimulusPiece) -> float | bool:
         """Return the value of a piece without slope and formula."""
         exact = piece.value
-        return bool(exact) if self.truth else exact.numerator / exact.denominator
+        return bool(exact) if self.is_bool else exact.numerator / exact.denominator
 
     def _active_piece(self, time: Fraction) -> int:
         """Return the index of the piece at a time [s]; the previous one is tried first."""
@@ -101,13 +101,13 @@ def resolve_recording(system: System, scenario: Scenario) -> Scenario:
     )
 
 
-def stimulus_of(channel: Channel, start: Fraction, truth: bool = False) -> Stimulus:
+def stimulus_of(channel: Channel, start: Fraction, is_bool: bool = False) -> Stimulus:
     """Return a channel as a stimulus from `start` [s] on, held or linear as the map says."""
     values = [Fraction(value) for value in channel.values]
     points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
     pieces = linear_pieces(points) if channel.column.hold == "linear" else constant_pieces(points)
     first = max(0, bisect_right([piece.start for piece in pieces], Fraction(0)) - 1)
-    return Stimulus(pieces[first:], is_bool=truth)
+    return Stimulus(pieces[first:], is_bool=is_bool)
 
 
 def _value_at_start(recording: Recording, column: str, start: Fraction) -> Fraction:

@@ -32,7 +32,7 @@ class SystemEnvironment:
         `looked` collects the values of `names` at each sampled time.
         """
         self.name = name
-        self.looked: list[tuple[Any, ...]] = []
+        self.sampled_rows: list[tuple[Any, ...]] = []
         self._stepper = stepper
         self._signals = signals
         variables = {variable.name for variable in program.variables}
@@ -82,7 +82,7 @@ class SystemEnvironment:
         for run in self._unsampled:
             value = values[self._outputs.index(run.sensor.source)]
             values = (*values, run.evaluate(time, value))
-        self.looked.append(values)
+        self.sampled_rows.append(values)
 
     def _input_function(self, connection: Connection) -> Callable[[Fraction], Any]:
         """Return a function of time [s] that evaluates a connection within the present flow."""

@@ -23,7 +23,7 @@ from language.checks.check_rewind import check_rewind_depth
 from language.checks.check_single_writer import check_outputs, check_scaling_ranges, check_writers
 from language.checks.check_truth_table import check_truth_tables
 from language.checks.check_unused import check_unused
-from language.checks.declared_names import declared_names
+from language.checks.declared_names import collect_declared_names
 from language.expressions.balance_form import coefficient_of
 from language.expressions.syntax_tree import DELAY_FUNCTIONS, ErrorNode, SyntaxTree, integer_literal
 from language.expressions.units import (
@@ -193,7 +193,7 @@ class _AutomatonChecker:
     def run(self) -> Automaton:
         """Run all checks and return the automaton with dimensions, types and marked equations."""
         automaton = self.automaton
-        self.kinds, self.literal_kinds = declared_names(automaton, self.problems)
+        self.kinds, self.literal_kinds = collect_declared_names(automaton, self.problems)
         self._check_parameters()
         self._check_initial_values()
         check_size(automaton, self.problems)

@@ -84,7 +84,7 @@ class _ModeDomainChecker:
         self.range_analysis = RangeAnalysis(
             self.interval_of, self._table_interval, likeness, self._report
         )
-        self.unreported_range_analysis = self.range_analysis.unreported
+        self.unreported_range_analysis = self.range_analysis.without_reports
 
     def check(self) -> None:
         """Report the operands of equations, actions, truth tables and balances of the mode.

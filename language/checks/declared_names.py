@@ -14,7 +14,7 @@ BUILTIN_NAMES = ("mode", "faults")
 """Names that the language defines."""
 
 
-def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprType:
+def declaration_type(declaration: Parameter | Input | State | SystemInput) -> ExprType:
     """Return the type of a declaration: truth, enumeration, integer interval or dimension.
 
     A fixed integer parameter has the interval of its value; other integers that of their range.
@@ -35,7 +35,7 @@ def declared_kind(declaration: Parameter | Input | State | SystemInput) -> ExprT
     return declaration.unit.dimension
 
 
-def declared_names(
+def collect_declared_names(
     automaton: Automaton, problems: Problems
 ) -> tuple[dict[str, ExprType], dict[str, ExprType]]:
     """Return the types of all declared names, and those of the values of enumerations.
@@ -63,7 +63,7 @@ class _DeclarationTable:
         groups = (automaton.parameters, automaton.inputs, automaton.state_variables)
         for group in groups:
             for name, thing in group.items():
-                self._declare_name(name, declared_kind(thing), thing.span)
+                self._declare_name(name, declaration_type(thing), thing.span)
         for group in groups:
             for thing in group.values():
                 if thing.values:

@@ -97,7 +97,9 @@ def _read_model(
         problems.raise_if_errors()
     model_parameters = _parameter_table(base.root)
     shared = {key: entry for key, entry in own.entries.items() if key in model_parameters.entries}
-    merged = apply_overlay(model_parameters, MappingNode(shared, own.span), problems, template=True)
+    merged = apply_overlay(
+        model_parameters, MappingNode(shared, own.span), problems, is_template=True
+    )
     known = MappingNode({**model_parameters.entries, **own.entries}, own.span)
     model_values = {key: value for key, value in values.items() if key in model_parameters.entries}
     own_values = {key: value for key, value in values.items() if key not in model_values}

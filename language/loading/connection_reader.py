@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.checks.declared_names import declared_kind
+from language.checks.declared_names import declaration_type
 from language.expressions.syntax_tree import (
     BoolLiteral,
     ErrorNode,
@@ -51,14 +51,18 @@ class ConnectionReader(Reader):
         self.inputs = inputs
         self.instances = instances
         self.sensors: dict[str, Sensor] = {}
-        self.lines: dict[str, DelayedSignal] = {}
+        self.delayed_signals: dict[str, DelayedSignal] = {}
         self.dimensions: dict[str, Dimension] = {}
-        self.kinds: dict[str, ExprType] = {n: declared_kind(thing) for n, thing in inputs.items()}
+        self.signal_types: dict[str, ExprType] = {
+            n: declaration_type(thing) for n, thing in inputs.items()
+        }
         self.instance_outputs: dict[str, ExprType] = {}
         for instance in instances.values():
-            self.instance_outputs.update(output_kinds(instance))
-        self.kinds.update(self.instance_outputs)
-        self.measurable = {n: k for n, k in self.kinds.items() if isinstance(k, Dimension)}
+            self.instance_outputs.update(output_types(instance))
+        self.signal_types.update(self.instance_outputs)
+        self.measurable_types = {
+            n: k for n, k in self.signal_types.items() if isinstance(k, Dimension)
+        }
 
     def read_sensors(self, node: YamlNode | None) -> None:
         """Read `sensors` into `self.sensors`; connections and outputs can read them afterwards."""
@@ -70,17 +74,17 @@ class ConnectionReader(Reader):
             with self.problems.collect_errors():
                 sensor = self._read_sensor(entry)
                 self.sensors[entry.key] = sensor
-                self.kinds[entry.key] = sensor.dimension
+                self.signal_types[entry.key] = sensor.dimension
 
     def _read_sensor(self, entry: Entry) -> Sensor:
         """Return one sensor; a wrong source and inconsistent stages are reported."""
         table = self.read_mapping(entry.node, f"sensors.{entry.key}", SENSOR_KEYS)
         source = self.read_scalar(table.get("of"), "of", entry.span)
-        dimension = self.measurable.get(source.text, PURE_NUMBER) if source else PURE_NUMBER
-        if source and source.text not in self.measurable:
+        dimension = self.measurable_types.get(source.text, PURE_NUMBER) if source else PURE_NUMBER
+        if source and source.text not in self.measurable_types:
             label = f"`{source.text}` is not an input or an output of an instance with a real value"
             self.problems.error(
-                "name", source.span, label, suggest_name(source.text, self.measurable)
+                "name", source.span, label, suggest_name(source.text, self.measurable_types)
             )
         unit = Unit(str(dimension), Fraction(1), dimension)
         lag = self._read_stage(table, "filter", "lag", None)
@@ -200,15 +204,15 @@ class ConnectionReader(Reader):
             return Connection(to, value, source.span)
         tree = self._replace_delays(tree)
         if isinstance(tree, Name):
-            self._check_direct_connection(tree, declared_kind(declaration))
+            self._check_direct_connection(tree, declaration_type(declaration))
             return Connection(to, tree.path, source.span)
         check = TypeChecker(self._scope(), self.problems)
-        check.check_assignment(tree, declared_kind(declaration), f"the input {name}")
+        check.check_assignment(tree, declaration_type(declaration), f"the input {name}")
         return Connection(to, Formula(tree, f"connections.{target.name}.{name}"), source.span)
 
     def _check_direct_connection(self, tree: Name, expected: ExprType) -> None:
         """Report a signal that does not exist or whose type does not fit the input."""
-        kind = self.kinds.get(tree.path)
+        kind = self.signal_types.get(tree.path)
         if kind is None:
             label = f"`{tree.path}` is not an input of the system or an output of an instance"
             self.problems.error(
@@ -222,11 +226,11 @@ class ConnectionReader(Reader):
 
     def _connectable_names(self) -> list[str]:
         """Return the names of all signals but the delayed ones, for hints."""
-        return [name for name in self.kinds if name not in self.lines]
+        return [name for name in self.signal_types if name not in self.delayed_signals]
 
     def _scope(self) -> NameEnvironment:
         """Return the name environment of expressions of the system."""
-        return NameEnvironment(self.kinds, location="in this system")
+        return NameEnvironment(self.signal_types, location="in this system")
 
     def _replace_delays(self, tree: SyntaxTree) -> SyntaxTree:
         """Return an expression with each `delay(signal, d)` replaced by a name.
@@ -253,7 +257,7 @@ class ConnectionReader(Reader):
             case (Name(path, span), NumberLiteral(delay, unit, _)) if are_compatible(
                 unit.dimension, SECOND
             ):
-                if path not in self.kinds or path in self.lines:
+                if path not in self.signal_types or path in self.delayed_signals:
                     label = f"`{path}` is not an input of the system or an output of an instance"
                     self.problems.error(
                         "name", span, label, suggest_name(path, self._connectable_names())
@@ -262,8 +266,8 @@ class ConnectionReader(Reader):
                 if delay == 0:
                     return Name(path, tree.span)
                 name = f"delay.{path}.{delay.numerator}.{delay.denominator}"
-                self.lines[name] = DelayedSignal(name, path, delay)
-                self.kinds[name] = self.kinds[path]
+                self.delayed_signals[name] = DelayedSignal(name, path, delay)
+                self.signal_types[name] = self.signal_types[path]
                 return Name(name, tree.span)
         label = "a delay is `delay(signal, time)`, like `delay(T_req, 1 ms)`"
         self.problems.error("arguments", tree.span, label)
@@ -313,7 +317,7 @@ class ConnectionReader(Reader):
                 self.problems.error("form", part.span, label, "a sensor may have a `delay`")
 
 
-def output_kinds(instance: Instance) -> dict[str, ExprType]:
+def output_types(instance: Instance) -> dict[str, ExprType]:
     """Return the types of the outputs of an instance by `instance.output`.
 
     The output `mode` has no type and is left out.

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from language.checks.declared_names import declared_kind
-from language.loading.connection_reader import output_kinds
+from language.checks.declared_names import declaration_type
+from language.loading.connection_reader import output_types
 from language.model.system import System
 from language.typecheck.types import ExprType
 
 
-def signal_kinds(system: System) -> dict[str, ExprType]:
+def signal_types(system: System) -> dict[str, ExprType]:
     """Return the types of the inputs, outputs of instances, sensors and outputs of a system.
 
     Outputs without a known type, such as modes, are left out.
     """
     kinds: dict[str, ExprType] = {
-        name: declared_kind(declaration) for name, declaration in system.inputs.items()
+        name: declaration_type(declaration) for name, declaration in system.inputs.items()
     }
     for instance in system.instances.values():
-        kinds.update(output_kinds(instance))
+        kinds.update(output_types(instance))
     kinds.update({name: sensor.dimension for name, sensor in system.sensors.items()})
     for name, output in system.outputs.items():
         if isinstance(output, str) and output in kinds:

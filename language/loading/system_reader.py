@@ -130,7 +130,7 @@ class _SystemReader(Reader):
             order=order,
             span=document.name_span,
             sensors=wires.sensors,
-            delayed_signals=wires.lines,
+            delayed_signals=wires.delayed_signals,
             dimensions=wires.dimensions,
         )
 
@@ -238,7 +238,7 @@ class _SystemReader(Reader):
         for connection in connections.values():
             target = instances[connection.target[0]]
             for read in connection.reads:
-                owner = read.partition(".")[0] if read not in wires.lines else ""
+                owner = read.partition(".")[0] if read not in wires.delayed_signals else ""
                 self._check_continuous_read(wires, read, target, connection)
                 if owner in edges and target.automaton.is_sampled:
                     edges[owner].append(target.name)
@@ -266,7 +266,7 @@ class _SystemReader(Reader):
                 f"`{target.name}` is continuous and reads sensor `{read}`, which has no `sample`"
             )
             self.problems.error("connection", at.span, label, "like `sample: 1 ms`")
-        source = wires.lines[read].source if read in wires.lines else read
+        source = wires.delayed_signals[read].source if read in wires.delayed_signals else read
         owner = wires.instances.get(source.partition(".")[0])
         if owner and "." in source:
             self._report_both_continuous(owner, target, at)

@@ -28,7 +28,7 @@ from language.overlays.tree_types import formula_entries
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
-from language.text.node_edit import entries, find_node, put_node, replace_source, scalars_of
+from language.text.node_edit import find_node, mapping_entries, put_node, replace_source, scalars_of
 from language.text.overlay import apply_overlay
 
 HOLE_PATTERN = re.compile(r"\$([A-Za-z]\w*)")
@@ -82,7 +82,7 @@ class _EffectApplier:
         self.tree = tree
         self.problems = problems
         source = application.effect.span.source
-        overlay = Source(source.name, source.lines, application.layer_name, application.span)
+        overlay = Source(source.name, source.lines, application.overlay_name, application.span)
         body = replace_source(application.effect.body, overlay)
         assert isinstance(body, MappingNode)
         self.body = body
@@ -136,7 +136,7 @@ class _EffectApplier:
         for section in ("elements", "regions"):
             node = self.tree.get(section)
             present = node.entries if isinstance(node, MappingNode) else {}
-            for entry in entries(self.body.get(section)):
+            for entry in mapping_entries(self.body.get(section)):
                 final = self._with_suffix(entry.key)
                 self._check_private_name(entry.key, final, final in present, self.application.span)
         return own
@@ -290,7 +290,7 @@ class _EffectApplier:
         A key such as `$torque` names an equation of the tree, and `base` in its formula stands for
         the old one. Unknown equations are reported.
         """
-        for entry in entries(self.body.get("equations")):
+        for entry in mapping_entries(self.body.get("equations")):
             if not entry.key.startswith("$"):
                 continue
             (name,) = self._fill_key(entry.key, ("equations",))
@@ -313,7 +313,7 @@ class _EffectApplier:
         between modes, or if no summand reads the name.
         """
         source = self.place.balance_state
-        for entry in entries(self.body.get("move")):
+        for entry in mapping_entries(self.body.get("move")):
             target = entry.node.text if isinstance(entry.node, ScalarNode) else ""
             if target not in self.private_names or source is None:
                 label = "what moves goes to the balance of a state of the effect"
@@ -354,7 +354,7 @@ class _EffectApplier:
 def _used_names(tree: MappingNode) -> Iterator[str]:
     """Yield the names of parameters, inputs, states, discrete variables, regions and equations."""
     for section in ("parameters", "inputs", "states", "discrete", "regions"):
-        for entry in entries(tree.get(section)):
+        for entry in mapping_entries(tree.get(section)):
             yield entry.key
     for name, _ in formula_entries(tree, "equations"):
         yield name

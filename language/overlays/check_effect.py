@@ -11,7 +11,7 @@ from language.reading.parameter_reader import ParameterReader
 from language.reading.reader import Reader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.text.node_edit import entries, format_inline, put_node, scalars_of
+from language.text.node_edit import format_inline, mapping_entries, put_node, scalars_of
 from language.typecheck.function_calls import FUNCTION_NAMES, argument_count_error
 
 HOLE_PATTERN = re.compile(r"\$[A-Za-z]\w*")
@@ -29,10 +29,10 @@ def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -
     texts = [
         (entry.key, entry.span)
         for section in KEY_HOLE_SECTIONS
-        for entry in entries(tree.get(section))
+        for entry in mapping_entries(tree.get(section))
     ]
     for section in UNIT_SECTIONS:
-        for entry in entries(tree.get(section)):
+        for entry in mapping_entries(tree.get(section)):
             unit = entry.node.get("unit") if isinstance(entry.node, MappingNode) else None
             if isinstance(unit, ScalarNode):
                 texts.append((unit.text, unit.span))

@@ -18,7 +18,7 @@ from language.reading.element_reader import outputs_as_mapping
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 from language.text.formula_sites import AUTOMATON_SITES, KeyPath, map_formulas
-from language.text.node_edit import entries, find_node, put_node
+from language.text.node_edit import find_node, mapping_entries, put_node
 
 MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
 """Sections at the root that contain modes."""
@@ -205,7 +205,7 @@ def remove_summands(
     moved: dict[str, YamlNode] = {}
     remaining_terms = {}
     terms = find_node(tree, ("terms", state))
-    for entry in entries(terms):
+    for entry in mapping_entries(terms):
         if isinstance(entry.node, ScalarNode) and names & set(names_in_text(entry.node.text)):
             moved[entry.key] = entry.node
         else:

@@ -116,7 +116,7 @@ class EffectApplication:
         return self.span.subspan(len(self.effect.name) + 1, len(self.place))
 
     @property
-    def layer_name(self) -> str:
+    def overlay_name(self) -> str:
         """The name of the overlay in messages, like `effect coulomb_friction@w_em`."""
         return f"effect {self.effect.name}@{self.place}"
 

@@ -17,7 +17,7 @@ from language.overlays.effect_reader import read_effect_application
 from language.reading.reader import Reader
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
-from language.text.node_edit import entries
+from language.text.node_edit import mapping_entries
 from language.text.overlay import apply_overlay, without_keys
 from language.text.project_files import Project, display_path, parse_document, read_document
 
@@ -147,7 +147,7 @@ def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]
     if isinstance(model, ScalarNode):
         base = expand_document(project.read(project.path_of(model.text, model.span)), project)
         result = parameters_of(without_keys(base.root, "model"), project)
-    for entry in entries(tree.get("parameters")):
+    for entry in mapping_entries(tree.get("parameters")):
         if isinstance(entry.node, MappingNode):
             result[entry.key] = entry.node
     return result
@@ -159,7 +159,7 @@ def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tup
     The keys are names like `k1_t_close`: instance, underscore, parameter.
     """
     result: dict[str, tuple[str, str]] = {}
-    for entry in entries(tree.get("instances")):
+    for entry in mapping_entries(tree.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
         if isinstance(of, ScalarNode):
             root = expand_document(project.read(project.path_of(of.text, of.span)), project).root
@@ -219,7 +219,7 @@ def _calibrate_system(
     """
     targets: dict[str, tuple[str, str]] = {}
     is_applicable = calibration.of.text in names
-    for entry in entries(root.get("instances")):
+    for entry in mapping_entries(root.get("instances")):
         of = entry.node.get("of") if isinstance(entry.node, MappingNode) else None
         if not isinstance(of, ScalarNode):
             continue
@@ -267,7 +267,7 @@ def _apply_effects(
         problems.error("form", overlay.root.entries["effects"].span, label)
         problems.raise_if_errors()
     root = without_keys(merged.root, "effects")
-    for entry in entries(node):
+    for entry in mapping_entries(node):
         effect_problems = Problems()
         with effect_problems.collect_errors():
             root = apply_effect(

@@ -59,7 +59,7 @@ def table_points(
     return MappingNode({"points": Entry("points", span, rows(parameter.table.axes))}, span)
 
 
-def is_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
+def has_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
     """Tell whether the exact value of a real parameter is that of its shortest literal.
 
     It is false for a value with more digits than its type holds, such as `0.06000000001` in

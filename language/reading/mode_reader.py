@@ -129,7 +129,7 @@ class ModeReader(Reader):
                 "name", node.span, label, suggest_name(name, self.templates.entries)
             )
             return without_keys(mode, "like")
-        return apply_overlay(template, without_keys(mode, "like"), self.problems, template=True)
+        return apply_overlay(template, without_keys(mode, "like"), self.problems, is_template=True)
 
     def read_mode(self, entry: Entry, context: ModeContext) -> Mode:
         """Return a mode with the dynamics that it inherits from its parent or from the root."""

@@ -45,7 +45,7 @@ class VariableDomain:
     names: tuple[str, ...] = ()
     default: Scalar | None = None
 
-    def holds(self, value: Scalar) -> bool:
+    def contains(self, value: Scalar) -> bool:
         """Return whether a value lies between the bounds, and in `numbers` if that is not empty."""
         low, high = self._bounds
         return low <= value <= high and (not self.numbers or value in self.numbers)
@@ -117,7 +117,7 @@ class SolverQuery:
         The result is False if a name has no value or an evaluation fails (overflow, domain error).
         """
         try:
-            if not all(self.domains[name].holds(value) for name, value in point.items()):
+            if not all(self.domains[name].contains(value) for name, value in point.items()):
                 return False
             values = {**self._read_parameter_values, **point}
             for target, value in self._needed_assignments:

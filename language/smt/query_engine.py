@@ -137,7 +137,7 @@ class QueryEngine:
         wider = self.free_tunables(query)
         return wider is None or _is_proven_unsatisfiable(QueryKey(wider.key, wider))
 
-    def find_confirmed_witness(self, exact: SolverQuery, near: SolverQuery) -> Witness | None:
+    def find_confirmed_witness(self, exact: SolverQuery, relaxed: SolverQuery) -> Witness | None:
         """Return a solution of the first query by z3 that satisfies the second one, else None.
 
         The second query is the first with equalities relaxed to a tolerance, because solutions are
@@ -148,8 +148,8 @@ class QueryEngine:
             return None
         solution = shared_solver().solve(exact, SMALL_RESOURCE_LIMIT)
         return (
-            _build_witness(near, solution)
-            if not isinstance(solution, str) and near.holds_at(solution)
+            _build_witness(relaxed, solution)
+            if not isinstance(solution, str) and relaxed.holds_at(solution)
             else None
         )
 

@@ -107,7 +107,7 @@ def _sample_value(domain: VariableDomain, index: int, position: int) -> Scalar:
     if domain.type == "truth":
         return bool(index >> position % 6 & 1)
     if domain.numbers:
-        inside = [number for number in domain.numbers if domain.holds(number)]
+        inside = [number for number in domain.numbers if domain.contains(number)]
         return inside[index % len(inside)] if inside else domain.numbers[0]
     low = DEFAULT_RANGE[0] if domain.low is None else float(domain.low)
     high = DEFAULT_RANGE[1] if domain.high is None else float(domain.high)

@@ -27,7 +27,7 @@ class ScalarNode:
 
     text: str
     span: Span
-    quoted: bool = False
+    is_quoted: bool = False
     changes: tuple[Span, ...] = ()
 
     @property
@@ -35,7 +35,7 @@ class ScalarNode:
         """The span of the text without quotes; atomic if an overlay rewrote the text."""
         if self.changes:
             return dataclasses.replace(self.span, is_atomic=True)
-        return self.span.subspan(1, len(self.text)) if self.quoted else self.span
+        return self.span.subspan(1, len(self.text)) if self.is_quoted else self.span
 
 
 @dataclass(frozen=True)

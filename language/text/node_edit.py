@@ -9,7 +9,7 @@ from language.text.diagnostic import Source, Span
 from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 
 
-def entries(node: YamlNode | None) -> Iterator[Entry]:
+def mapping_entries(node: YamlNode | None) -> Iterator[Entry]:
     """Yield the entries of a mapping in the order of the file.
 
     Another kind of node, or None, has no entries.

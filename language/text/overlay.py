@@ -7,13 +7,13 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 
 
 def apply_overlay(
-    base: MappingNode, overlay: MappingNode, problems: Problems, *, template: bool = False
+    base: MappingNode, overlay: MappingNode, problems: Problems, *, is_template: bool = False
 ) -> MappingNode:
     """Return `base` merged with `overlay` (docs/language.md, "Variants, effects, calibrations").
 
     Mappings are merged key by key at every depth. A scalar or a sequence replaces the value of the
     base. `{remove: true}` removes a key; it is an error if the base does not have the key. A value
-    equal to that of the base gives a warning unless `template` is true. Problems are added to
+    equal to that of the base gives a warning unless `is_template` is true. Problems are added to
     `problems`.
     """
     entries = dict(base.entries)
@@ -27,15 +27,15 @@ def apply_overlay(
         elif present is None:
             entries[entry.key] = _reject_removals(entry, base, problems)
         else:
-            node = _merge_entry(present, entry, problems, template)
+            node = _merge_entry(present, entry, problems, is_template)
             entries[entry.key] = Entry(entry.key, present.span, node)
     return MappingNode(entries, base.span)
 
 
-def without_keys(table: MappingNode, *keys: str) -> MappingNode:
+def without_keys(mapping: MappingNode, *keys: str) -> MappingNode:
     """Return a copy of a mapping without the given keys; absent keys are ignored."""
-    entries = {key: entry for key, entry in table.entries.items() if key not in keys}
-    return MappingNode(entries, table.span)
+    entries = {key: entry for key, entry in mapping.entries.items() if key not in keys}
+    return MappingNode(entries, mapping.span)
 
 
 def _is_removal(node: YamlNode) -> bool:
@@ -62,7 +62,7 @@ def _reject_removals(entry: Entry, base: MappingNode, problems: Problems) -> Ent
 def _merge_entry(base: Entry, overlay: Entry, problems: Problems, template: bool) -> YamlNode:
     """Return the node that results from an entry of the overlay over an entry of the base."""
     if isinstance(base.node, MappingNode) and isinstance(overlay.node, MappingNode):
-        return apply_overlay(base.node, overlay.node, problems, template=template)
+        return apply_overlay(base.node, overlay.node, problems, is_template=template)
     if (
         not template
         and not isinstance(base.node, MappingNode)

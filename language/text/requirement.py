@@ -18,9 +18,9 @@ class RequirementUse:
     span: Span
 
 
-def requirements_of(table: MappingNode) -> tuple[str, ...]:
+def requirements_of(mapping: MappingNode) -> tuple[str, ...]:
     """Return the names under the key `req` of a mapping; empty without the key."""
-    return tuple(item.text for item in _requirement_scalars(table))
+    return tuple(item.text for item in _requirement_scalars(mapping))
 
 
 def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[RequirementUse]:

@@ -181,13 +181,13 @@ class _YamlBuilder:
         if not (last and isinstance(last.node, ScalarNode) and isinstance(key, ScalarNode)):
             return False
         value = last.node
-        is_open = not value.quoted and value.text.count("(") > value.text.count(")")
+        is_open = not value.is_quoted and value.text.count("(") > value.text.count(")")
         if (
             not is_open
-            or key.quoted
+            or key.is_quoted
             or not isinstance(node, ScalarNode)
             or node.text
-            or node.quoted
+            or node.is_quoted
         ):
             return False
         text = f"{value.text}, {key.text}"

@@ -69,7 +69,7 @@ class RangeAnalysis:
         self.table_interval = table_interval
         self.numbering = numbering
         self.report = report
-        self.unreported = (
+        self.without_reports = (
             RangeAnalysis(name_interval, table_interval, numbering) if report else self
         )
         self.bound_cache: dict[tuple[int, int], tuple[Constraints, Interval]] = {}
@@ -80,7 +80,7 @@ class RangeAnalysis:
 
         Report arguments outside of their domain inside it.
         """
-        self.unreported.bound_cache.clear()
+        self.without_reports.bound_cache.clear()
         before, self.branch_path = self.branch_path, []
         interval = self.interval_of(tree, NO_CONSTRAINTS)
         self.branch_path = before
@@ -214,8 +214,8 @@ class RangeAnalysis:
             case Relation(operator, left, right, _) if operator not in ("==", "!="):
                 operator = operator if holds else NEGATED_RELATION[operator]
                 first, second = (
-                    self.unreported.bound_of(left, constraints),
-                    self.unreported.bound_of(right, constraints),
+                    self.without_reports.bound_of(left, constraints),
+                    self.without_reports.bound_of(right, constraints),
                 )
                 constraints = self._constrain_by_relation(left, operator, second, constraints)
                 return self._constrain_by_relation(
@@ -223,8 +223,8 @@ class RangeAnalysis:
                 )
             case Relation(operator, left, right, _) if operator in ("==", "!="):
                 sides = (
-                    self.unreported.bound_of(left, constraints),
-                    self.unreported.bound_of(right, constraints),
+                    self.without_reports.bound_of(left, constraints),
+                    self.without_reports.bound_of(right, constraints),
                 )
                 bounded = (
                     self._constrain_equal

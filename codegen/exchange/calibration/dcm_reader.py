@@ -29,9 +29,9 @@ from codegen.exchange.calibration.dcm_block import (
 from codegen.exchange.calibration.name_filter import NameFilter
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 
-COMMENTS = ("*", "!", ".")
+COMMENT_MARKS = ("*", "!", ".")
 """First characters of comment lines."""
-WORD = re.compile(r'"[^"]*"|"?[^\s"]+|"')
+WORD_PATTERN = re.compile(r'"[^"]*"|"?[^\s"]+|"')
 """A word of a line: a text in quotes, or characters without a blank."""
 SECTIONS = ("FUNKTIONEN", "VARIANTENKODIERUNG")
 """Sections that end with END and hold no values."""
@@ -94,7 +94,7 @@ def _blank_other_blocks(source: Source, name_filter: NameFilter) -> Source:
     """
     lines, is_inside = [], False
     for number, line in enumerate(source.lines, start=1):
-        head, name, *_ = (*WORD.findall(line), "", "")
+        head, name, *_ = (*WORD_PATTERN.findall(line), "", "")
         if head in HEADS:
             place = Span(source, number, line.find(name) + 1, len(name))
             is_inside = head in SIZES and bool(name) and not name_filter.accepts(Cell(name, place))
@@ -120,10 +120,10 @@ def _word_lines(context: _ReadContext) -> Lines:
     """Yield the words of each line that is neither empty nor a comment; report unclosed quotes."""
     for number, line in enumerate(context.source.lines, start=1):
         text = line.strip()
-        if not text or text.startswith(COMMENTS):
+        if not text or text.startswith(COMMENT_MARKS):
             continue
         words = []
-        for match in WORD.finditer(line):
+        for match in WORD_PATTERN.finditer(line):
             span = Span(context.source, number, match.start() + 1, len(match[0]))
             if match[0].startswith('"') and (len(match[0]) < 2 or not match[0].endswith('"')):
                 context.problems.error("form", span, "a quote is opened and not closed")

@@ -9,7 +9,7 @@ from typing import Any
 
 from codegen.emit.c_module import emit_c_files
 from codegen.exchange.fmi.interface import used_enumerations, variables_of
-from codegen.exchange.fmi.standard import refusals
+from codegen.exchange.fmi.standard import unsupported_functions
 from codegen.exchange.fmi.unit import unit_definitions
 from codegen.exchange.fmi.variable import FMI_TYPES, VERSIONS, Version
 from codegen.toolchain.templates import product_version as product, render
@@ -87,7 +87,7 @@ def fmu_context(program: Program, version: Version) -> dict[str, Any]:
         "written": sorted({variable.kept for variable in variables if variable.role != "SHOWN"}),
         "faults": program.faults,
         "options": COMPILER_OPTIONS,
-        "refusals": list(refusals(version)),
+        "refusals": list(unsupported_functions(version)),
     }
 
 

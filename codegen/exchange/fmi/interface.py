@@ -34,7 +34,7 @@ from language.text.sanitise import escape_invisible
 RUN_MODE = "memory.run_mode"
 """The variable of the mode of the model that a run integrates."""
 
-PREFIX = "type."
+TYPE_PREFIX = "type."
 """The prefix of type names, which in FMI must differ from names of variables."""
 
 
@@ -56,7 +56,9 @@ def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
     if program.run_modes:
         types.append(_mode_enumeration("run_mode", program.run_modes))
     types += [
-        Enumeration(f"{PREFIX}values.{name}", tuple((value, k) for k, value in enumerate(values)))
+        Enumeration(
+            f"{TYPE_PREFIX}values.{name}", tuple((value, k) for k, value in enumerate(values))
+        )
         for name, values in enumerations(program)
     ]
     return tuple(types)
@@ -68,19 +70,19 @@ def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) 
     Returns an empty text if it has no type.
     """
     if name == MODE_VARIABLE:
-        return f"{PREFIX}mode"
+        return f"{TYPE_PREFIX}mode"
     if name == RUN_MODE:
-        return f"{PREFIX}run_mode"
+        return f"{TYPE_PREFIX}run_mode"
     for region in program.regions:
         if name == mode_variable(MODE_VARIABLE, region.name):
-            return f"{PREFIX}region.{region.name}"
+            return f"{TYPE_PREFIX}region.{region.name}"
     owners = (owner for owner, known in enumerations(program) if known == values)
-    return f"{PREFIX}values.{next(owners)}" if values else ""
+    return f"{TYPE_PREFIX}values.{next(owners)}" if values else ""
 
 
 def _mode_enumeration(name: str, modes: Iterable[ModeInfo]) -> Enumeration:
     """Return the enumeration type of a list of modes."""
-    return Enumeration(f"{PREFIX}{name}", tuple((mode.name, mode.number) for mode in modes))
+    return Enumeration(f"{TYPE_PREFIX}{name}", tuple((mode.name, mode.number) for mode in modes))
 
 
 LOCAL_PREFIXES = (
@@ -95,10 +97,10 @@ LOCAL_PREFIXES = (
 them.
 """
 
-FIRED = "memory.fired"
+FIRED_PREFIX = "memory.fired"
 """The prefix of variables with the number of the last transition; they become locals too."""
 
-FAULTS = "memory.faults"
+FAULT_WORD = "memory.faults"
 """The fault word, which becomes a local too."""
 
 
@@ -207,7 +209,7 @@ def _local_variables(program: Program, version: Version) -> Iterator[FmuVariable
     output_sources = {wire.source for wire in program.outputs}
     for variable in program.variables:
         name = variable.name
-        is_local = name.startswith((*LOCAL_PREFIXES, FIRED)) or name == FAULTS
+        is_local = name.startswith((*LOCAL_PREFIXES, FIRED_PREFIX)) or name == FAULT_WORD
         if not is_local or name in output_sources or variable.size:
             continue
         storage_type = c_type(variable, program.number_type)

@@ -22,7 +22,7 @@ IMPLEMENTED: Mapping[Version, str] = {
     "DeserializeFMUState DoStep",
 }
 """Functions that return a status and have their own template."""
-REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
+UNSUPPORTED_REASONS: tuple[tuple[str, str], ...] = (
     ("String$", "no variable is a text"),
     ("Binary", "no variable is binary"),
     ("Clock|Interval|Shift", "there are no clocks"),
@@ -38,7 +38,7 @@ REFUSAL_REASONS: tuple[tuple[str, str], ...] = (
 
 
 @dataclass(frozen=True)
-class Refusal:
+class UnsupportedFunction:
     """A function that is exported because FMI requires it, and returns an error on each call."""
 
     name: str
@@ -51,7 +51,7 @@ class Refusal:
         return tuple(parameter.split()[-1].strip("*[]") for parameter in self.parameters)
 
 
-def refusals(version: Version) -> Iterator[Refusal]:
+def unsupported_functions(version: Version) -> Iterator[UnsupportedFunction]:
     """Yield the functions of a version that are not implemented, in the order of the header."""
     file = resources.files("codegen.exchange.fmi").joinpath(
         "headers", f"fmi{version}FunctionTypes.h"
@@ -63,8 +63,8 @@ def refusals(version: Version) -> Iterator[Refusal]:
     for name, parameters in FUNCTION.findall(COMMENT.sub("", file.read_text("ascii"))):
         if name not in implemented:
             parameter_texts = tuple(_format_parameter(text) for text in parameters.split(","))
-            why = next(why for pattern, why in REFUSAL_REASONS if re.search(pattern, name))
-            yield Refusal(name, parameter_texts, why)
+            why = next(why for pattern, why in UNSUPPORTED_REASONS if re.search(pattern, name))
+            yield UnsupportedFunction(name, parameter_texts, why)
 
 
 def _format_parameter(parameter: str) -> str:

@@ -13,7 +13,7 @@ from codegen.coverage.boundary_values import (
     NEIGHBOUR_COUNT,
     generate_boundary_sequences,
 )
-from codegen.coverage.mcdc import EXPORTER, measure_mcdc
+from codegen.coverage.mcdc import COVERAGE_EXPORTER, measure_mcdc
 from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType
 from language.ir.program import Program
 from tests.language.build import program
@@ -81,7 +81,9 @@ def test_what_is_not_a_number_has_no_border() -> None:
     )
 
 
-@pytest.mark.skipif(not shutil.which(EXPORTER), reason="no llvm-cov-19: make system-packages")
+@pytest.mark.skipif(
+    not shutil.which(COVERAGE_EXPORTER), reason="no llvm-cov-19: make system-packages"
+)
 def test_a_condition_that_only_the_border_shows() -> None:
     """`u >= 2.6` decides where u is 2.6 itself, which no value of the sequence is near."""
     spec, given = belt("u > 2.6 or u >= 2.6 and v > 0"), [sequence(0.0, 4.0, 0.0)]

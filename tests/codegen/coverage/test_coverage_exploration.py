@@ -10,13 +10,13 @@ import pytest
 from codegen.coverage import coverage_exploration as exploring
 from codegen.coverage.coverage_exploration import generate_corpus, page_scalars
 from codegen.coverage.libfuzzer import FUZZER_COMPILER
-from codegen.coverage.mcdc import EXPORTER, measure_mcdc
+from codegen.coverage.mcdc import COVERAGE_EXPORTER, measure_mcdc
 from language.ir.program import Program
 from modewright.api.simulation import program as program_named
 from tests.language.build import program
 
 pytestmark = pytest.mark.skipif(
-    not (shutil.which(EXPORTER) and shutil.which(FUZZER_COMPILER)),
+    not (shutil.which(COVERAGE_EXPORTER) and shutil.which(FUZZER_COMPILER)),
     reason="no clang-19: make system-packages",
 )
 SLOW = """language: 1

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from codegen.coverage.boundary_values import NEIGHBOUR_COUNT
-from codegen.coverage.mcdc import EXPORTER, McdcCoverage, measure_mcdc
+from codegen.coverage.mcdc import COVERAGE_EXPORTER, McdcCoverage, measure_mcdc
 from codegen.emit.c_module import emit_c_files
 from language.ir.program import Program
 from modewright.api import code_generation as code
@@ -18,7 +18,7 @@ from modewright.cli.app import app
 from tests.language.build import program
 
 pytestmark = pytest.mark.skipif(
-    not shutil.which(EXPORTER), reason="no llvm-cov-19: make system-packages"
+    not shutil.which(COVERAGE_EXPORTER), reason="no llvm-cov-19: make system-packages"
 )
 LAMP = """language: 1
 automaton: lamp

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.exchange.cmake import FILE, SET_BY_CMAKE, emit_cmake_file
+from codegen.exchange.cmake import CMAKE_FILE, SET_BY_CMAKE, emit_cmake_file
 from codegen.toolchain.compiler import FLAGS
 from modewright.api.simulation import program
 from modewright.cli.app import app
@@ -26,12 +26,12 @@ target_link_libraries(user PRIVATE estimator)
 
 
 def test_the_flags_that_define_the_bits_are_in_it() -> None:
-    text = emit_cmake_file(program("estimator"))[FILE]
+    text = emit_cmake_file(program("estimator"))[CMAKE_FILE]
     for flag in set(FLAGS) - set(SET_BY_CMAKE):
         assert flag in text
     assert "C_EXTENSIONS OFF" in text
     assert "  ha_math.c\n" in text
-    assert "ha_math" not in emit_cmake_file(program("contactor"))[FILE]
+    assert "ha_math" not in emit_cmake_file(program("contactor"))[CMAKE_FILE]
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake: make system-packages")
@@ -43,7 +43,7 @@ def test_cmake_builds_and_installs_it_and_a_project_of_a_user_takes_it(
     assert run_with_exit_code(partial(app, words, standalone_mode=False)) == 0
     page = (ROOT / "docs" / "c_code.md").read_text()
     (tmp_path / "main.c").write_text(page.partition("```c\n")[2].partition("```")[0])
-    (tmp_path / FILE).write_text(USER)
+    (tmp_path / CMAKE_FILE).write_text(USER)
     _run("cmake", "-S", ".", "-B", "made", "-DCMAKE_INSTALL_PREFIX=installed")
     _run("cmake", "--build", "made", "--target", "install", "--verbose")
     assert (tmp_path / "installed" / "include" / "estimator.h").exists()

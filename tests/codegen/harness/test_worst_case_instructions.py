@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from codegen.harness.disassembly import Instruction
-from codegen.harness.worst_case_instructions import Unbounded, longest_path
+from codegen.harness.worst_case_instructions import UnboundedError, longest_path
 
 Shape = int | tuple[Any, ...]
 """A number of instructions, or (`if`, then, otherwise), (`loop`, turns, body), (`then`, parts)."""
@@ -110,5 +110,5 @@ def test_what_has_no_bound_is_told(name: str, target: int, told: str) -> None:
     laid.put("adds", {})
     laid.put(name, {}, target)
     laid.put("bx", {})
-    with pytest.raises(Unbounded, match=told):
+    with pytest.raises(UnboundedError, match=told):
         longest_path({"step": tuple(laid.code)}, "step")

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from codegen.emit.c_module import emit_c_files, run_c_passes
-from codegen.harness.stack_usage import LIMIT
+from codegen.harness.stack_usage import MAX_STEP_STACK_BYTES
 from codegen.passes.inline_policy import select_noinline_blocks
 from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.number_type import NumberType
@@ -46,7 +46,7 @@ def test_whole_numbers_are_not_computed_in_software() -> None:
 def test_a_step_of_the_recursive_observer_takes_little_stack(
     name: str, numbers: NumberType
 ) -> None:
-    assert metrics(name, numbers=numbers).stack <= LIMIT
+    assert metrics(name, numbers=numbers).stack <= MAX_STEP_STACK_BYTES
 
 
 @pytest.mark.parametrize("name", ["estimator_float32", "driveline"])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.coverage.mcdc import EXPORTER, add_infeasibility_proofs, measure_mcdc
+from codegen.coverage.mcdc import COVERAGE_EXPORTER, add_infeasibility_proofs, measure_mcdc
 from codegen.emit.c_module import run_c_passes
 from codegen.proofs.infeasible.infeasible_conditions import (
     decision_sites,
@@ -24,7 +24,7 @@ from tests.lockstep.random_specs.spec import program as program_of
 from tests.lockstep.random_specs.spec_kinds import spec_of
 
 needs_llvm = pytest.mark.skipif(
-    not shutil.which(EXPORTER), reason="no llvm-cov-19: make system-packages"
+    not shutil.which(COVERAGE_EXPORTER), reason="no llvm-cov-19: make system-packages"
 )
 VALVE = """language: 1
 automaton: valve

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from codegen.harness.harness import LOCKSTEP, tick_inputs, write_harness
-from codegen.harness.instruction_count import ICOUNT_OPTIONS, MAIN
+from codegen.harness.harness import LOCKSTEP_MAIN, tick_inputs, write_harness
+from codegen.harness.instruction_count import COUNTING_MAIN, ICOUNT_OPTIONS
 from codegen.toolchain.compiler import FLAGS, WARNINGS, run_compiler
 from codegen.toolchain.machine import CORTEX_M4F, HOST, Machine, run_in_qemu
 from lockstep.tick_log import TickLog
@@ -22,7 +22,7 @@ RUN: dict[str, Callable[[Path, bytes], bytes]] = {
     CORTEX_M4F.name: partial(run_in_qemu, options=ICOUNT_OPTIONS),
 }
 CLOCK = {HOST.name: "clock_host.c", CORTEX_M4F.name: "clock_target.c"}
-MAINS = {HOST.name: LOCKSTEP, CORTEX_M4F.name: MAIN}
+MAINS = {HOST.name: LOCKSTEP_MAIN, CORTEX_M4F.name: COUNTING_MAIN}
 """Around both is a main of our own: of these the files are used."""
 
 

@@ -11,7 +11,7 @@ import pytest
 from diagnosis.data.sampled_recording import has_feedthrough
 from diagnosis.model.candidate import compile_candidate
 from diagnosis.pipeline.case import Case, read_series
-from engine.recordings.recording_window import overlap
+from engine.recordings.recording_window import paths_overlap
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
@@ -71,10 +71,10 @@ def test_a_part_of_a_file_is_cut_out_of_it(tmp_path: Path) -> None:
 
 def test_parts_of_one_file_are_apart_unless_they_have_a_time_in_common() -> None:
     file = Path("run.csv")
-    assert not overlap(Path("run.csv@0..2"), Path("run.csv@2..4"))
-    assert overlap(Path("run.csv@0..2.5"), Path("run.csv@2..4"))
-    assert overlap(file, Path("run.csv@2..4"))
-    assert not overlap(file, Path("other.csv"))
+    assert not paths_overlap(Path("run.csv@0..2"), Path("run.csv@2..4"))
+    assert paths_overlap(Path("run.csv@0..2.5"), Path("run.csv@2..4"))
+    assert paths_overlap(file, Path("run.csv@2..4"))
+    assert not paths_overlap(file, Path("other.csv"))
 
 
 def test_only_outputs_that_show_an_input_at_once_keep_a_recording_from_being_thinned() -> None:

@@ -69,8 +69,8 @@ def test_windows_say_who_was_in_which_mode() -> None:
     found = compare_runs(run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]))
     (window,) = found.windows
     assert (window.start, window.end, window.a, window.b) == (1.0, 3.0, "drive", "gap")
-    assert found.sequences[0].parted is None
-    assert found.sequences[0].apart == 2.0
+    assert found.sequences[0].first_difference is None
+    assert found.sequences[0].largest_time_difference == 2.0
     assert not found.is_within
     late = compare_runs(run([0.0] * 5, [0, 1, 1, 1, 0]), run([0.0] * 5, [0, 0, 0, 1, 0]), slack=2.0)
     assert late.is_within
@@ -79,7 +79,7 @@ def test_windows_say_who_was_in_which_mode() -> None:
 def test_sequences_part_where_a_transition_is_missing() -> None:
     found = compare_runs(run([0.0] * 4, [0, 1, 0, 1]), run([0.0] * 4, [0, 1, 0, 0]))
     (sequence,) = found.sequences
-    assert (sequence.count_a, sequence.count_b, sequence.parted) == (3, 2, 2)
+    assert (sequence.count_a, sequence.count_b, sequence.first_difference) == (3, 2, 2)
 
 
 def test_regions_beside_each_other_are_sequences_of_their_own() -> None:
@@ -87,7 +87,7 @@ def test_regions_beside_each_other_are_sequences_of_their_own() -> None:
     second = Event(1.0, 0, "p", "d", "c", "d", "gap")
     a = replace(run([0.0] * 3), events=(first, second))
     found = compare_runs(a, replace(a, events=(second, first)))
-    assert [(each.instance, each.parted) for each in found.sequences] == [
+    assert [(each.instance, each.first_difference) for each in found.sequences] == [
         ("p", None),
         ("p.gap", None),
     ]

@@ -37,7 +37,7 @@ def plain(node: YamlNode) -> Plain:
 
 def laid(base: str, over: str, *, template: bool = False) -> tuple[Plain, list[Problem]]:
     problems = Problems()
-    result = apply_overlay(read(base), read(over, "over"), problems, template=template)
+    result = apply_overlay(read(base), read(over, "over"), problems, is_template=template)
     return plain(result), problems.reported
 
 

@@ -10,7 +10,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CoSimulation, fmi2ModelExchange
 
-from codegen.exchange.fmi.standard import refusals
+from codegen.exchange.fmi.standard import unsupported_functions
 from codegen.exchange.fmi.variable import Version
 from tests.codegen.exchange.fmi.conftest import Ready
 from tests.codegen.exchange.fmi.importer import Importer
@@ -55,7 +55,7 @@ def test_a_state_is_saved_again_in_its_place(version: Version, stepping: Importe
 def test_every_function_that_is_not_supported_returns_an_error_and_tells_why(
     version: Version, stepping: Importer
 ) -> None:
-    listed = list(refusals(version))
+    listed = list(unsupported_functions(version))
     assert len(listed) == {2: 19, 3: 36}[version]
     for refusal in listed:
         function = library_function(stepping, refusal.name)
