@@ -238,10 +238,8 @@ instances: {x: {of: z}, y: {of: z}}
             "x: {of: z}, y: {of: z}",
             "y: {of: z}, x: {of: z}",
             [
-                [
-                    "instances | order | x, y | y, x | "
-                    "simultaneous actions are executed in another order"
-                ],
+                "instances | order | x, y | y, x | "
+                "simultaneous actions are executed in another order"
             ],
         ),
         ("right: {}", "right: {}, new: {}", ["faults | new |  |  | "]),
