@@ -111,7 +111,7 @@ class ConditionReader:
             Formula(resolved_tree, key),
             text,
             resolver.signals,
-            resolver.stays,
+            resolver.mode_predicates,
             resolver.flags,
             resolver.running,
             literals,
@@ -145,7 +145,7 @@ class _NameResolver:
         self.reader = reader
         self.problems = reader.problems
         self.signals: dict[str, ExprType] = {}
-        self.stays: dict[str, ModePredicate] = {}
+        self.mode_predicates: dict[str, ModePredicate] = {}
         self.flags: dict[str, FaultFlag] = {}
         self.running: dict[str, RunningStatistic] = {}
         self.kinds: dict[str, ExprType] = {}
@@ -240,7 +240,7 @@ class _NameResolver:
         """Store a mode predicate under a new name and return the name."""
         self._require_mode_output(predicate.region_ref, at)
         name = f"in {'.'.join(predicate.region_ref)} {mode}"
-        self.stays[name] = predicate
+        self.mode_predicates[name] = predicate
         self.kinds[name] = "truth"
         return Name(name, at.span)
 

@@ -117,7 +117,7 @@ def measure_coverage(test: Test) -> list[Coverage]:
                 automaton,
                 decisions[name],
                 _entered_modes(automaton, stepper.all_active_modes()),
-                frozenset(stepper.taken),
+                frozenset(stepper.fired),
                 {key: combinations for key, combinations in seen.items() if combinations},
                 frozenset(d.key for d in decisions[name] if d.key not in arrays[name]),
             )
@@ -195,10 +195,10 @@ class _CoverageInterpreter(Interpreter):
 
     def __init__(self, program: Program) -> None:
         super().__init__(program)
-        self.taken: set[str] = set()
+        self.fired: set[str] = set()
         self._modes = program.mode_variables()
         self._active = set(self._active_modes())
-        self._looks = GUARD_READ_BLOCK in program.blocks
+        self._has_guard_reads = GUARD_READ_BLOCK in program.blocks
 
     def all_active_modes(self) -> set[tuple[str, int]]:
         """Return (region, mode number) of all modes that were active, also within a tick."""
@@ -209,11 +209,11 @@ class _CoverageInterpreter(Interpreter):
 
     def run(self, block: str) -> None:
         """Run a block, and record fired transitions and active modes after it."""
-        if block == "equations" and self._looks:
+        if block == "equations" and self._has_guard_reads:
             super().run(GUARD_READ_BLOCK)
         super().run(block)
         if block in ("step", "jump"):
-            self.taken |= {
+            self.fired |= {
                 info.key.partition(" ")[2] for info in fired_transitions(self.program, self)
             }
         if block in ("step", "jump", "equations"):

@@ -49,7 +49,7 @@ class _ExpectationEvaluator:
 
     def __init__(self, expectation: Expectation, run: ObservedRun) -> None:
         self.expectation = expectation
-        self.seen = run
+        self.run = run
 
     def evaluate(self) -> Outcome:
         """Return the outcome of the expectation."""
@@ -72,8 +72,8 @@ class _ExpectationEvaluator:
 
     def _truth_series(self, subject: Any) -> TruthSeries:
         """Return the values of a condition at the points where it is known."""
-        found = evaluate_series(subject, self.seen)
-        points = self.seen.points
+        found = evaluate_series(subject, self.run)
+        points = self.run.points
         return [
             (k, points[k].time, bool(v)) for k, v in zip(found.points, found.values, strict=True)
         ]
@@ -83,7 +83,7 @@ class _ExpectationEvaluator:
         true.
         """
         if isinstance(trigger, ModeEntryEvent):
-            times = self.seen.times_of(trigger)
+            times = self.run.times_of(trigger)
         else:
             times = _rising_times(self._truth_series(trigger))
         low, high = self._window(when)
@@ -99,7 +99,7 @@ class _ExpectationEvaluator:
         By default this is the whole run.
         """
         low = 0.0 if when.since is None else float(when.since)
-        high = self.seen.end if when.until is None else float(when.until)
+        high = self.run.end if when.until is None else float(when.until)
         return low, high
 
     def _spans(self, when: TimeConstraint) -> TimeSpans:
@@ -139,7 +139,7 @@ class _ExpectationEvaluator:
         if held is None:
             return self._fail_run_ended(time)
         k, _, value = held
-        if self.seen.end < time - time_tolerance(time):
+        if self.run.end < time - time_tolerance(time):
             return self._fail_run_ended(time)
         if value:
             return self._pass(time)
@@ -169,15 +169,15 @@ class _ExpectationEvaluator:
             )
             if hit is None:
                 early = (
-                    f": the run ended at {_format_time(self.seen.end)}"
-                    if self.seen.end < high
+                    f": the run ended at {_format_time(self.run.end)}"
+                    if self.run.end < high
                     else ""
                 )
                 start = (
                     f" at {_format_time(low)}" if self.expectation.when.after is not None else ""
                 )
                 return self._fail(
-                    f"{text}{start}{early}", high, point_at_or_before(self.seen, high)
+                    f"{text}{start}{early}", high, point_at_or_before(self.run, high)
                 )
             first = hit if first is None else first
         return self._pass(first)
@@ -207,7 +207,7 @@ class _ExpectationEvaluator:
         if not spans:
             return self._fail_no_trigger(when)
         for low, high in spans:
-            if self.seen.end < high - time_tolerance(high):
+            if self.run.end < high - time_tolerance(high):
                 return self._fail_run_ended(high)
             inside = self._truths_within(truths, low, high)
             if not inside:
@@ -229,7 +229,7 @@ class _ExpectationEvaluator:
         """
         subject = self.expectation.subject
         assert isinstance(subject, ModeEntryEvent)
-        times = self.seen.times_of(subject)
+        times = self.run.times_of(subject)
         if when.at is not None:
             return self._check_near(times, float(when.at), float(when.within or 0), "happened")
         if when.before is not None:
@@ -266,7 +266,7 @@ class _ExpectationEvaluator:
                 start = (
                     f" at {_format_time(low)}" if self.expectation.when.after is not None else ""
                 )
-                return self._fail(text + start, high, point_at_or_before(self.seen, high))
+                return self._fail(text + start, high, point_at_or_before(self.run, high))
             first = hit if first is None else first
         return self._pass(first)
 
@@ -278,15 +278,15 @@ class _ExpectationEvaluator:
         place, expected_modes = self.expectation.region_ref, self.expectation.subject
         assert place is not None and isinstance(expected_modes, tuple)
         low, high = self._window(when)
-        start = point_at_or_before(self.seen, low)
-        entries = [(max(low, 0.0), self.seen.modes[place][start])]
-        for k, mode in self.seen.mode_entries(place, start):
-            if self.seen.points[k].time <= high + time_tolerance(high):
-                entries.append((self.seen.points[k].time, mode))
+        start = point_at_or_before(self.run, low)
+        entries = [(max(low, 0.0), self.run.modes[place][start])]
+        for k, mode in self.run.mode_entries(place, start):
+            if self.run.points[k].time <= high + time_tolerance(high):
+                entries.append((self.run.points[k].time, mode))
         for (time, mode), expected in zip(entries, expected_modes, strict=False):
             if mode != expected:
                 text = f"was `{mode}` from {_format_time(time)} on, not `{expected}`"
-                return self._fail(text, time, point_at_or_before(self.seen, time))
+                return self._fail(text, time, point_at_or_before(self.run, time))
         if len(entries) < len(expected_modes):
             return self._fail(
                 f"did not enter `{expected_modes[len(entries)]}` after `{entries[-1][1]}`"
@@ -310,16 +310,16 @@ class _ExpectationEvaluator:
         By default this is the last point that is not later than `time`.
         """
         if point is None and time is not None:
-            point = point_at_or_before(self.seen, time)
-        modes = {} if point is None else self.seen.modes_at(point)
+            point = point_at_or_before(self.run, time)
+        modes = {} if point is None else self.run.modes_at(point)
         values = {} if point is None else self._signal_values(point)
         return Outcome(self.expectation.name, False, text, time, modes, values)
 
     def _fail_run_ended(self, time: float) -> Outcome:
         """Return a failed outcome because the run ended before a time."""
         return self._fail(
-            f"the run ended at {_format_time(self.seen.end)}, before {_format_time(time)}",
-            self.seen.end,
+            f"the run ended at {_format_time(self.run.end)}, before {_format_time(time)}",
+            self.run.end,
         )
 
     def _fail_no_trigger(self, when: TimeConstraint) -> Outcome:
@@ -331,11 +331,11 @@ class _ExpectationEvaluator:
 
         The result is empty without rows.
         """
-        rows = [p.row for p in self.seen.points[: point + 1] if p.row >= 0]
+        rows = [p.row for p in self.run.points[: point + 1] if p.row >= 0]
         if not rows:
             return {}
         read = [name for each in self.expectation.conditions for name in each.all_signals]
-        return {name: self.seen.signals[name][rows[-1]] for name in dict.fromkeys(read)}
+        return {name: self.run.signals[name][rows[-1]] for name in dict.fromkeys(read)}
 
 
 def _rising_times(truths: TruthSeries) -> list[float]:

@@ -57,7 +57,7 @@ class Condition:
     formula: Formula
     text: str
     signals: Mapping[str, ExprType] = field(default_factory=dict)
-    stays: Mapping[str, ModePredicate] = field(default_factory=dict)
+    mode_predicates: Mapping[str, ModePredicate] = field(default_factory=dict)
     flags: Mapping[str, FaultFlag] = field(default_factory=dict)
     running: Mapping[str, RunningStatistic] = field(default_factory=dict)
     literals: Mapping[str, int] = field(default_factory=dict)

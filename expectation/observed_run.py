@@ -182,7 +182,7 @@ def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
         values, convert = run.signals[name], _converter_of(kind)
         columns.append([convert(values[run.points[k].row]) for k in points])
         known[name] = Ref(name, is_integer=isinstance(kind, IntType | EnumType))
-    for name, stay in condition.stays.items():
+    for name, stay in condition.mode_predicates.items():
         modes = run.modes[stay.region_ref]
         columns.append([modes[k] in stay.modes for k in points])
         known[name] = Ref(name)
@@ -194,7 +194,7 @@ def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
         made = _evaluate_running(running, run)
         columns.append([made[k] for k in points])
         known[name] = Ref(name, is_integer=running.function == "count")
-    names = [*condition.signals, *condition.stays, *condition.flags, *condition.running]
+    names = [*condition.signals, *condition.mode_predicates, *condition.flags, *condition.running]
     tree = condition.formula.tree
     expr = lower_expression(tree, known)
     expr = lower_assigned_value(tree, known, False) if is_whole(expr) else expr

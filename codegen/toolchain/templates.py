@@ -6,7 +6,7 @@ import pickle
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
-from importlib import metadata, resources
+from importlib import metadata
 from typing import Any
 
 import jinja2
@@ -19,21 +19,31 @@ TEMPLATE_CACHE = "templates"
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:
-    """Return a rendered template; a variable without a value is an error (rule C25)."""
-    return _environment().get_template(template).render(context)
+    """Return a rendered template of C; a variable without a value is an error (rule C25)."""
+    return template_environment(("codegen",), is_html=False).get_template(template).render(context)
+
+
+def render_html(packages: tuple[str, ...], template: str, context: Mapping[str, Any]) -> str:
+    """Return a rendered HTML page, with the values of the context escaped.
+
+    The template and the templates that it includes are in the folders `templates` of the packages.
+    """
+    return template_environment(packages, is_html=True).get_template(template).render(context)
 
 
 @cache
-def _environment() -> jinja2.Environment:
-    """Return the Jinja environment of the templates of this package."""
-    folder = resources.files("codegen").joinpath("templates")
+def template_environment(packages: tuple[str, ...], is_html: bool) -> jinja2.Environment:
+    """Return the Jinja environment of the templates of packages.
+
+    A variable without a value is an error. Compiled templates are cached on disk.
+    """
     return jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(package) for package in packages]),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,
+        autoescape=is_html,
         bytecode_cache=_template_cache(),
     )
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib import mlab
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 Reals = NDArray[np.float64]
 
@@ -16,5 +16,7 @@ def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]
     samples, overlap by half, and are taken without their mean.
     """
     length = min(len(values), max_window)
-    power, frequencies = mlab.psd(values, length, rate, mlab.detrend_mean, noverlap=length // 2)
-    return np.asarray(frequencies), np.asarray(power)
+    frequencies, power = welch(
+        values, rate, np.hanning(length), noverlap=length // 2, detrend="constant"
+    )
+    return frequencies, power

@@ -6,14 +6,12 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from codegen.toolchain.compiler import BuildError, compiler_version
-from codegen.toolchain.templates import product_version
+from codegen.toolchain.templates import product_version, render_html
 from diagnosis.model.compile_cache import node_text
 from diagnosis.model.equation_change import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
@@ -204,12 +202,4 @@ def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
 
 def _render_page(context: Mapping[str, Any]) -> str:
     """Return the HTML page for the values of the template."""
-    folder = resources.files("diagnosis.report").joinpath("templates")
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
-    return environment.get_template("report.html.jinja").render(context)
+    return render_html(("diagnosis.report",), "report.html.jinja", context)

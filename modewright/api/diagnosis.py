@@ -209,7 +209,7 @@ def _conclude(
     return dataclasses.replace(dossier, verdict=verdict)
 
 
-def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
+def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
     """Write verdict, variant, report and figures into a folder and return the paths.
 
     Files of earlier diagnoses that are not written again are removed. Raises OutputError.
@@ -218,40 +218,40 @@ def save_diagnosis(dossier: DiagnosisReport, out: str | Path, spec: str) -> list
 
     folder = Path(out)
     make_folder(folder)
-    variant = format_variant(dossier, base_of(dossier, spec, folder))
+    variant = format_variant(report, base_of(report, spec, folder))
     files = {}
-    if dossier.case.thresholds != DEFAULT_THRESHOLDS:
-        files[folder / "thresholds.json"] = format_thresholds(dossier.case.thresholds).encode()
-    for name, data in report_files(dossier, variant, Path(display_path(folder))).items():
+    if report.case.thresholds != DEFAULT_THRESHOLDS:
+        files[folder / "thresholds.json"] = format_thresholds(report.case.thresholds).encode()
+    for name, data in report_files(report, variant, Path(display_path(folder))).items():
         files[folder / name] = data
     stale = [
         path
         for path in find_stale_files(folder)
-        if path not in files and not _is_input_file(path, dossier)
+        if path not in files and not _is_input_file(path, report)
     ]
     write_files(files)
     remove_files(stale)
-    if not dossier.end_reason:
+    if not report.end_reason:
         shutil.rmtree(folder / CHECKPOINT_FOLDER, ignore_errors=True)
     return list(files)
 
 
-def _is_input_file(path: Path, dossier: DiagnosisReport) -> bool:
+def _is_input_file(path: Path, report: DiagnosisReport) -> bool:
     """Return whether a path is a recording or an effect that the diagnosis read."""
-    recordings = (*dossier.case.train, *dossier.case.held_out)
+    recordings = (*report.case.train, *report.case.held_out)
     is_recording = path.resolve() in {strip_window_suffix(one).resolve() for one in recordings}
-    return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
+    return is_recording or path.stem in {effect.name for effect in report.case.effects or ()}
 
 
-def base_of(dossier: DiagnosisReport, spec: str, folder: Path) -> str:
+def base_of(report: DiagnosisReport, spec: str, folder: Path) -> str:
     """Return how a variant in a folder refers to its base.
 
     This is the name of the base, or its relative path if the name is ambiguous.
     """
-    project = dossier.case.project
+    project = report.case.project
     path = project.path_of(spec)
-    if [file.resolve() for file in project.index.get(dossier.name, [])] == [path.resolve()]:
-        return dossier.name
+    if [file.resolve() for file in project.index.get(report.name, [])] == [path.resolve()]:
+        return report.name
     return os.path.relpath(path.resolve(), folder.resolve())
 
 

@@ -23,7 +23,7 @@ class HealthCheck:
 
     name: str
     verdict: HealthStatus
-    told: str
+    message: str
     help: str = ""
 
 

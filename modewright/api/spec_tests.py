@@ -32,7 +32,7 @@ class TestRun:
 
     test: Test
     outcomes: tuple[Outcome, ...]
-    means: str
+    backend: str
     difference: str
     stopped: str | None
     faults: tuple[str, ...]

@@ -34,7 +34,7 @@ def proof_json(proof: ToolVerdict) -> dict[str, Any]:
     return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
 
 
-def print_fuzzed(console: Console, result: FuzzReport) -> None:
+def print_fuzzing(console: Console, result: FuzzReport) -> None:
     """Print the counts of a fuzzing run, the findings and the first difference."""
     console.print(
         f"{result.program}: {result.distinct} different sequences of {result.runs}, "
@@ -50,7 +50,7 @@ def print_fuzzed(console: Console, result: FuzzReport) -> None:
     console.print(text, soft_wrap=True, highlight=False, markup=False)
 
 
-def fuzzed_json(result: FuzzReport) -> dict[str, Any]:
+def fuzzing_json(result: FuzzReport) -> dict[str, Any]:
     """Return the result of a fuzzing run as a dict for JSON."""
     first = vars(result.first) if result.first else None
     lists = {"modes": list(result.modes), "findings": list(result.findings)}

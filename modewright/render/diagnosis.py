@@ -13,9 +13,9 @@ from diagnosis.report.sentences import format_rounded, summary_lines
 from modewright.runtime.json_format import format_entry
 
 
-def print_dossier(screen: Console, dossier: DiagnosisReport) -> None:
+def print_diagnosis(screen: Console, report: DiagnosisReport) -> None:
     """Print the summary of a diagnosis in at most four lines."""
-    for line in summary_lines(dossier):
+    for line in summary_lines(report):
         screen.print(line.replace("`", ""), highlight=False, markup=False, soft_wrap=True)
 
 

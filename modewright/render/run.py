@@ -246,7 +246,7 @@ def _null_nonfinite_value(value: Any) -> Any:
 def print_health_check(console: Console, check: HealthCheck) -> None:
     """Print a result of the doctor with its remedy."""
     colour = {"ok": "green", "absent": "yellow", "fault": "red"}[check.verdict]
-    text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.told)}"
+    text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.message)}"
     console.print(text, highlight=False, soft_wrap=True)
     if check.help:
         console.print(f"       help: {escape(check.help)}", highlight=False, soft_wrap=True)

@@ -21,7 +21,7 @@ SECONDS_DECIMALS = 3
 def spec_test_lines(run: TestRun) -> Iterator[str]:
     """Yield the lines of a test: one if it passed, else also all failures."""
     word = "passed" if run.passed else "FAILED"
-    also = f" and C, {run.means.partition(':')[0]}" if run.means else ""
+    also = f" and C, {run.backend.partition(':')[0]}" if run.backend else ""
     count = pluralise(len(run.outcomes), "expectation")
     yield f"{word}  {run.test.name}: {count}, engine{also} ({run.seconds:.2f} s)"
     for expectation, outcome in zip(run.test.expectations, run.outcomes, strict=True):
@@ -56,7 +56,7 @@ def spec_test_json(run: TestRun) -> dict[str, Any]:
         "requirements": list(run.test.requirements),
         "passed": run.passed,
         "seconds": round(run.seconds, SECONDS_DECIMALS),
-        "beside": run.means,
+        "beside": run.backend,
         "difference": run.difference,
         "stopped": run.stopped,
         "faults": list(run.faults),

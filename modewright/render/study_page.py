@@ -6,13 +6,13 @@ import html
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
+from codegen.toolchain.templates import render_html
 from language.expressions.units import display_unit
 from modewright.render.sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.render.study import failure_texts, format_number, interval_text
@@ -220,21 +220,8 @@ def _embed_svg(name: str, data: bytes) -> str:
 
 def _render_template(context: Mapping[str, Any]) -> str:
     """Return the page for a context."""
-    own = resources.files("modewright.render").joinpath("templates")
-    shared = resources.files("diagnosis.report").joinpath("templates")
-
-    def text_of(name: str) -> str:
-        folder = shared if name == "report.css.jinja" else own
-        return folder.joinpath(name).read_text("utf-8")
-
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(text_of),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
-    return environment.get_template("study.html.jinja").render(context)
+    packages = ("modewright.render", "diagnosis.report")
+    return render_html(packages, "study.html.jinja", context)
 
 
 def study_report(out: str | Path) -> bytes:

@@ -33,7 +33,7 @@ class PresentationReader(Reader):
     def __init__(
         self,
         problems: Problems,
-        kinds: Sequence[SystemVariant],
+        system_variants: Sequence[SystemVariant],
         varied: Sequence[SweepVariable],
         measures: Sequence[Measure],
     ) -> None:
@@ -46,7 +46,7 @@ class PresentationReader(Reader):
         columns = [column for measure in measures for column in columns_of(measure)]
         self.columns = [column.name for column in columns]
         self.numbers = [column.name for column in columns if column.type != "list"]
-        self.is_plural = len(kinds) > 1
+        self.is_plural = len(system_variants) > 1
         self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: YamlNode | None, plots: YamlNode | None) -> Presentation:

@@ -81,7 +81,7 @@ class _StudyReader(Reader):
         self.project = project
         self.overrides = overrides
         self.identity: dict[str, str] = {}
-        self.alone = ""  # the name of a lone automaton in the first variant
+        self.sole_instance_name = ""  # the name of a lone automaton in the first variant
 
     def read(self, document: Document) -> Study:
         """Return the study of an expanded document; reports problems section by section."""
@@ -90,10 +90,10 @@ class _StudyReader(Reader):
         systems = self._systems(tree, at)
         self.problems.raise_if_errors()
         scenarios = self._scenarios(tree, at)
-        courses = {
+        scenarios_by_system = {
             name: self._read_scenarios(system, scenarios) for name, system in systems.items()
         }
-        if not scenarios or any(len(each) < len(scenarios) for each in courses.values()):
+        if not scenarios or any(len(each) < len(scenarios) for each in scenarios_by_system.values()):
             self.problems.raise_if_errors()
         places = self._common_targets(systems, list(scenarios.values()))
         vary = VaryReader(self.problems, places, next(iter(systems.values())))
@@ -101,20 +101,20 @@ class _StudyReader(Reader):
         settings = vary.settings(tree.get("set"), varied)
         sampling = SamplingReader(self.problems).sampling(tree.get("sampling"), varied)
         measures = MeasureReader(self.problems, list(systems.values()))
-        found = measures.measures(tree.get("measures"), at)
+        checked_measures = measures.measures(tree.get("measures"), at)
         parts = _has_input_targets(varied, settings)
-        kinds = tuple(
+        system_variants = tuple(
             SystemVariant(
                 name,
-                _with_measure_outputs(system, measures, found),
-                _bind_scenarios(courses[name], scenarios, parts),
+                _with_measure_outputs(system, measures, checked_measures),
+                _bind_scenarios(scenarios_by_system[name], scenarios, parts),
             )
             for name, system in systems.items()
         )
-        shown = PresentationReader(self.problems, kinds, varied, found)
+        shown = PresentationReader(self.problems, system_variants, varied, checked_measures)
         study = Study(
             name=document.name,
-            system_variants=kinds,
+            system_variants=system_variants,
             scenarios=tuple(scenarios),
             variables=varied,
             settings=settings,
@@ -122,7 +122,7 @@ class _StudyReader(Reader):
             replicates=self.read_integer(
                 tree.get("replicates"), "replicates", 1, 1, MAX_REPLICATES
             ),
-            measures=found,
+            measures=checked_measures,
             every=self._every(tree),
             presentation=shown.presentation(tree.get("summary"), tree.get("plots")),
             identity={**self.identity, "study": _digest(_to_plain_data(tree, PRESENTATION_KEYS))},
@@ -204,9 +204,9 @@ class _StudyReader(Reader):
         system = read_system(document, self.project, self.overrides)
         if not system.sole_instance:
             return system
-        self.alone = self.alone or system.sole_instance
+        self.sole_instance_name = self.sole_instance_name or system.sole_instance
         only = system.instances[system.sole_instance].automaton
-        return single_instance_system(dataclasses.replace(only, name=self.alone))
+        return single_instance_system(dataclasses.replace(only, name=self.sole_instance_name))
 
     def _scenarios(self, tree: MappingNode, at: Span) -> dict[str, Document]:
         """Return the expanded scenario documents by name.

@@ -43,7 +43,7 @@ class VaryReader(Reader):
         super().__init__(problems)
         self.places = places
         self.system = system
-        self.taken: dict[Target, Span] = {}
+        self.assigned_targets: dict[Target, Span] = {}
         self.kinds: dict[str, ExprType] = {}
 
     def variables(self, node: YamlNode | None) -> tuple[SweepVariable, ...]:
@@ -90,7 +90,7 @@ class VaryReader(Reader):
     def _claim_targets(self, targets: Sequence[Target], span: Span) -> None:
         """Record that targets get a value; report a target that has one already."""
         for target in targets:
-            first = self.taken.setdefault(target, span)
+            first = self.assigned_targets.setdefault(target, span)
             if first is not span:
                 label = f"`{'.'.join(target.path)}` has two values in each variant"
                 self.problems.error("duplicate", span, label, f"the other one is at {first}")

@@ -148,9 +148,9 @@ def open_store(folder: Path, manifest: Manifest) -> Store:
     OSError, and MissingToolError without pyarrow.
     """
     import_arrow()
-    there = require_same_study(folder, manifest)
-    if there:
-        manifest = dataclasses.replace(manifest, block_size=there.block_size)
+    stored = require_same_study(folder, manifest)
+    if stored:
+        manifest = dataclasses.replace(manifest, block_size=stored.block_size)
     (folder / BLOCKS_FOLDER).mkdir(parents=True, exist_ok=True)
     write_atomically(folder / MANIFEST_NAME, encode_manifest(manifest))
     store = Store(folder, manifest)
@@ -164,10 +164,10 @@ def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
     Raises SpecError if it belongs to another study or contains something else.
     """
     if (folder / MANIFEST_NAME).exists():
-        there = read_manifest(folder)
-        if there.digest != manifest.digest:
-            raise _changed_study_error(folder, there, manifest)
-        return there
+        stored = read_manifest(folder)
+        if stored.digest != manifest.digest:
+            raise _changed_study_error(folder, stored, manifest)
+        return stored
     if folder.is_dir() and any(
         p.name != LOCK_NAME and p.suffix != ".part" for p in folder.iterdir()
     ):

@@ -100,7 +100,7 @@ def written(folder: Path, text: str = TEST) -> str:
 def test_modes_inside_modes_are_expected_on_engine_and_c(tmp_path: Path) -> None:
     (run,) = tests.run_tests([written(tmp_path)], tmp_path)
     assert [(each.name, each.message) for each in run.outcomes if not each.passed] == []
-    assert (run.difference, len(run.outcomes)) == ("", 11) and run.means.startswith("compiled")
+    assert (run.difference, len(run.outcomes)) == ("", 11) and run.backend.startswith("compiled")
 
 
 def test_what_is_wrong_is_told(tmp_path: Path) -> None:

@@ -52,7 +52,9 @@ def run(folder: Path, expectations: str, compiled: bool) -> tests.TestRun:
 def test_the_word_and_its_bits_are_expected_on_engine_and_c(tmp_path: Path) -> None:
     found = run(tmp_path, RIGHT, compiled=True)
     assert [(each.name, each.message) for each in found.outcomes if not each.passed] == []
-    assert (found.difference, len(found.outcomes)) == ("", 8) and found.means.startswith("compiled")
+    assert (found.difference, len(found.outcomes)) == ("", 8) and found.backend.startswith(
+        "compiled"
+    )
 
 
 def test_a_fault_that_is_not_expected_fails_at_its_tick(tmp_path: Path) -> None:

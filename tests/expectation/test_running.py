@@ -27,7 +27,7 @@ def test_the_tests_that_are_shipped_pass(path: str) -> None:
     in_c = "tip_in" in path
     (run,) = tests.run_tests([path], SHIPPED, compiled=in_c)
     assert run.passed, list(show_tests.spec_test_lines(run))
-    assert run.means.startswith("compiled") == in_c
+    assert run.backend.startswith("compiled") == in_c
 
 
 def test_a_changed_spec_fails_the_test_that_is_shipped(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ def _print_report(report: DiagnosisReport, out: Path, as_json: bool) -> None:
     if as_json:
         show.print_json(verdict_to_json(report.verdict))
     else:
-        show_diagnosis.print_dossier(console(), report)
+        show_diagnosis.print_diagnosis(console(), report)
         report_written_files([out / "report.html"])
 
 

@@ -43,8 +43,8 @@ def fuzz(
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
     if as_json:
-        show.print_json(show_code.fuzzed_json(found))
+        show.print_json(show_code.fuzzing_json(found))
     else:
-        show_code.print_fuzzed(console(), found)
+        show_code.print_fuzzing(console(), found)
     if not found.is_clean:
         raise typer.Exit(PROBLEMS)

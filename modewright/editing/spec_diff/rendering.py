@@ -5,11 +5,9 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
-from importlib import resources
 from typing import Any
 
-import jinja2
-
+from codegen.toolchain.templates import render_html
 from modewright.editing.spec_diff.difference import SpecChange
 from modewright.runtime.json_format import format_entry
 
@@ -73,19 +71,15 @@ def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
 
 def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
     """Return the changes as a self-contained HTML page."""
-    folder = resources.files("modewright.editing.spec_diff").joinpath("templates")
-    environment = jinja2.Environment(
-        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=True
-    )
-    template = environment.from_string(folder.joinpath("difference.html.jinja").read_text("utf-8"))
     groups = [
         (group, list(members))
         for group, members in itertools.groupby(changes, lambda change: change.group)
     ]
-    return template.render(
-        before=before,
-        after=after,
-        groups=groups,
-        signs=SIGNS,
-        summary=diff_summary(changes) if changes else "nothing differs",
-    )
+    context = {
+        "before": before,
+        "after": after,
+        "groups": groups,
+        "signs": SIGNS,
+        "summary": diff_summary(changes) if changes else "nothing differs",
+    }
+    return render_html(("modewright.editing.spec_diff",), "difference.html.jinja", context)

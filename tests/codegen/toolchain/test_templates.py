@@ -19,9 +19,9 @@ NOTHING: dict[str, list[str]] = {"inputs": []}
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     path = tmp_path / "modewright"
     monkeypatch.setenv("MODEWRIGHT_CACHE", str(path))
-    rendering._environment.cache_clear()
+    rendering.template_environment.cache_clear()
     yield path
-    rendering._environment.cache_clear()
+    rendering.template_environment.cache_clear()
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def rendered() -> str:
     """Return a template filled in as another process would do it."""
-    rendering._environment.cache_clear()
+    rendering.template_environment.cache_clear()
     return render(TEMPLATE, NOTHING)
 
 
@@ -68,8 +68,8 @@ def test_without_a_folder_of_the_users_own_nothing_is_kept(
 
 def test_a_folder_that_goes_meanwhile_ends_nothing(folder: Path) -> None:
     first = rendered()
-    rendering._environment.cache_clear()
-    rendering._environment()
+    rendering.template_environment.cache_clear()
+    rendering.template_environment(("codegen",), is_html=False)
     for path in (folder / TEMPLATE_CACHE).iterdir():
         path.unlink()
     (folder / TEMPLATE_CACHE).rmdir()
