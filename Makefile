@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # A shell fragment that puts a Python that is new enough into $$python.
 find_python := python=$$(tools/find_python.sh $(PYTHON)) || exit
 
-.PHONY: help setup system-packages demo test long-test target-test prove verify verify-part prove-diagnosis paper bench check
+.PHONY: help setup system-packages demo test long-test recordings-test target-test prove verify verify-part prove-diagnosis paper bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -44,20 +44,23 @@ system-packages: ## install what the target needs (Debian, Ubuntu), if it is not
 demo: setup ## show the product at work
 	@$(BIN)/modewright demo $(ARGS)
 
-test long-test target-test: export CI := true
-test long-test target-test: export HYPOTHESIS_PROFILE := ci
-test long-test target-test: export LC_ALL := C
-test long-test target-test: export MPLBACKEND := Agg
-test long-test target-test: export OMP_NUM_THREADS := 1
-test long-test target-test: export OPENBLAS_NUM_THREADS := 1
-test long-test target-test: export PYTHONHASHSEED := 0
-test long-test target-test: export PYTHONUTF8 := 1
-test long-test target-test: export TZ := UTC
-test: setup ## run the tests but the long ones and those of the target, the same way everywhere
-	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m "not long" $(ARGS)
+test long-test recordings-test target-test: export CI := true
+test long-test recordings-test target-test: export HYPOTHESIS_PROFILE := ci
+test long-test recordings-test target-test: export LC_ALL := C
+test long-test recordings-test target-test: export MPLBACKEND := Agg
+test long-test recordings-test target-test: export OMP_NUM_THREADS := 1
+test long-test recordings-test target-test: export OPENBLAS_NUM_THREADS := 1
+test long-test recordings-test target-test: export PYTHONHASHSEED := 0
+test long-test recordings-test target-test: export PYTHONUTF8 := 1
+test long-test recordings-test target-test: export TZ := UTC
+test: setup ## run the tests but the long ones, those of recordings and those of the target
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m "not long and not recordings" $(ARGS)
 
 long-test: setup ## run the long ones: proofs, fuzzing, methods of integration
-	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m long $(ARGS)
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m "long and not recordings" $(ARGS)
+
+recordings-test: setup ## run the tests of real recordings: ARGS="--recordings=DIR" or MODEWRIGHT_RECORDINGS
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m recordings $(ARGS)
 
 target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, and prove contracts
 	$(BIN)/pytest -n 2 --dist worksteal -q tests/codegen/target $(ARGS)
