@@ -14,13 +14,15 @@ from jinja2.bccache import Bucket
 
 from codegen.toolchain.build_cache import cache_subfolder
 
+CODEGEN = __name__.partition(".toolchain")[0]
+"""The package of the C templates: `codegen`, which the wheel has below `modewright`."""
 TEMPLATE_CACHE = "templates"
 """The folder inside the cache for compiled templates."""
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:
     """Return a rendered template of C; a variable without a value is an error (rule C25)."""
-    return template_environment(("codegen",), is_html=False).get_template(template).render(context)
+    return template_environment((CODEGEN,), is_html=False).get_template(template).render(context)
 
 
 def render_html(packages: tuple[str, ...], template: str, context: Mapping[str, Any]) -> str:

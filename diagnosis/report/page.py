@@ -40,6 +40,8 @@ from diagnosis.report.tables import describe_residuals, whiteness_rows
 from language.overlays.tree_types import format_si_unit
 from language.text.diagnostic import MissingToolError
 
+REPORT = __name__.rpartition(".")[0]
+"""The package of the report's templates."""
 DIGEST_LENGTH = 16
 """Hexadecimal digits of SHA-256 that are shown."""
 
@@ -202,4 +204,4 @@ def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
 
 def _render_page(context: Mapping[str, Any]) -> str:
     """Return the HTML page for the values of the template."""
-    return render_html(("diagnosis.report",), "report.html.jinja", context)
+    return render_html((REPORT,), "report.html.jinja", context)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from codegen.toolchain.templates import render_html
+from diagnosis import report as diagnosis_report
 from language.expressions.units import display_unit
 from modewright.render.sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.render.study import failure_texts, format_number, interval_text
@@ -220,7 +221,7 @@ def _embed_svg(name: str, data: bytes) -> str:
 
 def _render_template(context: Mapping[str, Any]) -> str:
     """Return the page for a context."""
-    packages = ("modewright.render", "diagnosis.report")
+    packages = (__name__.rpartition(".")[0], diagnosis_report.__name__)
     return render_html(packages, "study.html.jinja", context)
 
 

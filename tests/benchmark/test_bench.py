@@ -31,7 +31,8 @@ def test_a_small_run_has_every_figure_with_its_errors(
 ) -> None:
     short = Manoeuvre("short", step_ms=20, horizon_ms=80)
     monkeypatch.setattr(figures, "TIP_OUT", short)
-    monkeypatch.setattr(figures, "CHATTER", short)
+    monkeypatch.setattr(run, "TIP_OUT", short)
+    monkeypatch.setattr(run, "CHATTER", short)
     monkeypatch.setattr(figures, "STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "COMPILED_STEPS", ("2 ms",))
     monkeypatch.setattr(figures, "VARIANTS", 4)

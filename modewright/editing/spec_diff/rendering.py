@@ -11,6 +11,8 @@ from codegen.toolchain.templates import render_html
 from modewright.editing.spec_diff.difference import SpecChange
 from modewright.runtime.json_format import format_entry
 
+SPEC_DIFF = __name__.rpartition(".")[0]
+"""The package of the page's template."""
 MAX_VALUE_LENGTH = 72
 """Longest value in a line of text; JSON and page have all of it."""
 SIGNS = {"added": "+", "removed": "-", "changed": "~"}
@@ -82,4 +84,4 @@ def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
         "signs": SIGNS,
         "summary": diff_summary(changes) if changes else "nothing differs",
     }
-    return render_html(("modewright.editing.spec_diff",), "difference.html.jinja", context)
+    return render_html((SPEC_DIFF,), "difference.html.jinja", context)

@@ -69,7 +69,7 @@ def test_without_a_folder_of_the_users_own_nothing_is_kept(
 def test_a_folder_that_goes_meanwhile_ends_nothing(folder: Path) -> None:
     first = rendered()
     rendering.template_environment.cache_clear()
-    rendering.template_environment(("codegen",), is_html=False)
+    rendering.template_environment((rendering.CODEGEN,), is_html=False)
     for path in (folder / TEMPLATE_CACHE).iterdir():
         path.unlink()
     (folder / TEMPLATE_CACHE).rmdir()
