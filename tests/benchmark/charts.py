@@ -49,7 +49,7 @@ def measure_charts(pairs: int) -> Figure:
 
 def _over_machine(module: str, name: str, pairs: int) -> Figure:
     ticks = TICKS // SHARE
-    rival: Run = importlib.import_module(f"tests.benchmark.{module}").prepared(
+    rival: Run = importlib.import_module(f"tests.benchmark.rival_scripts.{module}").prepared(
         chart_inputs(ticks).pairs()
     )
     ours = make_interpreter_run(ticks)
