@@ -37,10 +37,14 @@ class RawNode:
 
 
 def resolve_initials(nodes: Sequence[RawNode], reader: Reader) -> None:
-    """Set `initial` of all nodes below the root; problems are reported.
+    """Set `initial` of all nodes but the root to the node indices that their `initial` names.
 
-    A history without `initial` gets that of its parent. A history whose `initial` contains a
-    history is a problem.
+    Names, also dotted, are searched below the node; those of a history below its parent. A compound
+    node with a single child that is no history needs no `initial`. A history without `initial` gets
+    that of its parent. Atomic and parallel nodes get ().
+
+    Reported, not raised: a missing, empty or unknown `initial` (unknown names are left out), one of
+    an atomic or parallel node, a compound node without modes, a history that leads to a history.
     """
     for index, node in enumerate(nodes):
         if index != ROOT:

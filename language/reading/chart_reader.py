@@ -43,8 +43,9 @@ NO_PARENT = -1
 def is_chart(root: MappingNode) -> bool:
     """Tell whether the tree of an automaton uses a key that only charts have.
 
-    Such keys are `events`, `order` and `micro_steps` at the root, modes and regions inside modes,
-    events and the like of transitions, and a list of targets.
+    Such keys are CHART_KEYS (`events`, `order`, `micro_steps`) at the root, `regions` in a region
+    of the root, INNER_KEYS in a mode or template, and CHART_TRANSITION_KEYS or a list of targets in
+    `to` in a transition. Regions at the root alone make no chart. Nothing is reported.
     """
     if any(key in root.entries for key in CHART_KEYS):
         return True
@@ -92,6 +93,7 @@ class ChartReader:
     """Reads the tree of nested modes of an automaton; a `ModeReader` reads each mode."""
 
     def __init__(self, mode_reader: ModeReader) -> None:
+        """Read with the root and the problems of `mode_reader`."""
         self.mode_reader = mode_reader
         self.problems = mode_reader.problems
         self.root = mode_reader.root
@@ -99,9 +101,14 @@ class ChartReader:
         self.has_errors = False
 
     def read(self, span: Span) -> ModeStructure:
-        """Return the regions, superstates and tree of a chart.
+        """Return the regions (`chart` first), superstates and tree of a chart; call it only once.
 
-        `span` is the place of the automaton. Raises SpecError if reported problems leave no tree.
+        `span` is the place of the automaton. The modes at the root form the region `chart`; if
+        there are only regions, it gets the single mode `always`. Superstates are returned without
+        dynamics (equations, flow, update, observer, run, invariants).
+
+        Raises SpecError without any mode, for a region of the root without modes, and for a problem
+        of `initial`. All other problems are only reported.
         """
         signals = self._read_events()
         self._read_tree(span)

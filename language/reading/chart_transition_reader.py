@@ -13,9 +13,12 @@ from language.text.diagnostic import Problems, suggest_name
 def resolve_transitions(
     chart: Chart, modes: Mapping[int, Mode], problems: Problems
 ) -> dict[str, ChartTransition]:
-    """Return the resolved transitions of modes, by key path; wrong targets are reported.
+    """Return the resolved transitions of modes, by the key path of the transition.
 
-    `modes` are the modes by the index of their node.
+    `modes` are the modes by the index of their node. An unknown target is reported and left out.
+    Also reported, without effect on the result: a transition with both an event and a wait, targets
+    that are not in different regions of one parallel mode, an internal transition that leaves its
+    source or whose source is parallel, and a target in another region of the root.
     """
     result: dict[str, ChartTransition] = {}
     for index, mode in modes.items():

@@ -21,8 +21,9 @@ def read_difference(
 ) -> Fraction:
     """Return a literal in SI as a difference; a bare number is in `unit` without its offset.
 
-    A literal in a unit with an offset (degC) is reported: it is a point on a scale, not a
-    difference.
+    `what` names the literal and `span` places the problem if `node` is absent (reported, 0). A
+    literal in a unit with an offset (degC) is reported, and its value as a point (273.15 K more) is
+    returned. The sign is not checked.
     """
     own_zero = dataclasses.replace(unit, offset=Fraction(0))
     value, own = reader.read_quantity(node, what, span, own_zero)

@@ -43,7 +43,12 @@ class ElementReader(Reader):
         super().__init__(problems)
 
     def read_elements(self, node: YamlNode | None) -> dict[str, Element]:
-        """Return the elements by name; one with an unknown kind is reported and left out."""
+        """Return the elements by name in the order of the file; empty for an absent node.
+
+        One with a missing or unknown `kind` is reported and left out. Keys that are not in
+        ELEMENT_KEYS of the kind and missing REQUIRED_KEYS are reported, and the element is kept
+        with the formulas that it has. `far` is a list of names with their places.
+        """
         elements = {}
         for entry in self.named_entries(node, "elements"):
             key = f"elements.{entry.key}"
@@ -64,7 +69,11 @@ class ElementReader(Reader):
         return elements
 
     def read_places(self, node: YamlNode | None) -> dict[str, Mapping[str, Formula]]:
-        """Return the formulas that `places` declares, by state, input or output and by key."""
+        """Return the formulas that `places` declares, by state, input or output, then by key.
+
+        Keys other than PLACE_KEYS, `about` and `req` are reported and left out. Whether the state,
+        input or output exists is not checked.
+        """
         places: dict[str, Mapping[str, Formula]] = {}
         for entry in self.named_entries(node, "places"):
             key = f"places.{entry.key}"
@@ -73,7 +82,12 @@ class ElementReader(Reader):
         return places
 
     def read_outputs(self, node: YamlNode | None) -> OutputDeclarations:
-        """Return the outputs of a list of names, or of a mapping from names to variables."""
+        """Return the outputs of a list of names, or of a mapping from names to variables.
+
+        A name of a list is both output and variable. An absent node gives no outputs. An entry that
+        is no scalar is reported; in a mapping it reads the variable "". Whether variables exist is
+        not checked.
+        """
         if not isinstance(node, MappingNode):
             items = self.read_list(node, "outputs")
             return OutputDeclarations(
@@ -90,7 +104,8 @@ class ElementReader(Reader):
 def outputs_as_mapping(node: YamlNode) -> MappingNode:
     """Return `outputs` as a mapping from each output to the variable that it reads.
 
-    A mapping is returned unchanged; each name of a list maps to itself.
+    A mapping is returned unchanged; each scalar of a list maps to itself, other items are left out.
+    Any other node gives an empty mapping. Nothing is reported.
     """
     if isinstance(node, MappingNode):
         return node

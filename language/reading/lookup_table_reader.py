@@ -28,8 +28,13 @@ class LookupTableReader(Reader):
     ) -> LookupTable | None:
         """Return the table `{over: x, unit: u, points: {...}}`, or None with a problem reported.
 
-        `key` is the key path of the points. Values outside `value_range` and an axis with less than
-        two points are reported.
+        None is returned only if `over` names no axis or `points` is no mapping. `over` is one name
+        or a list, of which the first two count. `key` is the key path of the points. With two axes,
+        `points` has a mapping for each point of the first axis, and the values are stored row by
+        row.
+
+        Reported, with the table returned: values outside `value_range` (SI), an axis with less than
+        two points, points that do not ascend, and rows with other points than the first row.
         """
         unit = self.read_unit(table.get("unit"))
         names = self._read_axis_names(table)
@@ -136,6 +141,9 @@ class LookupTableReader(Reader):
 
 
 def section_of(tree: MappingNode, name: str) -> MappingNode:
-    """Return a section of an automaton's tree; an empty mapping if it is absent or no mapping."""
+    """Return the section `name` at the root of a tree, or an empty mapping.
+
+    It is empty if the section is absent or no mapping; nothing is reported.
+    """
     node = tree.get(name)
     return node if isinstance(node, MappingNode) else MappingNode({}, Span(tree.span.source, 0, 0))

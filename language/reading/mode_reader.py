@@ -34,7 +34,10 @@ class ModeReader(Reader):
     """
 
     def __init__(self, problems: Problems, model: Automaton | None, root: MappingNode) -> None:
-        """Report into `problems`."""
+        """Report into `problems`; read the templates and the names of events at `root`.
+
+        `model` is the continuous automaton whose modes may be run and observed, or None.
+        """
         super().__init__(problems)
         self.model = model
         self.root = root
@@ -43,9 +46,12 @@ class ModeReader(Reader):
         self.transition_reader = TransitionReader(problems, tuple(events.entries))
 
     def read_regions(self, span: Span) -> tuple[Region, ...]:
-        """Return the region `chart`, then the parallel regions in the order of the file.
+        """Return the region `chart`, then the other regions of the root in the order of the file.
 
-        An automaton without modes at the root gets the mode `always`.
+        `chart` consists of the `modes` at the root, or is a region of that name. Without modes at
+        the root it has the single mode `always`, placed at `span`. Modes inside modes are not read
+        (see `ChartReader`). Raises SpecError for a region without a mode; other problems are
+        reported.
         """
         entries = self.root_region_entries()
         chart = next((entry for entry in entries if entry.key == CHART), None)
@@ -63,9 +69,10 @@ class ModeReader(Reader):
         return (Region(CHART, modes, self._read_initial(self.root, modes, span), span), *parallel)
 
     def root_region_entries(self) -> list[Entry]:
-        """Return the regions at the root; their names are checked.
+        """Return the entries of `regions` at the root in the order of the file.
 
-        If one is called `chart`, `modes` and `initial` at the root are reported as duplicates.
+        Wrong names are reported and kept. If a region is called `chart`, `modes` and `initial` at
+        the root are reported as duplicates.
         """
         entries = list(self.read_mapping(self.root.get("regions"), "regions"))
         for entry in entries:
@@ -114,9 +121,11 @@ class ModeReader(Reader):
         return name
 
     def apply_template(self, mode: MappingNode) -> MappingNode:
-        """Return the mapping of a mode merged over the template that `like` names.
+        """Return the mapping of a mode merged over the template that `like` names, without `like`.
 
-        A mode without `like` is returned unchanged; an unknown template is reported.
+        Keys of the mode have precedence, at any depth. A mode without `like` is returned unchanged.
+        An unknown template is reported, and the mode is returned without `like`. A `like` inside
+        the template is not applied.
         """
         node = mode.get("like")
         if node is None:
@@ -132,7 +141,14 @@ class ModeReader(Reader):
         return apply_overlay(template, without_keys(mode, "like"), self.problems, is_template=True)
 
     def read_mode(self, entry: Entry, context: ModeContext) -> Mode:
-        """Return a mode with the dynamics that it inherits from its parent or from the root."""
+        """Return a mode with the dynamics that it inherits from `context.parent` or from the root.
+
+        The key of `entry` is its name; without `number` it has the number `context.position`.
+        Equations and updates are merged with the inherited ones (a name in both is reported). An
+        own balance or invariant replaces an inherited one of the same name; observer and run are
+        inherited if the mode has none. Only outermost modes of `chart` have the equations, flow and
+        terms of the root. Templates are not applied here; problems are reported.
+        """
         key, parent = context.key, context.parent
         table = self.read_mapping(entry.node, key, (*MODE_KEYS, *ACTION_KEYS, *INNER_KEYS))
         invariants = self._read_invariants(table.get("invariant"), f"{key}.invariant")
@@ -258,7 +274,10 @@ class ModeReader(Reader):
 
 
 def check_mode_numbers(modes: Iterable[Mode], problems: Problems) -> None:
-    """Report each mode whose number an earlier mode of the region has."""
+    """Report each mode of one region whose number an earlier mode has; the hint is a free number.
+
+    The hint is the smallest number from 0 on that no mode before it has.
+    """
     names: dict[int, str] = {}
     for mode in modes:
         if mode.number in names:

@@ -43,7 +43,12 @@ FormulaMatrix = dict[str, dict[str, Formula]]
 def read_observer(reader: Reader, node: YamlNode, key: str, model: Automaton | None) -> Observer:
     """Return the observer at a node: from a mode of the model (`of`) or with written matrices.
 
-    `key` is its key path. Missing and contradictory keys are reported.
+    `key` is its key path. Defaults: `gain: steady`, `predict: matrix`, `covariance: steady`; absent
+    matrices and vectors are empty, absent `of` and `correct` are None.
+
+    Reported, not raised: missing `kalman`, `measures`, `process_noise` or `measurement_noise`,
+    matrices beside `of`, keys of a recursive covariance with a steady gain, repeated states, a
+    measurement without noise, and unknown rows, columns or modes (left out).
     """
     table = reader.read_mapping(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
     kalman = reader.read_mapping(table.get("kalman"), f"{key}.kalman", KALMAN_KEYS)
@@ -193,7 +198,12 @@ def _check_matrix_source(reader: Reader, table: MappingNode) -> None:
 
 
 def read_run(reader: Reader, node: YamlNode, key: str, model: Automaton | None) -> ModelRun:
-    """Return the run of a mode of the model at a node; `key` is its key path."""
+    """Return the run of a mode of the model that the node describes; `key` is its key path.
+
+    Defaults: `method: rk4`, `substeps: 1` (1 to MAX_SUBSTEPS), `events: 4` (1 to MAX_EVENTS),
+    `follow: true`. `linearise` is None without the key, else the formulas of its `at` by state or
+    input of the model. A missing model or an unknown mode is reported and gives the mode "".
+    """
     table = reader.read_mapping(node, key, RUN_KEYS)
     mode = _read_model_mode(reader, table.get("of"), "a run", node.span, model) or ""
     point: dict[str, Formula] = {}

@@ -22,13 +22,22 @@ class ParameterReader(Reader):
     """Reads the section `parameters` of an automaton with the tree `root`."""
 
     def __init__(self, problems: Problems, root: MappingNode) -> None:
-        """Report into `problems`."""
+        """Report into `problems`; `root` is the tree of the automaton.
+
+        Its sections `inputs` and `states` give the units of the axes of lookup tables.
+        """
         super().__init__(problems)
         self.root = root
         self.axis_sections = (section_of(root, "inputs"), section_of(root, "states"))
 
     def read_parameters(self) -> dict[str, Parameter]:
-        """Return the parameters by name in the order of the file."""
+        """Return all parameters by name in the order of the file; problems are reported.
+
+        The kind is "derived" with the key `derived`, else "tunable" or "fixed" (default). The unit
+        is `unit`, else that of the value, else 1. The value is in SI, for other types as by
+        `read_typed_value`; None for a derived parameter or a lookup table. A missing value gives 0.
+        Values outside the range are reported and kept.
+        """
         entries = self.named_entries(self.root.get("parameters"), "parameters")
         return {entry.key: self._read_parameter(entry) for entry in entries}
 

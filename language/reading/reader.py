@@ -38,7 +38,7 @@ class Reader:
     """Reads parts of a document and reports problems into one collector."""
 
     def __init__(self, problems: Problems) -> None:
-        """Report into `problems`."""
+        """Report into `problems`; expressions are cached by scalar object and key path."""
         self.problems = problems
         self.parsed_formulas: dict[tuple[int, str], tuple[ScalarNode, Formula]] = {}
 
@@ -47,8 +47,9 @@ class Reader:
     ) -> MappingNode:
         """Return a mapping without its unknown keys; an empty one for an absent or empty node.
 
-        Unknown keys and a node that is no mapping are reported; `what` names the node. Without
-        `known_keys` all keys are allowed.
+        Unknown keys and a node that is no mapping are reported; `what` names the node. Known are
+        `known_keys` and TEXT_KEYS; without `known_keys` all keys are allowed. A `req` that is no
+        name or list of names is reported and kept.
         """
         if node is None:
             return MappingNode({}, NO_SPAN)
@@ -93,13 +94,21 @@ class Reader:
         self.problems.error("unknown-key", entry.span, label, hint)
 
     def named_entries(self, node: YamlNode | None, what: str) -> Iterator[Entry]:
-        """Yield the entries of a mapping; keys that are no valid names are reported."""
+        """Yield the entries of a mapping in the order of the file; an absent node has none.
+
+        Keys that `check_name` rejects are reported, and yielded all the same. `what` names the
+        node.
+        """
         for entry in self.read_mapping(node, what):
             check_name(entry.key, entry.span, self.problems)
             yield entry
 
     def read_scalar(self, node: YamlNode | None, what: str, span: Span) -> ScalarNode | None:
-        """Return a scalar; None with a problem reported if the node is absent or no scalar."""
+        """Return a scalar; None with a problem reported if the node is absent or no scalar.
+
+        `what` names the node; `span` is the place of the problem for an absent node. An empty
+        scalar is returned.
+        """
         if node is None:
             self.problems.error("missing", span, f"`{what}` is missing")
         elif not isinstance(node, ScalarNode):
@@ -109,17 +118,22 @@ class Reader:
         return None
 
     def read_string(self, node: YamlNode | None, what: str, span: Span) -> str:
-        """Return the text of a scalar; an empty text with a problem reported if there is none."""
+        """Return the text of a scalar; "" and a problem reported if it is absent or no scalar.
+
+        `what` names the node; `span` is the place of the problem for an absent node. The text of an
+        empty scalar is "", too, which is not reported.
+        """
         scalar = self.read_scalar(node, what, span)
         return scalar.text if scalar else ""
 
     def read_alternative(
         self, entry: Entry, key: str, alternatives: Mapping[str, tuple[str, ...]], verb: str
     ) -> tuple[str, MappingNode] | None:
-        """Return which of several kinds an entry is, and its mapping; None with a problem reported.
+        """Return the kind of an entry, and its mapping; None if not exactly one kind is given.
 
-        `alternatives` gives for each key that names a kind the keys that may be beside it. Exactly
-        one kind must be given.
+        `alternatives` gives for each key that names a kind the keys that may be beside it; `key` is
+        the key path. Keys of other kinds are reported and left out of the mapping. None is reported
+        as "`<entry>` <verb> one thing", unless the entry has another reported problem.
         """
         problem_count = len(self.problems.reported)
         other_keys = {key for keys in alternatives.values() for key in keys}
@@ -134,7 +148,11 @@ class Reader:
         return None
 
     def read_list(self, node: YamlNode | None, what: str) -> list[ScalarNode]:
-        """Return the scalars of a list; empty for an absent node. Other items are reported."""
+        """Return the scalars of a list in its order; empty for an absent node.
+
+        A node that is no list (also a single scalar) is reported and gives an empty list. Items
+        that are no scalars are reported and left out. Repetitions are kept.
+        """
         if node is None:
             return []
         if not isinstance(node, SequenceNode):
@@ -148,9 +166,10 @@ class Reader:
     def read_choice(
         self, node: YamlNode | None, what: str, allowed: Iterable[str], default: str
     ) -> str:
-        """Return one of the allowed words.
+        """Return one of the words `allowed`, or `default`.
 
-        Returns `default` for an absent node and for an unknown word, which is reported.
+        Returns `default` for an absent or empty node, and with a problem reported for an unknown
+        word and a node that is no scalar. `default` need not be one of the words.
         """
         if node is None:
             return default
@@ -165,9 +184,11 @@ class Reader:
     def read_integer(
         self, node: YamlNode | None, what: str, default: int, low: int, high: int
     ) -> int:
-        """Return an integer from `low` to `high`.
+        """Return an integer from `low` to `high`, both included.
 
-        Returns `default` for an absent node and for any other value, which is reported.
+        Returns `default` for an absent node and for any other value, which is reported. The literal
+        is decimal, without a unit, a plus sign or leading zeros. `default` need not be within the
+        bounds.
         """
         if node is None:
             return default
@@ -181,9 +202,9 @@ class Reader:
         return int(text)
 
     def read_unit(self, node: YamlNode | None) -> Unit:
-        """Return a unit: 1 (`NO_UNIT`) for an absent node.
+        """Return a unit; `NO_UNIT` (1) if the node is absent, an empty text or no scalar.
 
-        An unknown unit is reported and gives `UNKNOWN_UNIT`.
+        The last one is reported. An unknown unit is reported, too, and gives `UNKNOWN_UNIT`.
         """
         if node is None:
             return NO_UNIT
@@ -195,10 +216,11 @@ class Reader:
             return UNKNOWN_UNIT
 
     def read_expression(self, node: YamlNode | None, key: str, span: Span) -> Formula | None:
-        """Return an expression with its key path, or None with a problem reported.
+        """Return an expression with its key path; None (reported) if it is absent or no scalar.
 
-        A text that does not parse gives an `ErrorNode`. Results are stored by scalar and key,
-        because sections of the root are read again for each mode.
+        A text that does not parse is reported and gives an `ErrorNode`. Results are cached by
+        scalar object and key, so that a section of the root that is read for each mode reports
+        once.
         """
         scalar = self.read_scalar(node, key.rpartition(".")[2], span)
         if scalar is None:
@@ -215,7 +237,11 @@ class Reader:
         return Formula(tree, key)
 
     def read_formulas(self, node: YamlNode | None, key: str) -> dict[str, Formula]:
-        """Return the expressions of a mapping by name; entries that are no scalars are left out."""
+        """Return the expressions of a mapping by name, with the key paths `<key>.<name>`.
+
+        Entries that are no scalars are reported and left out; wrong names are reported and kept. An
+        absent node gives an empty dictionary.
+        """
         formulas = {}
         for entry in self.named_entries(node, key):
             formula = self.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
@@ -226,10 +252,11 @@ class Reader:
     def read_quantity(
         self, node: YamlNode | None, what: str, span: Span, unit: Unit | None
     ) -> Quantity:
-        """Return a literal in SI and its unit; a bare number is in `unit` if one is given.
+        """Return a literal in SI and its unit; a bare number is in `unit`, or in 1 if that is None.
 
-        A wrong literal gives 0 and `unit`, or `UNKNOWN_UNIT`. An expression, and a unit of another
-        dimension than `unit`, are reported.
+        A negative literal is one, too. Reported are a missing node (at `span`), an expression and a
+        text that does not parse; they give 0 and `unit`, or `UNKNOWN_UNIT` if it is None. A unit of
+        another dimension than `unit` is reported, and the value is returned with its own unit.
         """
         formula = self.read_expression(node, what, span)
         literal = _literal_value(formula.tree) if formula else None
@@ -249,9 +276,11 @@ class Reader:
         return value, own
 
     def read_type(self, table: MappingNode, what: str) -> tuple[TypeName, tuple[str, ...]]:
-        """Return the `type` of a declaration, and the `values` of an enumeration (else empty).
+        """Return the `type` of a declaration (default "real") and the `values` of an enum or ().
 
-        Keys that do not fit the type are reported.
+        `what` is the name of the declaration. Reported are an unknown type (gives "real"), a `unit`
+        unless the type is real, a `range` of a bool or enum, an enum with less than two values,
+        `values` of another type, and values that are repeated or no valid names.
         """
         kind = cast(TypeName, self.read_choice(table.get("type"), "type", TYPE_NAMES, "real"))
         node = table.get("values")
@@ -287,7 +316,8 @@ class Reader:
     ) -> Fraction:
         """Return a literal of a type as a number: SI value, integer, 0 or 1, or index in `names`.
 
-        A wrong literal gives 0 with a problem reported.
+        `unit` is that of a bare real number. A missing or wrong literal is reported and gives 0; an
+        int must be within +-MAX_INT. The range is not checked.
         """
         if type_name == "real":
             return self.read_quantity(node, what, span, unit)[0]
@@ -303,16 +333,20 @@ class Reader:
     def read_default(
         self, table: MappingNode, key: str, unit: Unit, type_name: TypeName, names: Sequence[str]
     ) -> Fraction | None:
-        """Return the `default` of an input as a number, or None if it has none."""
+        """Return the `default` of an input as by `read_typed_value`, or None if it has none.
+
+        `key` is the key path of the input. A wrong literal is reported and gives 0.
+        """
         node = table.get("default")
         if node is None:
             return None
         return self.read_typed_value(node, f"{key}.default", node.span, unit, type_name, names)
 
     def check_integer_range(self, value_range: Range | None, node: YamlNode | None) -> Range | None:
-        """Return the range of an integer, or None if there is none.
+        """Return the range of an integer unchanged; None if `value_range` or `node` is None.
 
-        Bounds that are not whole or not within +-MAX_INT are reported and give None.
+        `node` is the place of `range`. Bounds that are not whole or not within +-MAX_INT are
+        reported and give None.
         """
         if value_range is None or node is None:
             return None
@@ -323,7 +357,10 @@ class Reader:
         return value_range
 
     def read_range(self, node: YamlNode | None, unit: Unit) -> Range | None:
-        """Return the bounds `[low, high]` in SI; None if the node is absent or wrong (reported)."""
+        """Return the bounds `[low, high]` in SI; bare numbers are in `unit`. None without a node.
+
+        None with a problem reported if it is no list, has not two items, or low is not below high.
+        """
         bounds = self.read_list(node, "range")
         if not isinstance(node, SequenceNode):
             return None
@@ -361,6 +398,6 @@ def _literal_value(tree: SyntaxTree) -> tuple[Fraction, Unit] | None:
 
 
 def about_of(table: MappingNode) -> str:
-    """Return the description in `about`; an empty text if there is none."""
+    """Return the text of `about`; "" if it is absent or no scalar."""
     node = table.get("about")
     return node.text if isinstance(node, ScalarNode) else ""

@@ -53,7 +53,10 @@ class TransitionReader(Reader):
     ) -> Iterator[Transition]:
         """Yield the transitions of the mode `source` in the order of the file.
 
-        A transition without a guard is reported and left out.
+        One without a guard is reported and left out; with an event, or if the mode has inner modes,
+        a missing `when` means `true`. Without `to` the target is the name of the transition; `to:
+        []` gives no targets, and `target` is then the source. Undeclared events and wrong names are
+        reported and kept. Whether targets exist is not checked.
         """
         for entry in self.read_mapping(node, "transitions"):
             self._check_name(entry)

@@ -27,9 +27,14 @@ STAY = "stay"
 
 
 def expand_transition_tables(tree: MappingNode, problems: Problems) -> MappingNode:
-    """Return an automaton's tree in which the tables of the root and of all modes are expanded.
+    """Return a tree in which the tables of the root, of regions and of modes are expanded.
 
-    Problems are reported into `problems`.
+    Each table becomes transitions of the modes beside it, named like the columns, after the own
+    ones; the key `transition_table` is removed. A cell `stay` gives no transition. Tables inside
+    templates are not expanded.
+
+    Reported, not raised: a table without modes or columns, missing or unknown rows and cells, a
+    mode called `stay`, and a transition with the name of a column (which wins).
     """
     reader = _TransitionTableReader(problems)
     return reader.expand_table(reader.expand_children(tree, ("modes", "regions")))

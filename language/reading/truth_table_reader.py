@@ -28,7 +28,12 @@ class TruthTableReader(Reader):
     discrete: tuple[str, ...] = ()
 
     def read_truth_tables(self, tree: MappingNode) -> tuple[TruthTable, ...]:
-        """Return the truth tables of an automaton's tree in the order of the file."""
+        """Return the truth tables in the section `tables` of a tree in the order of the file.
+
+        Sets `discrete` to the discrete variables of the tree. A row with wrong marks is reported
+        and has no marks. Also reported, and kept: empty `if` or `rows`, more than MAX_CONDITIONS
+        conditions, `else` before other rows, and results that are no discrete variables.
+        """
         self.discrete = tuple(self.read_mapping(tree.get("discrete"), "discrete").entries)
         node = tree.get("tables")
         return tuple(self._read_table(entry) for entry in self.named_entries(node, "tables"))

@@ -34,9 +34,11 @@ class VariableReader(Reader):
         tree: MappingNode,
         modes: Collection[str],
     ) -> None:
-        """Read `faults` and `fault_mode` of the tree of an automaton.
+        """Read `faults` and `fault_mode` of the tree of an automaton into attributes.
 
-        `modes` are the names of the modes that a fault may enter.
+        `modes` are the names of the modes that a fault may enter; another name is reported and
+        kept. `fault_mode` is stored without the prefix `chart.`, None if absent. `faults` tells by
+        name whether a fault is latched (default true); names in BUILTIN_FAULTS are reported.
         """
         super().__init__(problems)
         self.model = model
@@ -51,7 +53,11 @@ class VariableReader(Reader):
                 self.problems.error("name", node.span, label, suggest_name(self.fault_mode, modes))
 
     def read_inputs(self, node: YamlNode | None) -> dict[str, Input]:
-        """Return the inputs by name."""
+        """Return the inputs by name in the order of the file; problems are reported, none left out.
+
+        Default and range are in SI and None if absent; without a type and unit an input is a real
+        in 1.
+        """
         return {entry.key: self._read_input(entry) for entry in self.named_entries(node, "inputs")}
 
     def _read_input(self, entry: Entry) -> Input:
@@ -71,7 +77,11 @@ class VariableReader(Reader):
         return Input(entry.key, unit, kind, default, limits, key, span, values, outside, about)
 
     def read_states(self, node: YamlNode | None) -> dict[str, State]:
-        """Return the states by name; a state without a unit has that of the model's state, or 1."""
+        """Return the states by name; one without a unit has that of the state in `model`, else 1.
+
+        All are real. A missing `initial` is reported and gives an ErrorNode. The range is in SI,
+        None if it is absent or wrong.
+        """
         states = {}
         for entry in self.named_entries(node, "states"):
             keys = ("unit", "initial", "range", *RANGE_POLICY_KEYS)
@@ -100,7 +110,11 @@ class VariableReader(Reader):
         return states
 
     def read_discrete(self, node: YamlNode | None) -> dict[str, State]:
-        """Return the discrete variables by name; one without `initial` is reported and left out."""
+        """Return the discrete variables by name; one without `initial` is reported and left out.
+
+        Their type is real (default), int, bool or enum. The range is in SI, None if it is absent or
+        wrong.
+        """
         variables = {}
         for entry in self.named_entries(node, "discrete"):
             key = f"discrete.{entry.key}"
@@ -137,8 +151,10 @@ class VariableReader(Reader):
     ) -> RangePolicy:
         """Return the reaction to a value outside its range (rule 18).
 
-        Keys in a continuous automaton, keys without a range, unknown faults and a missing fault
-        mode are reported.
+        Defaults: `on_range: saturate`, `fallback` None, `fault` None. `fallback` is a number like
+        that of `read_typed_value`, or "hold". `value_range` is the range in SI. Reported, not
+        raised: keys in a continuous automaton, keys without a range unless the type is enum, a
+        fallback outside the range, an unknown fault, and `on_range: fault` without a fault mode.
         """
         for key in RANGE_POLICY_KEYS:
             place = table.entries.get(key)
