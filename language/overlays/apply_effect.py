@@ -42,10 +42,17 @@ ASSIGNING_SECTIONS = ("equations", "update", "entry", "exit", "reset", "flow", "
 def apply_effect(
     tree: MappingNode, application: EffectApplication, problems: Problems
 ) -> MappingNode:
-    """Return the tree with an effect applied at its place. Raises SpecError.
+    """Return the tree with an effect applied at its place. Raises SpecError with all problems.
 
-    The order is: redirections, equations that use `base`, moved summands, additions. Redirections
-    therefore do not reach the formulas that the effect adds.
+    Holes are filled with the values of the place. Names that the effect adds get the suffix
+    `_<suffix>` of the application, or their name under `rename`.
+
+    The order is: redirections, equations that use `base`, moved summands, additions with the
+    parameter values of the application. Redirections therefore do not reach the formulas that the
+    effect adds.
+
+    Errors are a place that the effect does not fit, a hole without a value, names that are taken,
+    unknown names under `rename` or `values`, and edits without a hit.
     """
     place = find_effect_place(tree, application.effect, application.place)
     if isinstance(place, PlaceMismatch):

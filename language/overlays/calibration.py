@@ -44,9 +44,11 @@ class Calibration:
 
 
 def read_calibration(document: Document, problems: Problems) -> Calibration:
-    """Return the calibration of a document. Raises SpecError.
+    """Return the calibration of a document. Raises SpecError with all problems.
 
-    Whether its parameters exist is checked when the calibration is applied.
+    A value without `from` or `date` has those of the file; missing texts are "". `of` and the form
+    of values, dates (DATE) and standard deviations (not negative) are checked. Whether the
+    parameters exist is checked when the calibration is applied.
     """
     require_kind(document, "calibration", problems)
     return _CalibrationReader(problems).read(document)
@@ -61,9 +63,13 @@ def apply_calibration(
 ) -> MappingNode:
     """Return the tree of an automaton with the values of a calibration.
 
-    `parameters` are the parameters of the automaton and of its model by name. `instance_parameters`
-    gives the instance and the parameter for names like `k1_t_close`. Unknown and derived parameters
-    are reported.
+    `parameters` are the parameters of the automaton and of its model by name; a value for one of
+    the model adds its overridden declaration to the tree. `instance_parameters` gives the instance
+    and the parameter for names like `k1_t_close`, and has precedence; its value is set under
+    `instances`.
+
+    Unknown and derived parameters and values of the wrong form are reported, and their values are
+    skipped.
     """
     for name, value in calibration.values.items():
         if name in instance_parameters:
@@ -84,7 +90,9 @@ def apply_calibration(
 def set_instance_value(tree: MappingNode, place: tuple[str, str], value: YamlNode) -> MappingNode:
     """Return the tree of a system or automaton with another value for a parameter of an instance.
 
-    `place` is the instance and the parameter. Points of a lookup table are merged.
+    `place` is the instance and the parameter: the path is
+    `instances.<instance>.values.<parameter>`, which is created if missing. Points of a lookup table
+    are merged with earlier ones. Nothing is checked.
     """
     path = ("instances", place[0], "values", place[1])
     return put_node(tree, path, overlay_value(find_node(tree, path), value))
@@ -96,7 +104,10 @@ def report_unknown_parameter(
     candidates: Mapping[str, object],
     problems: Problems,
 ) -> None:
-    """Report a value whose parameter does not exist; the hint is a similar name of `candidates`."""
+    """Report that the automaton or system of a calibration has no parameter of the name of `value`.
+
+    The hint is the most similar name of `candidates`, if there is one.
+    """
     label = f"`{calibration.of.text}` has no parameter `{value.name}`"
     problems.error("name", value.span, label, suggest_name(value.name, candidates))
 

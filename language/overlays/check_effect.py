@@ -25,7 +25,12 @@ QUANTITY_KEYS = ("value", "range", "neutral", "plain", "starts")
 
 
 def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -> None:
-    """Report holes in keys and units that no place of the effect has."""
+    """Report holes in keys and units that are not in `holes` (texts with `$`).
+
+    Examined are the keys of `terms`, `equations`, `redirect` and `move` (KEY_HOLE_SECTIONS), and
+    the `unit` of parameters, states and discrete variables (UNIT_SECTIONS). Holes in expressions
+    are not.
+    """
     texts = [
         (entry.key, entry.span)
         for section in KEY_HOLE_SECTIONS
@@ -44,14 +49,20 @@ def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -
 
 
 def report_unknown_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
-    """Report a hole that no place of the effect has; the hint is a similar hole or `has`."""
+    """Report a hole (with `$`) that no place of the effect has.
+
+    The hint is the most similar hole of `holes`, or `has: [<hole>]` which declares it.
+    """
     label = f"`{hole}` is not a hole of the places where this effect fits"
     hint = suggest_name(hole, holes) or f"`has: [{hole[1:]}]` declares it"
     problems.error("effect", span, label, hint)
 
 
 def check_functions(tree: SyntaxTree, problems: Problems) -> None:
-    """Report unknown functions and wrong numbers of arguments in an expression, at any depth."""
+    """Report unknown functions and wrong numbers of arguments in an expression, at any depth.
+
+    Known are FUNCTION_NAMES. The types of arguments are not checked.
+    """
     if isinstance(tree, FunctionCall):
         if tree.function not in FUNCTION_NAMES:
             hint = (
@@ -67,7 +78,11 @@ def check_functions(tree: SyntaxTree, problems: Problems) -> None:
 
 
 def check_parameters(tree: MappingNode, problems: Problems) -> None:
-    """Report wrong or inconsistent values, ranges and starts of the parameters of an effect."""
+    """Report wrong or inconsistent values, ranges and starts of the parameters of an effect.
+
+    The problems are those of `ParameterReader`. A unit with a hole is left out before; a parameter
+    is skipped if it has a lookup table with holes, or quantities with units beside such a unit.
+    """
     known = tree.get("parameters")
     if isinstance(known, MappingNode):
         checkable = {entry.key: _remove_hole_unit(entry) for entry in known}

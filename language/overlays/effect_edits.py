@@ -46,8 +46,11 @@ def redirect_reads(
 ) -> tuple[MappingNode, frozenset[str]]:
     """Return a tree with the reads at some paths redirected, and the old names that were found.
 
-    A path `everywhere` stands for all expressions and outputs. A redirection in an equation also
-    applies to the equations that only this equation reads, directly or indirectly.
+    A path is a key path like `flow.w`: from the root with all expressions below it, or the end of a
+    key path inside a mode, region or template. `everywhere` stands for all expressions and outputs,
+    `outputs` for outputs. A path of an equation also covers the equations that only this equation
+    reads, directly or indirectly. `exceptions` apply to `everywhere` only. `der(x)`, `in(x)`,
+    parameters and start values are not redirected.
     """
     redirected_names: set[str] = set()
     applies_to = _path_predicate(tree, redirection)
@@ -74,14 +77,15 @@ def redirect_reads(
 
 
 def rewrite_scalar(scalar: ScalarNode, text: str, span: Span) -> ScalarNode:
-    """Return a scalar with another text; the span of the overlay is added to its changes."""
+    """Return a scalar with another text; `span` (the overlay) is appended to its changes."""
     return dataclasses.replace(scalar, text=text, changes=(*scalar.changes, span))
 
 
 def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> MappingNode:
-    """Return a tree with the formula of an equation replaced in every mode.
+    """Return a tree with the formula of an equation replaced wherever it is given.
 
-    The name `base` in the new formula stands for the old one.
+    This is at the root, in modes, in regions and in templates. The name `base` in `formula` stands
+    for the old formula of that place. A tree without the equation is returned unchanged.
     """
 
     def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
@@ -95,9 +99,10 @@ def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> Mappi
 
 
 def has_formula_at(tree: MappingNode, key: str) -> bool:
-    """Tell whether there is an expression at or below a key path such as `flow.w_w`, in any mode.
+    """Tell whether there is an expression at or below a key path such as `flow.w_w`.
 
-    It is always true for `everywhere` and `outputs`.
+    Inside modes, regions and templates an expression counts if its key path ends with `key`. It is
+    always true for `everywhere` and `outputs`. Parameters and start values do not count.
     """
     if key in ("everywhere", "outputs"):
         return True
@@ -189,8 +194,10 @@ def remove_summands(
 ) -> MovedSummands | None:
     """Remove the top-level summands that read one of `names` from the balance of a state.
 
-    Terms of the balance count as summands. Returns None if the root has no balance of the state,
-    because then it is not the same in every mode.
+    Terms of the balance at the root count as summands. If nothing reads a name, both lists of the
+    result are empty and the tree is unchanged. `span` is recorded as the change of the balance.
+    Returns None if the root has no balance of the state, because then it is not the same in every
+    mode.
     """
     balance = find_node(tree, ("flow", state))
     if not isinstance(balance, ScalarNode):
@@ -216,7 +223,11 @@ def remove_summands(
 
 
 def insert_summands(body: MappingNode, state: str, moved: MovedSummands) -> MappingNode:
-    """Return the body of an effect with moved summands and terms in the balance of a state."""
+    """Return the body of an effect with moved summands and terms in the balance of a state.
+
+    Summands are appended with their signs to the right side of `flow.<state>`, and left out if the
+    body has no such balance. Terms are added to `terms.<state>` under their own names.
+    """
     balance = find_node(body, ("flow", state))
     if isinstance(balance, ScalarNode) and moved.summands:
         left, right = split_balance(balance.text)

@@ -41,7 +41,9 @@ class PlaceMismatch:
 def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPlace | PlaceMismatch:
     """Return the place of a name that an effect fits, or the reasons why there is none.
 
-    The patterns of the effect are tried in their order, and the first match counts.
+    The patterns of the effect are tried in their order, and the first match with all holes of `has`
+    counts. The kind of place (balance, input, output, element), the unit and the kind of an element
+    must fit. A mismatch has the reasons and the different hints of all patterns, joined by "; ".
     """
     known = TreeTypes(tree)
     misfits = []

@@ -124,7 +124,9 @@ class EffectApplication:
 def read_effect(document: Document, problems: Problems) -> Effect:
     """Return the effect of a document; errors of the effect itself are reported.
 
-    Raises SpecError for a document of another kind.
+    These are unknown keys, places, holes, functions and names, and errors of its parameters.
+    Missing texts are "", missing lists are empty. Raises SpecError only for a document of another
+    kind.
     """
     require_kind(document, "effect", problems)
     return _EffectReader(problems).read(document)
@@ -135,7 +137,9 @@ def read_effect_application(
 ) -> EffectApplication:
     """Return the application of an entry `name@place: {values: ..., as: ..., rename: ...}`.
 
-    The suffix is `as`, by default the place. Raises SpecError.
+    The suffix is `as`, by default the place. `lookup` gives the document of the effect. Raises
+    SpecError with all problems: a key without name or place, an entry of `values` or `rename` that
+    is no scalar, errors of the effect. Whether the place exists is not checked.
     """
     reader = Reader(problems)
     name, sign, place = entry.key.partition("@")
@@ -157,8 +161,9 @@ def read_effect_application(
 def added_names(body: MappingNode) -> dict[str, Span]:
     """Return the names that an effect or automaton adds and that expressions may read.
 
-    These are parameters, states, discrete variables and equations, those of regions included; keys
-    with a hole are left out. The result gives the place of each name.
+    These are the keys of `parameters`, `states`, `discrete` and `equations` at the root, and of
+    `equations` in regions and their modes; `modes` at the root are not searched. Keys with a hole
+    are left out. The result gives the place of each name, the first if there are several.
     """
     spans: dict[str, Span] = {}
     for section in ("parameters", "states", "discrete", "equations"):
@@ -173,7 +178,8 @@ def added_names(body: MappingNode) -> dict[str, Span]:
 def external_names(body: MappingNode) -> list[str]:
     """Return the names that expressions of an effect read and that are neither holes nor its own.
 
-    They are in the order of their first use; `base` is left out.
+    They are in the order of their first use, each once; `base` and functions are left out. Own
+    names are those of `added_names`. Expressions that do not parse are skipped.
     """
     own, found = added_names(body), dict[str, None]()
 

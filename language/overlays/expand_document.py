@@ -43,7 +43,9 @@ def expand_document(
 ) -> Document:
     """Return a document with its variants, effects and calibrations applied to the base.
 
-    The result has the kind of the base and the name of the document. Warnings are added to
+    First those of the base, then each variant from the base on: its body, its effects, its
+    calibrations. The result has the kind of the base and the name of the document. A document of
+    any kind is accepted; one without overlays is returned unchanged. Warnings are added to
     `problems`. Raises SpecError.
     """
     problems = problems or Problems()
@@ -59,8 +61,9 @@ def apply_variant(
 ) -> Document:
     """Return `base` with `variant` applied, under the name of the base.
 
-    The variant must extend the base or a document from which the base was derived; otherwise raises
-    SpecError.
+    `base` is expanded first. Its kind is that of the result, its source that of the variant. Raises
+    SpecError unless `variant` extends the base or a document that the base extends, and for
+    problems of the overlays.
     """
     assert variant.kind == "variant"
     base_name = _base_name_of(variant)
@@ -77,7 +80,10 @@ def apply_variant(
 
 
 def lineage(document: Document, project: Project) -> list[str]:
-    """Return the names of a document and of the documents that it extends, the base last."""
+    """Return the names of a document and of the documents that it extends, the base last.
+
+    Raises SpecError for a missing base, a cycle and a chain of more than MAX_OVERLAYS documents.
+    """
     return [overlay.name for overlay in _extension_chain(document, project)]
 
 
@@ -122,9 +128,10 @@ def _apply_variant_body(
 
 
 def add_calibrations(document: Document, names: Sequence[str], option: str) -> Document:
-    """Return a document with the calibrations `names` added after its own.
+    """Return a document with the calibrations `names` added after its own; unchanged without names.
 
-    `option` is the command-line option that names them; problems are placed there.
+    `option` is the command-line option that names them; problems are placed there. They are applied
+    when the document is expanded; whether they exist is not checked here.
     """
     node = document.root.get("calibrations")
     own = node.nodes if isinstance(node, SequenceNode) else ()
@@ -140,7 +147,9 @@ def add_calibrations(document: Document, names: Sequence[str], option: str) -> D
 def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]:
     """Return the mappings of the parameters of an automaton's tree and of its model, by name.
 
-    A parameter of the automaton replaces one of the model with the same name.
+    The model is expanded. A parameter of the automaton replaces one of the model with the same
+    name. Entries that are no mappings are left out; instances are not searched. Raises SpecError if
+    the model cannot be expanded.
     """
     result: dict[str, MappingNode] = {}
     model = tree.get("model")
@@ -156,7 +165,8 @@ def parameters_of(tree: MappingNode, project: Project) -> dict[str, MappingNode]
 def instance_parameters_of(tree: MappingNode, project: Project) -> dict[str, tuple[str, str]]:
     """Return the instance and parameter for each parameter of the instances in an automaton's tree.
 
-    The keys are names like `k1_t_close`: instance, underscore, parameter.
+    The keys are names like `k1_t_close`: instance, underscore, parameter. Instances without `of`
+    are left out. Raises SpecError if the document of an instance cannot be expanded.
     """
     result: dict[str, tuple[str, str]] = {}
     for entry in mapping_entries(tree.get("instances")):

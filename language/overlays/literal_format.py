@@ -22,10 +22,14 @@ PLAIN_EXPONENTS = range(-5, 16)
 
 
 def format_value_in_unit(parameter: Parameter, value: float, number_type: NumberType) -> str:
-    """Return a value [SI] as a literal in the unit of a parameter.
+    """Return a value [SI] as a literal in the unit of a parameter, such as `0.05 s`.
 
-    The literal gives the same value when it is read and rounded to `number_type`. If no literal in
-    the unit does, it is in the SI unit. Raises ValueError if there is none there either.
+    It is the decimal with the fewest digits that gives `value` again when it is read and rounded to
+    `number_type`, and that is within the range of the parameter. Without such a decimal the literal
+    is in the SI unit; ValueError if there is none either. The unit 1 is not written.
+
+    A bool is `true` or `false`, an enum the name at the index `value`, an int an integer without a
+    unit.
     """
     if parameter.type == "bool":
         return "true" if value else "false"
@@ -42,7 +46,9 @@ def table_points(
 ) -> MappingNode:
     """Return the values [SI] of a lookup table as `{points: {...}}`; the last axis varies fastest.
 
-    Values are formatted by `format_value_in_unit`, points as in the spec.
+    `values` are in the order of `parameter.table`; StopIteration if there are too few. They are
+    formatted by `format_value_in_unit`, points as in the spec; a second axis gives nested mappings.
+    `span` is the place of all nodes.
     """
     assert parameter.table
     texts = iter([format_value_in_unit(parameter, value, number_type) for value in values])
@@ -60,10 +66,11 @@ def table_points(
 
 
 def has_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
-    """Tell whether the exact value of a real parameter is that of its shortest literal.
+    """Tell whether the shortest literal of the value of a real parameter has exactly this value.
 
-    It is false for a value with more digits than its type holds, such as `0.06000000001` in
-    float32.
+    The shortest literal is that of the value rounded to `number_type` (see `format_value_in_unit`),
+    so it is false for a value with more digits than the type holds, such as `0.06000000001` in
+    float32. Raises ValueError if there is no such literal.
     """
     assert parameter.value is not None
     number, unit = _shortest_in_any_unit(
@@ -75,9 +82,10 @@ def has_exact_literal(parameter: Parameter, number_type: NumberType) -> bool:
 def format_calibration(
     name: str, of: str, origin: str, date: str, values: Mapping[str, str]
 ) -> str:
-    """Return the text of a calibration file; `values` are literals by parameter.
+    """Return the text of a calibration file; `values` are literals by parameter, in their order.
 
-    An empty `origin` or `date` is left out.
+    The lines are `language: 1`, `calibration`, `of`, `from` (as a quoted string), `date` and
+    `parameters`. An empty `origin` or `date` is left out; without values it is `parameters: {}`.
     """
     lines = ["language: 1", f"calibration: {name}", f"of: {of}"]
     lines += [f"from: {json.dumps(origin, ensure_ascii=False)}"] if origin else []
@@ -88,14 +96,19 @@ def format_calibration(
 
 
 def format_exact(number: Fraction) -> str:
-    """Return a number as a decimal literal, rounded to `MAX_DIGITS` significant digits."""
+    """Return a number as a decimal literal, rounded to MAX_DIGITS significant digits.
+
+    Trailing zeros are left out. An exponent is written outside of PLAIN_EXPONENTS: `0.05`,
+    `1.0e-7`.
+    """
     return _format_decimal(_round_to_digits(number, MAX_DIGITS))
 
 
 def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
-    """Return a value [SI] exactly as a literal in a unit.
+    """Return a value [SI] exactly as a literal with its unit, also for the unit 1.
 
-    If it has no decimal of `MAX_DIGITS` digits in that unit, the literal is in the SI unit.
+    If it has no decimal of MAX_DIGITS digits in `unit`, the literal is in the SI unit, there
+    rounded to MAX_DIGITS digits.
     """
     number = (value - unit.offset) / unit.factor
     if Fraction(_round_to_digits(number, MAX_DIGITS)) == number:

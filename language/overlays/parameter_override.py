@@ -20,9 +20,12 @@ def override_points(
 ) -> MappingNode:
     """Return a parameter with other values at some points of its lookup table.
 
-    A point may be written in another unit than in the table, such as `500 ms` for `0.5 s`. A number
-    without a unit matches only a point without a unit. Unknown points and a parameter without a
-    table are reported.
+    `overrides` is `{points: {...}}`. A point may be written in another unit than in the table, such
+    as `500 ms` for `0.5 s`. A number without a unit matches only the same text or a point without a
+    unit.
+
+    Reported are a parameter without a table and a wrong form (the parameter is returned unchanged),
+    unknown points (skipped) and repeated points (the last value holds).
     """
     reader = Reader(problems)
     points = reader.read_mapping(overrides, "a table's values", ("points",)).get("points")
@@ -113,7 +116,11 @@ def _is_same_point(given: Quantity, point: Quantity) -> bool:
 
 
 def overlay_value(old: YamlNode | None, new: YamlNode) -> YamlNode:
-    """Return the later of two values of a parameter; the points of lookup tables are merged."""
+    """Return the later of two values of a parameter; the points of lookup tables are merged.
+
+    If both are `{points: ...}`, later points replace earlier ones of the same value, in any unit,
+    and new points are added. Otherwise `new` is returned. Nothing is reported.
+    """
     before = old.get("points") if isinstance(old, MappingNode) else None
     after = new.get("points") if isinstance(new, MappingNode) else None
     if not (
@@ -141,7 +148,8 @@ def _overlay_points(before: MappingNode, after: MappingNode, reader: Reader) -> 
 def override_parameter(parameter: MappingNode, value: YamlNode, problems: Problems) -> MappingNode:
     """Return a parameter with another value, or with other values at points of its table.
 
-    A value of the wrong form is reported, and the parameter is returned unchanged.
+    A value of the wrong form (a scalar for a table, a list) is reported, and the parameter is
+    returned unchanged. A mapping is handled by `override_points`. The range is not checked.
     """
     if isinstance(value, ScalarNode) and "table" in parameter.entries:
         label = "this parameter is a table: its values are `{points: {...}}`"
@@ -158,7 +166,11 @@ def override_parameter(parameter: MappingNode, value: YamlNode, problems: Proble
 
 
 def set_parameter_value(parameter: MappingNode, value: ScalarNode) -> MappingNode:
-    """Return a parameter with another value; a bare number is in the unit of the old value."""
+    """Return a parameter with another value; a bare number is in the unit of the old value.
+
+    For this, a real parameter without `unit` gets the unit of the old literal, or 1. Nothing is
+    checked.
+    """
     entries = dict(parameter.entries)
     old, kind = parameter.get("value"), parameter.get("type")
     is_real = not isinstance(kind, ScalarNode) or kind.text == "real"

@@ -16,7 +16,11 @@ from language.typecheck.types import EnumType, ExprType, IntType
 
 
 def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
-    """Yield the mappings of all modes and templates of a tree, at any depth."""
+    """Yield the mappings of all modes and templates of a tree, at any depth, outer ones first.
+
+    Modes and templates at the root come before those in regions of the root; regions inside modes
+    are searched, too. Regions themselves are not yielded.
+    """
     for key in ("modes", "templates"):
         for entry in _child_mappings(tree.get(key)):
             yield entry
@@ -26,7 +30,11 @@ def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
 
 
 def formula_entries(tree: MappingNode, section: str) -> Iterator[tuple[str, ScalarNode]]:
-    """Yield name and scalar of a section (`equations`, `flow`) of the root, then of every mode."""
+    """Yield name and scalar of a section (`equations`, `flow`) of the root, then of every mode.
+
+    Templates count as modes. Entries that are no scalars are left out; a name may occur several
+    times.
+    """
     for owner in (tree, *mode_mappings(tree)):
         table = owner.get(section)
         for entry in table if isinstance(table, MappingNode) else ():
@@ -38,7 +46,11 @@ class TreeTypes:
     """The types of parameters, inputs, states, discrete variables and equations of a tree."""
 
     def __init__(self, tree: MappingNode) -> None:
-        """Read the declarations; the types of equations are inferred on request."""
+        """Read the declarations; the types of equations are inferred on request and cached.
+
+        A name that is declared twice has the last of inputs, states, discrete variables and
+        parameters.
+        """
         self.tree = tree
         self.types: dict[str, ExprType | None] = {}
         self.equations: dict[str, list[ScalarNode]] = {}
@@ -49,9 +61,11 @@ class TreeTypes:
                 self.types[name] = self._declared_type(table)
 
     def type_of_name(self, name: str) -> ExprType | None:
-        """Return the type of a name, or None if it is unknown.
+        """Return the type of a name, or None if it is unknown, cyclic or cannot be inferred.
 
-        Of several formulas of an equation, one with a dimension other than a number is preferred.
+        Without `unit` and `type` a declaration has the type of its value, or that of a pure number.
+        Of several formulas of an equation, the first with a dimension that is no pure number is
+        preferred, else the first with a type.
         """
         if name not in self.types:
             self.types[name] = None
@@ -62,14 +76,22 @@ class TreeTypes:
         return self.types[name]
 
     def type_of_formula(self, scalar: ScalarNode) -> ExprType | None:
-        """Return the type of an expression, or None if it cannot be parsed or inferred."""
+        """Return the type of an expression, or None if it cannot be parsed or inferred.
+
+        Problems are discarded.
+        """
         try:
             return self._infer_tree(parse_expression(scalar), scalar.text)
         except SpecError:
             return None
 
     def balance_dimension(self, state: str, balance: ScalarNode) -> Dimension | None:
-        """Return the dimension of the left side of the balance of a state, or None if unknown."""
+        """Return the dimension of the left side of the balance of a state, or None if unknown.
+
+        The left side must be `der(x)` or a product of one factor and `der(x)`; `der(x)` alone has
+        the dimension of the state per second. It is None if the type of the state or the factor is
+        not known.
+        """
         try:
             left, _ = parse_balance(balance)
         except SpecError:
