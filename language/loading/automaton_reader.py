@@ -58,8 +58,13 @@ def read_automaton(
 ) -> Automaton:
     """Return the automaton of a document with some parameter values replaced.
 
-    Overlays and instances are expanded first. Problems of form are reported and the reading
-    continues. Raises SpecError if no automaton can be built.
+    Overlays and instances are expanded first. `values` are new values by name, also of the model's
+    parameters; unknown and derived ones are reported. The result has no types yet:
+    `check_automaton` follows.
+
+    Problems of form are reported and the reading continues with defaults (step DEFAULT_STEP, method
+    `rk4`, numbers float64). Raises SpecError for another kind of document, an overlay or instance
+    with an error, a model that has a model, and a region or chart without modes.
     """
     document = expand_document(document, project, problems)
     require_kind(document, "automaton", problems)

@@ -16,14 +16,21 @@ from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 def read_pages(
     node: YamlNode | None, system: System, problems: Problems
 ) -> tuple[ScheduledCalibration, ...]:
-    """Return the pages at a node `{1.5 s: {est.k_hs: 6000 N*m/rad}}`; problems are reported."""
+    """Return the pages at a node `{1.5 s: {est.k_hs: 6000 N*m/rad}}`; problems are reported.
+
+    Values are in SI by instance and parameter. A key without an instance sets the parameter in all
+    instances that have it. Only tunable reals without a lookup table, which no `wait` uses, can be
+    set. Reported are other names, values outside the range and times that do not ascend. An absent
+    node has no pages.
+    """
     return _PageReader(problems, system).read_pages(node)
 
 
 def parse_pages(texts: Sequence[str], system: System) -> tuple[ScheduledCalibration, ...]:
     """Return the pages of command-line texts like `1.5 s: k_hs = 6000 N*m/rad`.
 
-    Texts of equal times form one page. Raises SpecError.
+    Texts of the same time, compared as text, form one page, and the last of equal names counts.
+    Pages must be in the order of time. Raises SpecError with all problems, placed in `--change`.
     """
     problems = Problems()
     times: dict[str, MappingNode] = {}

@@ -35,9 +35,8 @@ SENSOR_KEYS = ("of", "filter", "delay", "noise", "quantise", "sample")
 class ConnectionReader(Reader):
     """Reads the signals of a system and the expressions that read them.
 
-    Sensors have to be read before connections, and connections before outputs. `lines` are the
-    delayed signals that connections created, and `dimensions` those of outputs that are real
-    expressions.
+    Sensors have to be read before connections, and connections before outputs. `delayed_signals`
+    are those that connections created, and `dimensions` those of outputs that are real expressions.
     """
 
     def __init__(
@@ -65,7 +64,12 @@ class ConnectionReader(Reader):
         }
 
     def read_sensors(self, node: YamlNode | None) -> None:
-        """Read `sensors` into `self.sensors`; connections and outputs can read them afterwards."""
+        """Read `sensors` into `self.sensors`; connections and outputs can read them afterwards.
+
+        A sensor with the name of an input or an instance is reported and left out. Other problems
+        (a source that is no real input or output, a filter of an input, `delay` or `noise` without
+        `sample`, times and levels that are not positive) are reported, and the sensor is kept.
+        """
         for entry in self.named_entries(node, "sensors"):
             if entry.key in self.inputs or entry.key in self.instances:
                 label = f"`{entry.key}` is an input or an instance of the system, too"
@@ -169,7 +173,14 @@ class ConnectionReader(Reader):
         return value
 
     def read_connections(self, node: YamlNode | None) -> dict[tuple[str, str], Connection]:
-        """Return the connections by instance and input; one with a problem is left out."""
+        """Return the connections by instance and input; the keys of the node are `instance.input`.
+
+        The source of a connection is a number in SI (a constant, also of a bool, int or enum), the
+        name of a signal, or an expression. Calls `delay(signal, time)` in it become
+        `delayed_signals`. A target that is no input of an instance and a source that is no scalar
+        are reported and left out; unknown signals and wrong types are reported, and the connection
+        is kept.
+        """
         connections = {}
         for entry in self.read_mapping(node, "connections"):
             owner, _, name = entry.key.partition(".")
@@ -235,7 +246,7 @@ class ConnectionReader(Reader):
     def _replace_delays(self, tree: SyntaxTree) -> SyntaxTree:
         """Return an expression with each `delay(signal, d)` replaced by a name.
 
-        The delayed signals of these names are added to `lines`.
+        The delayed signals of these names are added to `delayed_signals`.
         """
         if isinstance(tree, FunctionCall) and tree.function == "delay":
             return self._add_delay_line(tree)
@@ -249,7 +260,7 @@ class ConnectionReader(Reader):
         return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[arg-type]
 
     def _add_delay_line(self, tree: FunctionCall) -> SyntaxTree:
-        """Add the delayed signal of a call of `delay` to `lines`, and return its name.
+        """Add the delayed signal of a call of `delay` to `delayed_signals`, and return its name.
 
         A delay of 0 gives the signal itself. Wrong arguments are reported and give an ErrorNode.
         """
@@ -274,7 +285,13 @@ class ConnectionReader(Reader):
         return ErrorNode(tree.span)
 
     def read_outputs(self, node: YamlNode | None) -> dict[str, str | Formula]:
-        """Return the outputs of the system by name: the name of a signal, or an expression."""
+        """Return the outputs of the system by name: the name of a signal, or an expression.
+
+        Signals are declared outputs of instances (`instance.output`), sensors and inputs of the
+        system; others are reported and kept. Real expressions add to `dimensions`. Also reported:
+        the name of an input or a sensor, and a call of `delay`. Sources that are no scalars are
+        left out.
+        """
         outputs: dict[str, str | Formula] = {}
         for entry in self.named_entries(node, "outputs"):
             source = self.read_scalar(entry.node, entry.key, entry.span)
@@ -320,7 +337,7 @@ class ConnectionReader(Reader):
 def output_types(instance: Instance) -> dict[str, ExprType]:
     """Return the types of the outputs of an instance by `instance.output`.
 
-    The output `mode` has no type and is left out.
+    Outputs whose source has no type, such as `mode`, are left out.
     """
     automaton = instance.automaton
     return {

@@ -23,8 +23,10 @@ class ModeEntryEvent:
 def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEntryEvent | None:
     """Return the event that a text like `plant.no_contact` or `plant.drive -> plant.coast` names.
 
-    Returns None with a problem reported if a mode does not exist or no transition enters it. The
-    fault mode counts as entered from any mode. In a chart the transitions are not examined.
+    Names are those of `modes_by_name`; the name after `->` may lack the instance. Returns None with
+    a problem reported if a mode does not exist, if both modes are not of one region, or if no
+    transition (from the source, if given) enters the mode. The fault mode counts as entered from
+    any mode. In a chart the transitions are not examined.
     """
     head, arrow, tail = (part.strip() for part in scalar.text.partition("->"))
     known = modes_by_name(system)
@@ -69,8 +71,8 @@ def read_event(scalar: ScalarNode, system: System, problems: Problems) -> ModeEn
 def modes_by_name(system: System) -> dict[str, tuple[str, str, str]]:
     """Return instance, region and mode by name: `instance.mode` or `instance.region.mode`.
 
-    Superstates are included. In the system of a single automaton, names without the instance are
-    included too.
+    The region is left out for `chart`. Superstates are included, regions inside modes are not
+    modes. In the system of a single automaton, names without the instance are included too.
     """
     modes = {}
     for name, instance in system.instances.items():

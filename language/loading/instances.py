@@ -78,7 +78,13 @@ class _InstanceDeclaration:
 def expand_instances(tree: MappingNode, project: Project, problems: Problems) -> MappingNode:
     """Return an automaton's tree with its instances replaced by regions. Raises SpecError.
 
-    A tree without instances is returned unchanged.
+    A tree without instances is returned unchanged. Each instance becomes the region of its name;
+    its parameters, variables and equations become `<instance>_<name>` in the host, each input an
+    equation with its expression or default, and reads of `<instance>.<output>` are replaced by the
+    host name.
+
+    Errors are another kind of document, FORBIDDEN_KEYS, another period, names that are taken or too
+    long, unknown parameters and inputs, and inputs without a value.
     """
     node = tree.get("instances")
     if node is None:

@@ -25,7 +25,8 @@ def automaton_of(
 ) -> Automaton:
     """Return the checked automaton of a document with some parameter values replaced.
 
-    Warnings are added to `problems`. Raises SpecError with all problems.
+    `values` are new values by name. Warnings are added to `problems`. Raises SpecError with all
+    problems, those in `problems` included.
     """
     problems = problems or Problems()
     return check_automaton(read_automaton(document, project, values, problems), problems)
@@ -34,20 +35,29 @@ def automaton_of(
 def load_automaton(
     reference: str, project: Project, values: Mapping[str, YamlNode] | None = None
 ) -> Automaton:
-    """Return the checked automaton of a name or path. Raises SpecError with all problems."""
+    """Return the checked automaton of a name or path. Raises SpecError with all problems.
+
+    `values` are new values of parameters by name. Warnings are discarded.
+    """
     return automaton_of(project.read(project.path_of(reference)), project, values)
 
 
 def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
     """Return the optimised Program of a checked automaton.
 
-    `varying` are the inputs that change inside a step of a continuous automaton. Raises SpecError.
+    `varying` are the inputs that change inside a step of a continuous automaton; it is ignored for
+    a sampled one. Raises SpecError for numbers that the number type cannot hold and for constructs
+    that cannot be lowered.
     """
     return run_passes(lower_automaton(automaton, varying))
 
 
 def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Program:
-    """Return the Program of a checked automaton before the passes. Raises SpecError."""
+    """Return the Program of a checked automaton before the passes. Raises SpecError.
+
+    The numbers are checked first (`check_numbers`). `varying` are the inputs that change inside a
+    step of a continuous automaton; it is ignored for a sampled one.
+    """
     problems = Problems()
     check_numbers(automaton, problems)
     if automaton.is_sampled:
@@ -56,7 +66,11 @@ def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Prog
 
 
 def command_line_value(text: str, option: str = "--set", name: str = "") -> ScalarNode:
-    """Return a value of the command line as a scalar; problems point into `name=text`."""
+    """Return a value of the command line as a scalar; problems point to it in the text `name=text`.
+
+    Without a name they point into `text` alone. `option` is shown as the name of the source. The
+    text is not parsed.
+    """
     shown = f"{name}={text}" if name else text
     place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
     return ScalarNode(text, place)

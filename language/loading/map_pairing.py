@@ -14,9 +14,12 @@ def pair_columns(
 ) -> tuple[list[str], list[str]]:
     """Return the names of the columns that an automaton reads or compares, and of the others.
 
-    Columns and constants for inputs that the automaton lacks are no problem, because a map may
-    serve several automata. Reported are inputs without a value, inputs that are fed twice, wrong
-    dimensions and unknown outputs.
+    Both are in the order of the map. A column with `compare` counts as used; the others are columns
+    whose `to` is no input of the automaton, which is no problem, because a map may serve several
+    automata.
+
+    Reported are inputs without a column, constant or default, inputs that are fed twice, wrong
+    dimensions of columns and constants, and unknown outputs.
     """
     used, left_out = [], []
     fed = set(mapping.constants)
@@ -48,7 +51,7 @@ def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problem
     """Report what prevents the comparison of recordings with an automaton.
 
     In addition to the problems of `pair_columns`, these are columns for unknown inputs, outputs
-    that are compared twice, and a map that compares no output.
+    that are compared twice, and a map that compares no output. All are errors; nothing is raised.
     """
     _, left_out = pair_columns(automaton, mapping, problems)
     for name in left_out:

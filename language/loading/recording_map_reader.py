@@ -36,7 +36,10 @@ COLUMN_KEYS = (
 
 
 def read_map(document: Document, project: Project) -> RecordingMap:
-    """Return the recording map of a document. Raises SpecError with all problems."""
+    """Return the recording map of a document. Raises SpecError with all problems.
+
+    Overlays are expanded first. Another kind of document is an error.
+    """
     document = expand_document(document, project)
     problems = Problems()
     require_kind(document, "map", problems)
@@ -47,7 +50,16 @@ def read_map(document: Document, project: Project) -> RecordingMap:
 
 
 def read_map_table(root: MappingNode, name: str, span: Span, problems: Problems) -> RecordingMap:
-    """Return the recording map in a mapping; problems are reported."""
+    """Return the recording map in a mapping; problems are reported.
+
+    `span` places problems of the whole map. Without `time` the column of time is "" and its unit s.
+    A column reads the source column of its own name unless `column` or `mean` is given. Defaults:
+    `hold: previous`, `blank: refuse`, `sign: 1`, scale 1, delay 0 s, unit 1. A bare list of windows
+    applies to ALL_FILES.
+
+    Reported are a map without columns, both or neither of `to` and `compare`, wrong units and
+    windows that overlap.
+    """
     return _MapReader(problems).read(root, name, span)
 
 

@@ -36,7 +36,15 @@ LARGEST_SEED = 2**31 - 1
 
 
 def read_scenario(document: Document, project: Project, system: System) -> Scenario:
-    """Return the scenario of a document for a system. Raises SpecError with all problems."""
+    """Return the scenario of a document for a system. Raises SpecError with all problems.
+
+    Overlays are expanded first. Each input has a stimulus from the recording, the scenario or its
+    default. The horizon is None for `horizon: recording`, at most MAX_HORIZON otherwise. Defaults:
+    seed 0, `every: 1 ms`, no recorded signals.
+
+    The recording file is searched beside the scenario, in the working directory and in the folder
+    of RECORDINGS_ENV; it need not exist, and it is not read.
+    """
     document = expand_document(document, project)
     problems = Problems()
     require_kind(document, "scenario", problems)

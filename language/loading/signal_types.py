@@ -11,7 +11,9 @@ from language.typecheck.types import ExprType
 def signal_types(system: System) -> dict[str, ExprType]:
     """Return the types of the inputs, outputs of instances, sensors and outputs of a system.
 
-    Outputs without a known type, such as modes, are left out.
+    Keys are `input`, `instance.output`, `sensor` and `output`. An output of the system has the type
+    of the signal that it names, or the dimension of its real expression. Outputs without a known
+    type, such as modes and expressions of another type, are left out.
     """
     kinds: dict[str, ExprType] = {
         name: declaration_type(declaration) for name, declaration in system.inputs.items()

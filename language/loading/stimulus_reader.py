@@ -45,7 +45,9 @@ Breakpoint = tuple[Fraction, Fraction]
 def linear_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
     """Return the pieces of a piecewise linear function through points in ascending order of time.
 
-    It is constant before the first and after the last point.
+    It is constant before the first and after the last point. A piece is (start, value, slope); the
+    first begins at 0 if the first point is later. Raises IndexError without points,
+    ZeroDivisionError for two points of one time.
     """
     pieces = [] if points[0][0] <= 0 else [StimulusPiece(Fraction(0), points[0][1])]
     for (start, value), (end, later) in itertools.pairwise(points):
@@ -56,7 +58,7 @@ def linear_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
 def constant_pieces(points: Sequence[Breakpoint]) -> tuple[StimulusPiece, ...]:
     """Return the pieces of a piecewise constant function: each value holds until the next point.
 
-    Before the first point it has the first value.
+    Before the first point, from 0 on, it has the first value. Raises IndexError without points.
     """
     first = () if points[0][0] <= 0 else (StimulusPiece(Fraction(0), points[0][1]),)
     return (*first, *(StimulusPiece(*point) for point in points))
@@ -68,9 +70,15 @@ class StimulusReader(Reader):
     def read_stimulus(
         self, entry: Entry, declaration: SystemInput, periods: Collection[Fraction] = ()
     ) -> Stimulus:
-        """Return the stimulus of an input.
+        """Return the stimulus of an input; wrong forms are reported and give the constant 0.
 
-        `periods` [s] are those of the sampled automata that read it; `pulses` need exactly one.
+        A scalar is a constant, or for a real input a formula of `time` without jumps. A mapping has
+        `start` and at most one of FORMS; without one it is the constant `start`. An input that is
+        not real has only `steps`, a bool one also `pulses`. `table` is linear, or constant between
+        points with `hold: previous`.
+
+        `periods` [s] are those of the sampled automata that read the input; `pulses` need exactly
+        one, which is their length.
         """
         unit, truth = declaration.unit, declaration.is_bool
         if isinstance(entry.node, ScalarNode):
@@ -143,7 +151,8 @@ class StimulusReader(Reader):
     ) -> Fraction:
         """Return a time [s] above zero, or with `lower_bound="at least"` of at least zero.
 
-        Another value gives 1 s; it is reported unless there are errors already.
+        Another value or dimension gives 1 s; it is reported unless there are errors already. A
+        missing node is reported and counts as 0 s. `what` names the time in messages.
         """
         value, unit = self.read_quantity(node, what, span, None)
         fine = value > 0 or (value == 0 and lower_bound == "at least")

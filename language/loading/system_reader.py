@@ -37,8 +37,11 @@ Overrides = Mapping[str, ScalarNode]
 def read_system(document: Document, project: Project, overrides: Overrides | None = None) -> System:
     """Return the system of a document with all its automata checked.
 
-    An automaton gives a system of one instance (see `single_instance_system`). Raises SpecError
-    with all problems.
+    An automaton gives a system of one instance (see `single_instance_system`). `overrides` are
+    parameter values by `parameter` (all instances that have it) or `instance.parameter`, which has
+    precedence; both come before the values of the file. Raises SpecError with all problems, among
+    them overrides without a parameter, inputs that are not connected and cycles of direct
+    feed-through (rule 19a).
     """
     plain, document = document, expand_document(document, project)
     problems = Problems()
@@ -52,7 +55,10 @@ def read_system(document: Document, project: Project, overrides: Overrides | Non
 
 
 def with_number_type(system: System, numbers: NumberType) -> System:
-    """Return the system with another number type in every instance."""
+    """Return the system with another number type in every instance.
+
+    Models of the automata keep theirs. Nothing is checked again.
+    """
     instances = {
         name: dataclasses.replace(
             instance, automaton=dataclasses.replace(instance.automaton, numbers=numbers)
@@ -63,7 +69,12 @@ def with_number_type(system: System, numbers: NumberType) -> System:
 
 
 def single_instance_system(automaton: Automaton) -> System:
-    """Return a system of one instance that has the name and the inputs of an automaton."""
+    """Return a system of one instance that has the name and the inputs of an automaton.
+
+    Each input of the system is connected to the input of its name; ranges of inputs are not kept.
+    The system has no outputs and no sensors, the instance the offset 0, and `sole_instance` its
+    name.
+    """
     name, at = automaton.name, automaton.span
     return System(
         name=name,
