@@ -24,9 +24,11 @@ def check_assignments(
     check: TypeChecker,
     problems: Problems,
 ) -> None:
-    """Report assignments to names that are not states or discrete variables, and wrong value types.
+    """Report assigned names that are no states or discrete variables, and values of a wrong type.
 
-    Invalid names are skipped because the reader has reported them.
+    `formulas` are the assigned values by name, `check` knows the names that they may read. The hint
+    tells that a name is an event, input or parameter, else it is a similar name. Names of a wrong
+    form are skipped because the reader has reported them.
     """
     for name, formula in formulas.items():
         kind = check.environment.types.get(name)
@@ -62,7 +64,11 @@ def check_mode_transitions(
 ) -> None:
     """Report mistakes in the transitions and invariants of a mode.
 
-    `check` knows all names of the mode. `parameter_check` knows parameters only and checks waits.
+    These are unknown targets (not in a chart), guards, `until` and invariants that are no
+    conditions, waits and `within` that are no fixed times (a tunable wait is allowed), wrong
+    resets, and what `check_rewind` and, outside of charts, `check_memory_continue` report.
+
+    `check` knows all names of the mode. `parameter_check` knows parameters only and checks times.
     """
     memory_functions = frozenset(
         MEMORY_FUNCTIONS if automaton.is_sampled else ("delay", *EDGE_FUNCTIONS, *TIME_FUNCTIONS)

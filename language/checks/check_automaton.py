@@ -53,7 +53,8 @@ from language.typecheck.types import EnumType, ExprType, IntType
 def check_flow(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
     """Report states without a balance in a mode of a continuous automaton, then check its balances.
 
-    A state that a parallel region balances needs none.
+    A state that any mode of a parallel region balances needs none. A sampled automaton is skipped.
+    `check` knows the names of the mode and holds the problems.
     """
     problems = check.problems
     if automaton.is_sampled:
@@ -72,7 +73,11 @@ def check_flow(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
 
 
 def check_balances(automaton: Automaton, mode: Mode, check: TypeChecker) -> None:
-    """Report balances of names that are not states, and sides of different dimension."""
+    """Report balances of names that are not states, and sides of different dimension.
+
+    The left side must be `der(x)` or a product with it; another form is reported, too. A side that
+    did not parse is skipped.
+    """
     problems = check.problems
     for name, balance in mode.flow.items():
         if name not in automaton.states:
@@ -95,7 +100,12 @@ def check_balances(automaton: Automaton, mode: Mode, check: TypeChecker) -> None
 
 
 def check_elements(automaton: Automaton, names: Mapping[str, ExprType], problems: Problems) -> None:
-    """Report unknown names in elements and places, and mistakes in their formulas."""
+    """Report unknown names in elements and places, and mistakes in their formulas.
+
+    `names` are the types of the names that formulas may read. Names of `far` must be among them.
+    The name of a place must be a state with a balance in a mode of the chart, an input or an
+    output.
+    """
     check = TypeChecker(NameEnvironment(names), problems)
     for element in automaton.elements.values():
         for formula in element.parts.values():
@@ -123,7 +133,9 @@ MAX_TRANSITIONS = 200
 def check_size(automaton: Automaton, problems: Problems) -> None:
     """Report an automaton with too many equations or transitions; raises SpecError then.
 
-    Equations at the root count once for each mode, because the Program repeats them.
+    The limits are MAX_EQUATIONS equations and balances in all modes, and MAX_TRANSITIONS
+    transitions of one mode. Equations at the root count once for each mode, because the Program
+    repeats them.
     """
     modes = automaton.all_modes
     before = len(problems.reported)
@@ -146,8 +158,11 @@ WHOLE_KINDS = (IntType, EnumType)
 def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     """Return the automaton with the types and dimensions of its names. Raises SpecError.
 
-    The error contains all problems, including those that `problems` has before. The model of a
-    sampled automaton is checked too. Warnings about unused names are added.
+    Integer equations are marked (`is_integer`). The error contains all problems, including those
+    that `problems` has before; names and types are checked first, ranges, memory and domains next,
+    reachability and overlaps of guards only without errors. The model of a sampled automaton is
+    checked too. Warnings of these checks, such as unused names and unreachable modes, are added;
+    the others are in `check_warnings`.
     """
     if automaton.model:
         automaton = dataclasses.replace(

@@ -13,7 +13,16 @@ from language.text.diagnostic import Problems, Span
 
 
 def check_chart(automaton: Automaton, problems: Problems) -> None:
-    """Report invalid transitions, modes and regions of a chart; other automata have no problem."""
+    """Report invalid transitions, modes and regions of a chart; other automata have no problem.
+
+    Errors are a continuous chart, variables that two parallel regions assign (rule 14), sibling
+    regions of equal priority that a transition leaves both (rule 3), transitions of a final mode,
+    equations or flow of a region inside a mode, a rewind, a completion of a mode without a final
+    mode, a history of a mode without modes, and `memory: continue` without wait counters.
+
+    Warnings are a transition to a history from inside its mode, and a guard that reads an input
+    event.
+    """
     chart = automaton.statechart
     if chart is None:
         return
@@ -37,8 +46,10 @@ def unreachable_chart_modes(
 ) -> list[Mode]:
     """Return the modes of a chart that no transition outside of `dead_transitions` leads to.
 
-    `dead_transitions` are keys. The set of modes that a history can enter is over-estimated. The
-    fault mode and the initial modes are reachable.
+    `dead_transitions` are key paths. Reachable are the initial modes, the fault mode, and what
+    transitions of reachable modes enter, with ancestors and sibling regions; guards are not
+    examined, and a history counts as all that it may enter. The result is in the order of the nodes
+    and includes superstates.
     """
     reachable = {node.index for node in chart.initial_configuration()}
     if automaton.fault_mode:

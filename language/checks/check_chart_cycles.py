@@ -36,9 +36,12 @@ EVENT_HINT = "let one of them raise no event"
 
 
 def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of cycles of chart transitions that use up all micro-steps of a tick.
+    """Warn of cycles of chart transitions that use up all micro-steps of a tick (rule 7).
 
-    A chart with one micro-step has none. At most `MAX_CYCLES` candidate cycles are examined.
+    A chart with one micro-step has none, an automaton without a chart neither. At most MAX_CYCLES
+    candidate cycles of at most MAX_CYCLE_LENGTH transitions are examined. A cycle is reported, at
+    its last transition, only with values at which all its guards and no competing guard hold and
+    nothing that they read changes within a tick; its events must be raised by the cycle itself.
     """
     chart = automaton.statechart
     if chart is None or chart.micro_steps < 2:

@@ -38,8 +38,9 @@ def check_dead_transitions(
 ) -> set[str]:
     """Warn of transitions that never fire; return their keys.
 
-    A transition never fires if nothing raises its events, its guard never holds, or transitions of
-    higher precedence always fire first.
+    A transition never fires if no transition raises its events and none is an input, if its guard
+    never holds within the declared ranges, or if transitions of higher precedence always fire
+    first. Only what is proven is reported. A completion that never holds is left to `check_chart`.
     """
     dead_transitions: set[str] = set()
     for mode in automaton.all_modes:
@@ -78,9 +79,10 @@ def _waits_for_unraised_event(automaton: Automaton, transition: Transition) -> b
 
 
 def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of two waits of a mode that differ by less than a period (rule 10).
+    """Warn of two waits of a mode that differ by less than a period, but are not equal (rule 10).
 
-    Tunable waits and transitions with exclusive guards are left out.
+    Waits of 0, tunable waits and transitions with guards that are proven exclusive are left out. A
+    continuous automaton is skipped. The warning is placed at the later wait in the file.
     """
     if automaton.period is None:
         return
@@ -107,7 +109,8 @@ def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems:
 def check_stuck_modes(automaton: Automaton, dead_transitions: set[str], problems: Problems) -> None:
     """Warn of modes whose transitions are all dead, those of enclosing modes included.
 
-    Superstates and modes without transitions are left out.
+    `dead_transitions` are key paths. Superstates, and modes without any transition of their own or
+    of an enclosing mode, are left out.
     """
     superstates = {mode.key for mode in automaton.superstates}
     for mode in automaton.all_modes:

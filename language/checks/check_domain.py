@@ -50,9 +50,16 @@ OUTSIDE_RELATION: Mapping[str, Literal["==", "<", "<="]] = {
 
 
 def check_domains(automaton: Automaton, problems: Problems) -> None:
-    """Report operands whose declared ranges exceed the domain of their operation.
+    """Report operands whose ranges exceed the domain of their operation.
 
-    Start values outside of their range are reported too.
+    Operands are divisors (not 0), arguments of `sqrt` (>= 0) and `log` (> 0), and bases of `pow`
+    (>= 0, or > 0 for a negative degree). Ranges are computed by interval arithmetic from the
+    declared ones; an operand is reported if its interval is certain and the solver does not prove
+    that enclosing `if` conditions exclude the values outside.
+
+    Also reported are coefficients of `der(x)` that may be 0, and start values that lie outside of
+    their range for all values of parameters. Spectral densities that may be negative give a
+    warning.
     """
     fixed: dict[str, Interval] = {}
     likeness = TreeNumbering()

@@ -22,10 +22,11 @@ MAX_OVERLAPS = 1000
 
 
 def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Report pairs of transitions with equal priority whose guards are not proven disjoint.
+    """Report pairs of transitions of one mode with equal priority whose guards may hold together.
 
-    The problem shows a witness if one is found. At most `MAX_OVERLAPS` pairs of a mode are
-    reported.
+    A missing priority is 0. Pairs with disjoint events, and guards that are exclusive by form or
+    proven so for all values of tunable parameters, are left out. The problem shows a witness if one
+    is found, and is placed at the later guard. At most MAX_OVERLAPS pairs of a mode are reported.
     """
     for mode in automaton.all_modes:
         reported = 0
@@ -58,8 +59,9 @@ def _overlap_candidates(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
 def are_syntactically_exclusive(left: SyntaxTree, right: SyntaxTree) -> bool:
     """Return whether two guards exclude each other by their form.
 
-    The forms are `not g` and `g`, and two opposed relations between the same sides, like `a < b`
-    and `a >= b`.
+    The forms are `not g` and `g`, and two opposed relations (EXCLUSIVE_RELATIONS) between the same
+    sides in the same order, like `a < b` and `a >= b`. `b > a` and a relation inside an `and` are
+    not recognised.
     """
     if isinstance(right, Not) and is_same_expression(right.operand, left):
         return True

@@ -32,7 +32,11 @@ Cycle = tuple[Transition, ...]
 
 
 def report_refiring(automaton: Automaton, problems: Problems) -> None:
-    """Report cycles of one or two transitions that repeat at one instant, with a witness."""
+    """Report cycles of one or two transitions that repeat at one instant, with a witness.
+
+    Only continuous automata have them. The error is placed at the guard of the last transition that
+    compares a state by `<=` or `>=`, else at that of the last one.
+    """
     for cycle, witness in _endless_cycles(automaton, range(1, 3)):
         label = f"this fires again at the same instant, for ever: {_format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}write the direction of motion too, like "
@@ -41,7 +45,11 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
 
 
 def check_cycles(automaton: Automaton, problems: Problems) -> None:
-    """Warn of cycles of three or more transitions that repeat at one instant, with a witness."""
+    """Warn of cycles of three or more transitions that repeat at one instant, with a witness.
+
+    They have at most MAX_CYCLE_LENGTH transitions. Only continuous automata have them. The place is
+    that of `report_refiring`.
+    """
     for cycle, witness in _endless_cycles(automaton, range(3, MAX_CYCLE_LENGTH + 1)):
         label = f"from here the modes change for ever at one instant: {_format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}let one of them wait, or its guard exclude the one before"
@@ -71,8 +79,10 @@ def _endless_cycles(automaton: Automaton, lengths: range) -> Iterator[tuple[Cycl
 def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
     """Return the cycles in which each transition can follow its predecessor at one instant.
 
-    At most `MAX_CYCLES` cycles of at most `MAX_CYCLE_LENGTH` transitions are examined; the result
-    is cached.
+    Transitions have no wait or a wait of 0. At most MAX_CYCLES cycles of at most MAX_CYCLE_LENGTH
+    transitions are examined; a cycle is left out if one of its pairs is proven impossible or a
+    guard cannot be lowered. Whether a whole cycle is possible is not examined. The result is cached
+    on the automaton.
     """
     query_engine = QueryEngine(automaton)
     transitions = {each.key: each for each in instant_transitions(automaton)}
@@ -100,7 +110,7 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
 
 
 def instant_transitions(automaton: Automaton) -> list[Transition]:
-    """Return the transitions without a wait, or with a wait of 0."""
+    """Return the transitions of all modes without a wait, or with a wait of 0."""
     transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
     return [
         transition
@@ -110,10 +120,10 @@ def instant_transitions(automaton: Automaton) -> list[Transition]:
 
 
 def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
-    """Yield the simple cycles of a graph with at most `MAX_CYCLE_LENGTH` nodes, each once.
+    """Yield the simple cycles of a graph with at most MAX_CYCLE_LENGTH nodes, each once.
 
-    `after` gives the successors of each node. A cycle starts with its first node in the order of
-    `after`.
+    `after` gives the successors of each node; all nodes are keys. A cycle starts with its first
+    node in the order of `after`; a node that follows itself is a cycle of one.
     """
     position = {name: number for number, name in enumerate(after)}
     for group in strongly_connected_components(after):
@@ -195,7 +205,9 @@ def _can_follow(
 def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, list[Expr]]:
     """Return the symbolic path of consecutive transitions at one instant, and its conditions.
 
-    Each guard holds, and no guard of a smaller priority without wait in the same mode holds.
+    Each guard holds at its position, and no guard of a smaller priority without wait in the same
+    mode does. The effects of a transition apply before the guard of the next one. Raises KeyError
+    or SpecError if a guard cannot be lowered.
     """
     path = SymbolicPath()
     snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)

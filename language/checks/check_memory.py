@@ -33,8 +33,11 @@ MAX_AFTER_TICKS = 65535
 def check_memory(automaton: Automaton, problems: Problems) -> None:
     """Report invalid uses of functions with memory.
 
-    Checked are the argument type, the time argument, the length in ticks, names without a value in
-    some mode, and edges on transitions with a wait.
+    These are times that are not constant or negative, `delay` of more than MAX_DELAY ticks or major
+    steps or (continuous) of less than one major step, `after` or `every` of more than
+    MAX_AFTER_TICKS ticks, an `every` of 0 or of no whole number of periods, delayed names without
+    an equation in some mode, a delay of a value that is no real or `changed` of a real in a
+    continuous automaton, and edges or `every` on transitions with a positive wait.
     """
     for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
         _check_known_in_every_mode(automaton, tree, problems)

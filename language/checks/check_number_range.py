@@ -18,7 +18,9 @@ from language.text.diagnostic import Problems, Span
 def check_numbers(automaton: Automaton, problems: Problems) -> None:
     """Report numbers that are infinite or 0 in the number type, and coinciding points of an axis.
 
-    Automata of type `float64` have none. Raises SpecError if there are errors.
+    Examined are literals, values of parameters and defaults of inputs, also of the model; 0 itself
+    is none. Ranges are checked by `check_ranges`. Automata of type `float64` have no problem.
+    Raises SpecError with all problems if there are errors.
     """
     number = automaton.numbers
     if number == "float64":
@@ -46,7 +48,10 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
 
 
 def check_ranges(automaton: Automaton, problems: Problems) -> None:
-    """Report ranges whose bounds are infinite in the number type."""
+    """Report ranges with a bound that is infinite in the number type of the automaton.
+
+    Examined are inputs, states, discrete variables and parameters, also those of its model.
+    """
     for thing in _ranged_declarations(automaton):
         if any(math.isinf(round_to_type(bound, automaton.numbers)) for bound in thing.range or ()):
             label = f"the range of `{thing.name}` goes beyond the largest {automaton.numbers}"

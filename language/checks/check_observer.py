@@ -20,7 +20,11 @@ def check_observer(
     """Report unknown names of an observer, and entries whose dimension does not fit its equations.
 
     The equations are dx/dt = A x + B u + f, y = C x. `kinds` are the types of all names of the
-    automaton.
+    automaton; `check` knows those that formulas may read.
+
+    Also reported are a `correct` that is no bool, an `unknown_instant` of no real input, and a
+    formula of `f` or of the process noise that reads an equation, or in `f` a state of the
+    observer. If a listed name has no dimension, matrices and vectors are not checked.
     """
     problems = check.problems
     for listed, known, what in (

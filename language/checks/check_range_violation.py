@@ -26,7 +26,12 @@ STATE_PREFIXES = ("state.", "discrete.", "memory.")
 def check_range_violations(
     automaton: Automaton, query_engine: QueryEngine, problems: Problems
 ) -> None:
-    """Warn of assignments that can exceed the range of their target; the hint shows a witness."""
+    """Warn of assignments that can exceed the range of their target; the hint shows a witness.
+
+    Examined are entry, exit, update and resets; resets of transitions with events or completions
+    are left out. Targets are real, with a range and the default range policy. Values that read a
+    state, a discrete variable or memory are skipped, as are those without a witness.
+    """
     for mode in automaton.all_modes:
         for formulas, guard in _assignments(mode):
             for name, formula in formulas.items():

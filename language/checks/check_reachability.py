@@ -12,7 +12,10 @@ from language.text.diagnostic import Problems
 
 
 def check_reachability(automaton: Automaton, problems: Problems) -> None:
-    """Warn of modes that no path of transitions from an initial or fault mode enters."""
+    """Warn of modes that no path of transitions from an initial or fault mode enters.
+
+    Guards are not examined. In a chart superstates count, too.
+    """
     for mode in _unreachable_modes(automaton, set()):
         problems.warning("unreached", mode.span, f"mode `{mode.name}` is never entered")
 
@@ -20,9 +23,9 @@ def check_reachability(automaton: Automaton, problems: Problems) -> None:
 def check_blocked_modes(
     automaton: Automaton, dead_transitions: set[str], problems: Problems
 ) -> None:
-    """Warn of modes that are reachable only by dead transitions, given by their keys.
+    """Warn of modes that are reachable only by dead transitions, given by their key paths.
 
-    Modes that `check_reachability` reports are left out.
+    Modes that `check_reachability` reports are left out. There are none without dead transitions.
     """
     reported = {mode.key for mode in _unreachable_modes(automaton, set())}
     for mode in _unreachable_modes(automaton, dead_transitions) if dead_transitions else ():
@@ -61,10 +64,11 @@ def _unreachable_in_region(
 
 
 def check_final_modes(automaton: Automaton, problems: Problems) -> None:
-    """Warn of final modes whose completion has no effect.
+    """Warn of final modes of a chart whose completion has no effect.
 
-    A completion has an effect if a completion transition leaves the enclosing mode or `in(...)`
-    reads the final mode. Regions of the root are left out.
+    A completion has an effect if a completion transition leaves the enclosing mode, or if `in(...)`
+    in a guard or an equation reads the final mode. Final modes directly in a region of the root are
+    left out.
     """
     chart = automaton.statechart
     if chart is None:

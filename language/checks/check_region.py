@@ -10,7 +10,12 @@ from language.text.diagnostic import Problems, Span
 
 
 def check_regions(automaton: Automaton, problems: Problems) -> None:
-    """Report duplicate mode labels, incomplete modes, and names that two regions write."""
+    """Report modes of equal label, incomplete modes of parallel regions, and shared writes.
+
+    A mode of a parallel region needs each equation and balance that another mode of its region has,
+    and has no observer or run. No two regions may define, balance or assign one name (rule 14);
+    assignments in a chart are left to `check_chart`.
+    """
     labels: dict[str, Span] = {}
     for mode in automaton.all_modes:
         if mode.label in labels:

@@ -18,8 +18,10 @@ from language.text.diagnostic import Problems
 def check_rewind(automaton: Automaton, transition: Transition, problems: Problems) -> None:
     """Report why a transition cannot rewind; a transition without `rewind` has no problem.
 
-    Rewinds need a sampled automaton without parallel regions, a reversible source and a target that
-    runs the model.
+    The automaton must be sampled, without parallel regions in it or its model. `until` must read a
+    state or input and no function with memory. The source may have a run with one substep that
+    cannot leave its flow, or an observer that takes its matrices from the model (`of`). The target
+    must run the model with one substep. Neither may update a state of the model.
     """
     rewind = transition.rewind
     if rewind is None:
@@ -39,7 +41,7 @@ def check_rewind(automaton: Automaton, transition: Transition, problems: Problem
 
 
 def check_rewind_depth(automaton: Automaton, problems: Problems) -> None:
-    """Report rewinds whose `within` is not positive or longer than `MAX_REWIND` ticks.
+    """Report rewinds whose `within` is not positive or longer than MAX_REWIND ticks (rounded up).
 
     Rewinds of a continuous automaton are skipped.
     """

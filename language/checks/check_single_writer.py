@@ -12,8 +12,9 @@ from language.text.diagnostic import Problems, suggest_name
 def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
     """Report states of a mode with several writers, and keys of the other kind of automaton.
 
-    Writers are the observer, the run and `update`. A run needs every state of its model in the
-    automaton.
+    Writers are the observer, the run and `update`; observer and run are allowed together only with
+    `predict: runs`, which needs a run. A run needs every state of its model in the automaton.
+    `flow` belongs to a continuous automaton, `update`, `observer` and `runs` to a sampled one.
     """
     if mode.observer and mode.run and not mode.observer.predicts_by_run:
         label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
@@ -47,7 +48,10 @@ def check_writers(automaton: Automaton, mode: Mode, problems: Problems) -> None:
 
 
 def check_memory_continue(automaton: Automaton, transition: Transition, problems: Problems) -> None:
-    """Report `memory: continue` to a mode without wait counters or in a continuous automaton."""
+    """Report `memory: continue` to a mode without wait counters or in a continuous automaton.
+
+    The caller has checked that the transition has this option. An unknown target is not reported.
+    """
     modes = automaton.region(transition.region).modes
     target = modes.get(transition.target)
     if not automaton.is_sampled:
@@ -62,8 +66,9 @@ def check_memory_continue(automaton: Automaton, transition: Transition, problems
 def check_outputs(automaton: Automaton, problems: Problems) -> None:
     """Report outputs with an unknown name and outputs without a value in some mode.
 
-    An output names a state, an equation, a region, `mode` or, if the automaton is sampled,
-    `faults`.
+    An output names a state, a discrete variable, an equation, a region, `mode` or, if the automaton
+    is sampled, `faults`. An equation must be known in every mode of the chart; there is one problem
+    for each mode that lacks it.
     """
     equations = equation_names_of(automaton.all_modes)
     for output, span in automaton.outputs.items():
@@ -88,7 +93,8 @@ def check_outputs(automaton: Automaton, problems: Problems) -> None:
 def check_scaling_ranges(automaton: Automaton, problems: Problems) -> None:
     """Report states without a range if a method of integration scales the states by their ranges.
 
-    The methods are `exponential` and `exact`.
+    The methods are `exponential` and `exact`: those of runs, and that of a continuous automaton.
+    States of the model are examined, too.
     """
     used = {m.run.method for m in automaton.modes.values() if m.run}
     used |= set() if automaton.is_sampled else {automaton.method}
@@ -101,5 +107,8 @@ def check_scaling_ranges(automaton: Automaton, problems: Problems) -> None:
 
 
 def equation_names_of(modes: Iterable[Mode]) -> list[str]:
-    """Return the names of the equations of some modes, each once, in order of appearance."""
+    """Return the names of the equations of some modes, each once, in order of appearance.
+
+    Only the own `equations` of each mode count, not those of parallel regions.
+    """
     return list(dict.fromkeys(name for mode in modes for name in mode.equations))

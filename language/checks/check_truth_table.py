@@ -18,7 +18,9 @@ MARK_TEXT = {True: "T", False: "F", None: "-"}
 def check_truth_tables(automaton: Automaton, check: TypeChecker, problems: Problems) -> None:
     """Report truth tables with wrong types, shared variables, or missing or overlapping rows.
 
-    Tables of a continuous automaton are reported too.
+    No two tables may assign one variable. Exactly one row must hold for each combination of the
+    conditions, `else` aside; an `else` that never holds gives a warning. Rows of a table with wrong
+    marks are not examined. Tables of a continuous automaton are an error.
     """
     if automaton.tables and not automaton.is_sampled:
         label = "`tables` belongs to a sampled automaton"

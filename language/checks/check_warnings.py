@@ -25,7 +25,8 @@ def check_warnings(automaton: Automaton, problems: Problems) -> None:
     """Report the warnings of a checked automaton.
 
     They are dead transitions, blocked and stuck modes, final modes without effect, close waits,
-    cycles, Zeno behaviour and assignments past a range.
+    cycles, Zeno behaviour and assignments past a range. Unused names and unreachable modes are
+    reported by `check_automaton`. The model is not examined.
     """
     query_engine = QueryEngine(automaton)
     dead_transitions = check_dead_transitions(automaton, query_engine, problems)

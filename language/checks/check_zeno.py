@@ -28,7 +28,13 @@ SECANT_STEP = 1.0e-3
 
 
 def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
-    """Warn of cycles of one or two modes that have a Zeno equilibrium; the warning shows it."""
+    """Warn of cycles of one or two modes that have a Zeno equilibrium; the warning shows it.
+
+    Only continuous automata without parallel regions are examined, and transitions without a wait
+    whose guard calls none of TIMED_FUNCTIONS. The resets must reduce the distance to the
+    equilibrium. Cycles that cannot be lowered or differentiated, or that the solver leaves open,
+    are skipped.
+    """
     for cycle in _two_mode_cycles(automaton):
         try:
             witness = _find_zeno_equilibrium(automaton, cycle, query_engine)

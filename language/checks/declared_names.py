@@ -17,7 +17,8 @@ BUILTIN_NAMES = ("mode", "faults")
 def declaration_type(declaration: Parameter | Input | State | SystemInput) -> ExprType:
     """Return the type of a declaration: truth, enumeration, integer interval or dimension.
 
-    A fixed integer parameter has the interval of its value; other integers that of their range.
+    A fixed integer parameter has the interval of its value; other integers that of their range, or
+    an interval without bounds. A real has the dimension of its unit.
     """
     if declaration.type == "bool":
         return "truth"
@@ -40,7 +41,10 @@ def collect_declared_names(
 ) -> tuple[dict[str, ExprType], dict[str, ExprType]]:
     """Return the types of all declared names, and those of the values of enumerations.
 
-    Report names that are declared twice, reserved, or that differ in case only.
+    Names are parameters, inputs, states and discrete variables; the first result also has the
+    values. Reported are names that are declared twice (also as an equation or region),
+    BUILTIN_NAMES, names that differ in case only, and values that two enumerations with different
+    lists share.
     """
     table = _DeclarationTable(automaton, problems)
     table.declare()
