@@ -18,10 +18,11 @@ The sum of coefficients times variables plus the constant is > 0 if strict, else
 
 
 def is_infeasible(inequalities: Sequence[Inequality]) -> bool:
-    """Return whether elimination proves that no values fulfil all inequalities.
+    """Return whether elimination proves that no real values fulfil all inequalities.
 
-    The result is False if a solution exists or if more than `MAX_INEQUALITIES` inequalities arise.
-    The variable that creates the fewest new inequalities is eliminated first.
+    The result is False if a solution exists or if more than MAX_INEQUALITIES inequalities arise.
+    The variable that creates the fewest new inequalities is eliminated first, ties by name.
+    Coefficients must not be 0.
     """
     remaining = list(inequalities)
     while len(remaining) <= MAX_INEQUALITIES:

@@ -67,7 +67,11 @@ class GuardSnapshot:
         path: SymbolicPath | None = None,
         values: Mapping[str, Expr] | None = None,
     ) -> None:
-        """Start a path, or continue one with the values that a transition left."""
+        """Start a path, or continue one with the values that a transition left.
+
+        Inputs and states are variables, unless `values` gives the symbolic value of a state by
+        name. In a later snapshot of a path the mode is just entered: edges and `every` are false.
+        """
         self.automaton = automaton
         self.mode = mode
         self.path = path or SymbolicPath()
@@ -85,15 +89,18 @@ class GuardSnapshot:
     def lower_expression(self, tree: SyntaxTree) -> Expr:
         """Return a lowered expression; the equations that it reads are assigned first.
 
-        Raises KeyError if a name has no value in this snapshot.
+        The assignments are appended to the path, each equation once for a snapshot. Functions with
+        memory become variables (see the module). Raises KeyError if a name has no value in this
+        snapshot, SpecError if the expression cannot be lowered.
         """
         self._define_equations([tree])
         return lower_expression(tree, self.bindings)
 
     def lower_guard(self, transition: Transition) -> Expr:
-        """Return the condition under which a transition is enabled, without its events.
+        """Return the condition under which a transition is enabled, without its events and wait.
 
         For a completion transition of a chart, this is the condition that its source is complete.
+        Raises KeyError or SpecError like `lower_expression`.
         """
         chart = self.automaton.statechart
         node = node_of(self.automaton, self.automaton.source_mode(transition))
@@ -102,9 +109,10 @@ class GuardSnapshot:
         return self.lower_expression(transition.when.tree)
 
     def in_enclosing_mode(self, outer: Mode) -> GuardSnapshot:
-        """Return a copy of the snapshot for a mode that encloses this one.
+        """Return a copy of the snapshot for a mode that encloses this one; both share the path.
 
-        The time in the enclosing mode is a new variable that is not below the time in this mode.
+        The time in the enclosing mode is a new variable in ticks that is not below the time in this
+        mode. Equations are still those of this mode.
         """
         result = copy.copy(self)
         result.bindings = {
@@ -119,9 +127,11 @@ class GuardSnapshot:
         return result
 
     def apply_transition(self, transition: Transition) -> GuardSnapshot:
-        """Return the snapshot after the exit, reset and entry stages of a transition.
+        """Return the snapshot of the target mode after exit, reset and entry (rule 6).
 
-        The assignments of a stage read the values before the stage (rule 5).
+        Assignments are appended to the path; those of a stage read the values before the stage
+        (rule 5). Guard, wait and events are not required here, and modes around source and target
+        are not entered or left. Raises KeyError or SpecError like `lower_expression`.
         """
         target = self.automaton.target_mode(transition)
         carried = self._apply_stage(self.mode.exit, {})
@@ -270,7 +280,11 @@ class GuardSnapshot:
         self.bindings[name] = Ref(target, is_whole)
 
     def define_memory(self, tree: SyntaxTree) -> None:
-        """Bind the functions with memory in a tree; inner calls come first."""
+        """Bind the functions with memory in a tree to symbolic values; inner calls come first.
+
+        Calls that are bound already are kept. New variables and assumptions are added to the path.
+        Raises KeyError if an argument reads a name without a value.
+        """
         for part in reversed(walk(tree)):
             if isinstance(part, FunctionCall) and part.function in MEMORY_FUNCTIONS:
                 key = memory_key(part)

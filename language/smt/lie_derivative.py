@@ -41,7 +41,7 @@ class LieDerivative:
     """
 
     def __init__(self, snapshot: GuardSnapshot) -> None:
-        """Compute the rates of all states.
+        """Compute the rates of all states and append them to the path of the snapshot.
 
         Raises UnknownRateError if the mode has no balance for a state.
         """
@@ -67,7 +67,10 @@ class LieDerivative:
     def differentiate(self, expr: Expr) -> Expr:
         """Return the derivative of an expression with respect to time.
 
-        Raises UnknownRateError for a function without a rule.
+        Inputs, parameters and discrete variables are constant. At a corner of `abs`, `min`, `max`,
+        `clip` or a selection it is that of the active branch; `sign` and `floor` have 0. Rates of
+        assigned names are appended to the path. Raises UnknownRateError for memory, conditions and
+        functions without a rule (such as lookups), unless their arguments are constant.
         """
         match expr:
             case Value():

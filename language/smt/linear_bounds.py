@@ -25,15 +25,19 @@ LinearForm = tuple[dict[str, Fraction], Fraction]
 
 
 def is_disproved_by_bounds(query: SolverQuery) -> bool:
-    """Return whether linear bounds prove that the conditions never hold together."""
+    """Return whether linear bounds prove that the conditions never hold together.
+
+    False means that nothing is known. No solver is called (see `narrow_domains`).
+    """
     return narrow_domains(query) is None
 
 
 def narrow_domains(query: SolverQuery) -> dict[str, VariableDomain] | None:
     """Return narrower domains of variables that the conditions imply; None if they never hold.
 
-    Only variables that a relation bounds alone, or that stand alone as a Boolean, are in the
-    result. Conditions that are not linear are ignored.
+    Only variables that a relation bounds alone, without their default, or that stand alone as a
+    Boolean, with the required value as default, are in the result. Bounds are closed even for
+    strict relations. Conditions that are not linear, `!=` and alternatives (`or`) are ignored.
     """
     forms = _LinearForms(query)
     bounds: dict[Direction, _DirectionBounds] = {}

@@ -78,7 +78,10 @@ class SolverQuery:
 
     @cached_property
     def names_read(self) -> set[str]:
-        """Names that the conditions read, directly or through the assignments."""
+        """Names that the conditions read, directly or through the assignments.
+
+        Variables, constants and assigned names are included, and `call <function>` for each call.
+        """
         result = {name for condition in self.conditions for name in expr_names(condition)}
         for target, value in reversed(self.assignments):
             if target in result:
@@ -115,6 +118,7 @@ class SolverQuery:
         """Return whether a point lies within the domains and makes all conditions true.
 
         The result is False if a name has no value or an evaluation fails (overflow, domain error).
+        The point may lack variables that nothing reads.
         """
         try:
             if not all(self.domains[name].contains(value) for name, value in point.items()):
@@ -129,7 +133,8 @@ class SolverQuery:
     def value_at(self, point: Mapping[str, Scalar], expr: Expr) -> float:
         """Return the value of an expression at a point, after all assignments.
 
-        An assignment whose operands have no value is skipped.
+        An assignment whose operands have no value is skipped. Neither domains nor conditions are
+        checked. Raises KeyError if the expression reads a name without a value.
         """
         values = {**self.parameter_values, **point}
         for target, value in self.assignments:
@@ -140,7 +145,8 @@ class SolverQuery:
     def shorten(self, point: Valuation) -> Valuation:
         """Return the point with floats rounded to the fewest digits at which the conditions hold.
 
-        The point is returned unchanged if they hold at none of the roundings in `DISPLAY_DIGITS`.
+        The point is returned unchanged if they hold at none of the roundings in DISPLAY_DIGITS.
+        Bools and integers are kept.
         """
         for digits in DISPLAY_DIGITS:
             shorter: Valuation = {
@@ -155,7 +161,9 @@ class SolverQuery:
 def format_valuation(point: Mapping[str, Scalar], domains: Mapping[str, VariableDomain]) -> str:
     """Return a point as text: `x = 0.5, ready = true, key = parked`.
 
-    The prefix of a name up to its first dot is left out.
+    The order is that of `point`; values are in SI. The prefix of a name up to its first dot is left
+    out. A number is the shortest text that reads back as the same float; a value of a domain with
+    names is its name. An empty point gives "".
     """
     return ", ".join(
         f"{name.partition('.')[2] or name} = {_format_value(value, domains[name])}"

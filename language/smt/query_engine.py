@@ -51,7 +51,7 @@ class Witness:
 
     @property
     def hint_prefix(self) -> str:
-        """Start of a hint, `at x = 0.5; `; empty if there is no value to show."""
+        """Start of a hint, `at x = 0.5; `; "" if there is no value to show."""
         return f"at {self.text}; " if self.text else ""
 
 
@@ -62,7 +62,12 @@ class QueryEngine:
     """
 
     def __init__(self, automaton: Automaton) -> None:
-        """Compute the domains of inputs, states, discrete variables and tunable parameters."""
+        """Compute the domains of inputs, states, discrete variables and tunable parameters.
+
+        A domain is the declared range, rounded to the number type, or the indices of an
+        enumeration. Tunable lookup tables have none. The limits of queries and points count for one
+        engine.
+        """
         self.automaton = automaton
         self.query_count = self.point_count = 0
         self.parameter_values = constant_values(parameter_constants(automaton, Problems()))
@@ -79,7 +84,8 @@ class QueryEngine:
     def build_query(self, path: SymbolicPath, conditions: Iterable[Expr]) -> SolverQuery:
         """Return the query whether conditions can hold together after the assignments of a path.
 
-        The assumptions of the path are added to the conditions.
+        The assumptions of the path are added to the conditions, its domains to those of the
+        automaton. Parameters have their present values.
         """
         domains = {**self.domains, **path.domains}
         all_conditions = (*conditions, *path.assumptions)
@@ -88,7 +94,8 @@ class QueryEngine:
     def free_tunables(self, query: SolverQuery) -> SolverQuery | None:
         """Return the query with tunable parameters as variables; None if it depends on none.
 
-        The assignments of derived parameters are put before those of the query.
+        The assignments of derived parameters are put before those of the query. Tunable lookup
+        tables keep their values.
         """
         wider = replace(
             query,
@@ -100,8 +107,10 @@ class QueryEngine:
     def answer(self, query: SolverQuery) -> Witness | Verdict:
         """Return a witness, "never" if the conditions are disproved, or "open".
 
-        The methods are tried in this order: linear bounds, sample points, z3, and a larger set of
-        sample points.
+        The methods are tried in this order: linear bounds, `first_sample_points`, z3 (at most
+        MAX_SOLVER_QUERIES in this engine), and if z3 finds no confirmed solution
+        `all_sample_points` (at most MAX_SEARCHED_POINTS). A query without variables has no witness:
+        if it is not disproved, it is "open".
         """
         narrower = narrow_domains(query)
         if narrower is None:
@@ -117,8 +126,8 @@ class QueryEngine:
     def answer_for_all_tunables(self, query: SolverQuery) -> Witness | Verdict:
         """Return the answer for the present values of tunable parameters.
 
-        If that is "never", return the answer for all values in the ranges of the tunable
-        parameters.
+        If that is "never" and the query depends on tunable parameters, return the answer for all
+        values in their ranges instead.
         """
         answer = self.answer(query)
         wider = self.free_tunables(query) if answer == "never" else None
@@ -127,7 +136,8 @@ class QueryEngine:
     def is_unsatisfiable(self, query: SolverQuery) -> bool:
         """Return whether it is proven that the conditions never hold, for all tunable values.
 
-        The result is False once `MAX_SOLVER_QUERIES` is exceeded.
+        Proofs are linear bounds or z3 with SMALL_RESOURCE_LIMIT; answers are cached. The result is
+        False if nothing is proven, and once MAX_SOLVER_QUERIES is exceeded.
         """
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or not _is_proven_unsatisfiable(
@@ -141,7 +151,8 @@ class QueryEngine:
         """Return a solution of the first query by z3 that satisfies the second one, else None.
 
         The second query is the first with equalities relaxed to a tolerance, because solutions are
-        rounded. The result is None, too, once `MAX_SOLVER_QUERIES` is exceeded.
+        rounded. z3 has SMALL_RESOURCE_LIMIT, and sample points are not tried. The result is None,
+        too, once MAX_SOLVER_QUERIES is exceeded.
         """
         self.query_count += 1
         if self.query_count > MAX_SOLVER_QUERIES or narrow_domains(exact) is None:
@@ -202,7 +213,10 @@ def _is_proven_unsatisfiable(query_key: QueryKey) -> bool:
 
 @cache
 def shared_solver() -> Solver:
-    """Return the solver of this process; it reuses the terms of names and numbers."""
+    """Return the solver of this process, created at the first call.
+
+    It reuses the terms of names and numbers, and a lock serialises its queries.
+    """
     return Solver()
 
 

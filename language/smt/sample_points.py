@@ -27,7 +27,12 @@ PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 def first_sample_points(
     query: SolverQuery, narrowed_domains: Mapping[str, VariableDomain]
 ) -> Iterator[Valuation]:
-    """Yield `SAMPLE_COUNT - 1` points within the narrowed domains."""
+    """Yield `SAMPLE_COUNT - 1` points within the narrowed domains; equal ones at each call.
+
+    A point has a value for each variable that the conditions depend on: its default, else a number
+    of a Halton sequence in the range (DEFAULT_RANGE for absent bounds). `narrowed_domains` replace
+    those of the query by name. Whether the conditions hold is not checked.
+    """
     domains = {**query.domains, **narrowed_domains}
     for index in range(1, SAMPLE_COUNT):
         yield _sample_point(query, domains, index)
@@ -36,7 +41,9 @@ def first_sample_points(
 def all_sample_points(query: SolverQuery) -> Iterator[Valuation]:
     """Yield `MAX_SAMPLE_COUNT - 1` points, each followed by its projections onto boundaries.
 
-    A projection replaces one side of a relation of the conditions so that both sides are equal.
+    The points are within the domains of the query. A projection gives a real variable that is one
+    side of a relation of the conditions the value of the other side, which may be outside its
+    domain.
     """
     parts = [part for condition in query.conditions for part in subexpressions(condition)]
     relations = [part for part in parts if isinstance(part, Compare)]
@@ -77,8 +84,9 @@ def _boundary_points(
 def neighbouring_points(point: Valuation, query: SolverQuery) -> Iterator[Valuation]:
     """Yield a point of z3, its floating-point neighbours, and copies with one sampled coordinate.
 
-    The first point has the defaults of the domains. Neighbours are tried because the solution of z3
-    is rounded.
+    The order is: the point with the defaults of the domains, the point itself, each float
+    coordinate moved down and up by one float, then `SAMPLE_COUNT - 1` sampled values of each
+    coordinate. Neighbours are tried because the solution of z3 is rounded.
     """
     default = {
         name: domain.default

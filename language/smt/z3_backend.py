@@ -54,25 +54,33 @@ class Solver:
     """
 
     def __init__(self) -> None:
-        """Create the lock; z3 is imported later."""
+        """Create the lock; z3 is imported with the first query."""
         self._lock = threading.Lock()
 
     @cached_property
     def z3(self) -> Any:
-        """Module z3; its import takes a fifth of a second."""
+        """The module z3, imported at the first access; the import takes a fifth of a second."""
         import z3
 
         return z3
 
     @cached_property
     def term_cache(self) -> dict[object, Any]:
-        """Cached z3 literals and variables; their construction takes most of the time."""
+        """Cached z3 literals by number, and variables with their facts by name and domain.
+
+        It is empty at first and never cleared; the construction of terms takes most of the time.
+        """
         return {}
 
     def solve(
         self, query: SolverQuery, resource_limit: int = RESOURCE_LIMIT
     ) -> Valuation | Verdict:
-        """Return rounded values of a solution, "never" if there is none, or "open" if undecided."""
+        """Return rounded values of a solution, "never" if there is none, or "open" if undecided.
+
+        Values are bool, int or float, for the variables that the conditions or their assignments
+        read; whether they hold after rounding is not checked. "open" is returned at
+        `resource_limit` and for an expression without a counterpart in z3. Nothing is raised.
+        """
         with self._lock:
             return self._solve_locked(query, resource_limit)
 
