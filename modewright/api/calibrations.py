@@ -40,16 +40,20 @@ class CalibrationPage:
 
     @property
     def tunable(self) -> tuple[Constant, ...]:
-        """The tunable parameters in the order of the page."""
+        """The constants of the tunable parameters, in the order of the page."""
         return tuple(c for c in page_constants(self.program) if c.kind == "tunable")
 
     @property
     def solved(self) -> tuple[Constant, ...]:
-        """The solved numbers in the order of the page."""
+        """The constants of the solved numbers in the order of the page, after the tunables."""
         return tuple(c for c in page_constants(self.program) if c.kind == "solved")
 
     def text(self, form: str) -> str:
-        """Return the page as the text of a file in the format `dcm`, `cdfx` or `csv`."""
+        """Return the page as the text of a file in the format `dcm`, `cdfx` or `csv`.
+
+        The heading names automaton and number type; the text has no date. Raises KeyError for
+        another format.
+        """
         name, number = self.program.name, self.program.number_type
         heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
         return FORMATS[form].write(
@@ -67,7 +71,7 @@ class SolvedChange:
 
     @property
     def relative(self) -> float:
-        """The relative change, between 0 and 2."""
+        """|after - before| over the larger of |after| and |before|; between 0 and 2."""
         size = max(abs(self.after), abs(self.before))
         return abs(self.after / size - self.before / size)
 
@@ -87,7 +91,11 @@ class ImportedPage:
     warnings: tuple[Problem, ...]
 
     def calibration(self, name: str, origin: str = "", date: str = "") -> str:
-        """Return the text of a calibration file (YAML) with these values."""
+        """Return the text of a calibration file (YAML) with the imported parameter values.
+
+        `name` is the name of the calibration; an empty `origin` or `date` is left out. Solved
+        numbers are not contained.
+        """
         return format_calibration(name, self.page.program.name, origin, date, self.values)
 
 
@@ -110,7 +118,11 @@ def export_calibration(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> CalibrationPage:
-    """Return the calibration page of an automaton. Raises SpecError."""
+    """Return the calibration page of an automaton, with calibrations, then `values`, applied.
+
+    Solved numbers are computed for the parameter values as the number type of the automaton stores
+    them. Writes no file. Raises SpecError.
+    """
     project = Project(root or Path())
     return _build_page(
         load_calibrated_document(reference, project, calibrations), project, parse_values(values)
@@ -124,9 +136,12 @@ def import_calibration(
     form: str | None = None,
     own_only: bool = False,
 ) -> ImportedPage:
-    """Return the values of a calibration file for an automaton. Raises SpecError.
+    """Return the values of a calibration file for the automaton `of`, and their page.
 
-    With `own_only` names of other functions of the ECU are ignored.
+    `form` is `dcm`, `cdfx` or `csv`; None takes it from the suffix. Parameters that are not in the
+    file keep the value of the spec and get a remark. With `own_only` names that do not begin with
+    the name of the automaton and a dot are ignored, each with a remark; else an unknown name is an
+    error. Raises SpecError.
     """
     project = Project(root or Path())
     return _import_page(
@@ -142,9 +157,12 @@ def resolve_calibration(
     calibrations: Sequence[str] = (),
     form: str | None = None,
 ) -> ResolvedPage:
-    """Return the page of an automaton with solved numbers computed for a file or for calibrations.
+    """Return the page of an automaton with solved numbers computed again.
 
-    Changes are relative to the file, or without a file to the spec. Raises SpecError.
+    With the file `page` the parameter values are those of the file, and changes are relative to its
+    solved numbers. Without it they are those of `calibrations` and `values`, and changes are
+    relative to the spec without both. A solved number that is not in the file or in the spec is in
+    `added`. `form` is the format of the file. Raises SpecError.
     """
     project = Project(root or Path())
     document = load_calibrated_document(reference, project, calibrations)

@@ -36,9 +36,10 @@ class CheckResult:
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec including warnings.
+    """Return all problems of a spec including warnings, each once; an empty list if there are none.
 
-    An empty list means that the spec is valid.
+    `reference` is a name or path below `root` (default: the working folder). Errors of the spec,
+    also a missing file, are returned and not raised.
     """
     return list(check_spec(reference, root).problems)
 
@@ -46,9 +47,12 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
 def check_spec(
     reference: str, root: Path | None = None, texts: Mapping[Path, str] | None = None
 ) -> CheckResult:
-    """Return all problems of a spec, and the largest stable step of each mode of an automaton.
+    """Return all problems of a spec, each once, and lines about the largest stable steps.
 
-    `texts` are unsaved texts of an editor by resolved path; they replace the files.
+    There are such lines for an automaton with continuous states and without errors only, not for a
+    calibration. A calibration is checked on its base; the automata of a system are lowered, too.
+    `texts` are unsaved texts of an editor by resolved path; they replace the files. SpecError is
+    not raised but converted to problems.
     """
     return _run_checks(
         reference,
@@ -58,7 +62,11 @@ def check_spec(
 
 
 def check_without_proofs(reference: str, root: Path, texts: Mapping[Path, str]) -> CheckResult:
-    """Return the result of `check_spec` without solved numbers and proofs, which take long."""
+    """Return the result of `check_spec` without the slow steps, so that `limits` are empty.
+
+    These steps are the lowering to a Program, which computes solved numbers, and the warnings that
+    need proofs.
+    """
     skip_deep_checks = _DeepChecks(lambda automaton: None, lambda automaton, problems: None)
     return _run_checks(reference, Project(root, texts), skip_deep_checks)
 
@@ -122,17 +130,21 @@ def _apply_calibration(
 
 
 def merge_problems(results: Iterable[CheckResult]) -> list[Problem]:
-    """Return the problems of several specs without duplicates, in the order of their places."""
+    """Return the problems of several specs, each once, sorted by file, line, column and label."""
     return sort_problems(problem for each in results for problem in each.problems)
 
 
 def spec_files(root: Path) -> Iterator[Path]:
-    """Yield the YAML files below `spec/` in the order of their paths."""
+    """Yield the files `*.yaml` below `spec/` of a project, at any depth, sorted by path."""
     yield from sorted((root / "spec").rglob("*.yaml"))
 
 
 def problem_json(problem: Problem) -> dict[str, Any]:
-    """Return a problem as a dict for JSON."""
+    """Return a problem as a dict for JSON.
+
+    The keys are severity, code, kind, file, line, column, message and help (empty if there is
+    none).
+    """
     return {
         "severity": problem.severity,
         "code": problem.code,

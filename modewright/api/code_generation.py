@@ -47,7 +47,11 @@ def generate(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return the C files of an automaton by name. Raises SpecError."""
+    """Return the texts of the C files of an automaton by file name.
+
+    These are header, source and memory map, and the files of ha_math if the C calls it. Raises
+    SpecError, and ValueError for an automaton without C (an input varies inside a step).
+    """
     return emit_c_files(_load_program(reference, values, root, calibrations))
 
 
@@ -57,7 +61,11 @@ def cmake(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return the CMake file for the C of an automaton by name. Raises SpecError."""
+    """Return the CMake file for the C of an automaton, as a dict of one text by file name.
+
+    It builds the C as a static library. Raises SpecError, and ValueError for an automaton without
+    C.
+    """
     return emit_cmake_file(_load_program(reference, values, root, calibrations))
 
 
@@ -87,10 +95,11 @@ def a2l(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> str:
-    """Return the A2L file of an automaton's C, with addresses if a linked program `elf` is given.
+    """Return the text of the A2L file of an automaton's C.
 
-    `page` and `instance` name the structures if the program has several. Raises SpecError,
-    ImageError and MissingToolError.
+    With a linked program `elf` it contains the addresses; `page` and `instance` are the C names of
+    the calibration structure and of the instance, required if the program has several candidates.
+    They are ignored without `elf`. Raises SpecError, ImageError and MissingToolError.
     """
     program = _load_program(reference, values, root, calibrations)
     return asam.emit_a2l(program, asam.locate_module(program, elf, page, instance) if elf else None)
@@ -105,9 +114,12 @@ def dbc(
     *,
     is_fd: bool = False,
 ) -> str:
-    """Return a DBC file of the inputs and outputs of an automaton; identifiers start at `first`.
+    """Return a DBC file with messages of the inputs and outputs of an automaton.
 
-    Raises SpecError, MissingToolError, and ValueError if the identifiers are exhausted.
+    The messages `X_In` and `X_Out` are split where they exceed a frame; their identifiers count up
+    from `first`. `is_fd` gives CAN FD frames. Declared ranges of inputs are the limits of their
+    signals. Raises SpecError, MissingToolError, and ValueError for an identifier that is negative
+    or has more than 29 bits.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
     return emit_dbc(program, _input_ranges(automaton), first, is_fd)
@@ -122,7 +134,9 @@ def prove(
 ) -> Iterator[ToolVerdict]:
     """Yield the verdicts of external tools about the C of an automaton, one check after another.
 
-    Raises SpecError and MissingToolError.
+    `checks` are names of CHECKS, by default all. A failed proof is a verdict and not an exception.
+    Raises SpecError, BuildError, KeyError for an unknown check, and MissingToolError for a tool
+    that is not installed.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
     yield from run_checks(automaton, program, checks)
@@ -138,9 +152,12 @@ def fuzz(
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
 ) -> FuzzReport:
-    """Compare engine and C of a sampled automaton on `runs` generated sequences of at most `ticks`.
+    """Compare engine and C of a sampled automaton on sequences that libFuzzer generates.
 
-    Raises SpecError, ValueError for a continuous automaton, MissingToolError and BuildError.
+    It executes `runs` sequences of at most `ticks` ticks each, the same ones for the same `seed`.
+    `numbers` replaces the number type of the automaton. Raises SpecError, ValueError for a
+    continuous automaton, MissingToolError and BuildError; a difference is in the report and is not
+    raised.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     if not automaton.is_sampled:
@@ -160,10 +177,12 @@ def mcdc(
 ) -> McdcCoverage:
     """Return the MC/DC coverage of the C of an automaton.
 
-    The sequences are those of the project's tests, those that libFuzzer finds in `runs`, and
-    boundary values of both. With `is_proven` conditions that cannot be covered are proven
-    infeasible (sampled automata only). Raises SpecError, MissingToolError, BuildError, and
-    ValueError without any sequence.
+    The sequences are those of the project's tests that run this automaton with the same Program,
+    those that libFuzzer finds in `runs` (0: none) with each of SEEDS, and, for a sampled automaton,
+    boundary values of both. With `is_proven` it is proven for a sampled automaton which uncovered
+    conditions are infeasible. `numbers` replaces the number type. Raises SpecError,
+    MissingToolError, BuildError, and ValueError without any sequence and for `runs` of a continuous
+    automaton.
     """
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     sequences = [tape.inputs for tape in _record_project_tests(program, root, numbers)]
@@ -215,7 +234,7 @@ def metrics(
 ) -> Metrics:
     """Return ROM, RAM and stack of the C of an automaton on a Cortex-M4F.
 
-    `numbers` replaces its number type. Raises SpecError and MissingToolError.
+    `numbers` replaces the number type of the automaton. Raises SpecError and MissingToolError.
     """
     return measure_code(_load_program(reference, values, root, calibrations, numbers))
 
@@ -231,7 +250,9 @@ def instructions(
 ) -> InstructionCounts:
     """Return the instruction counts of the steps of an automaton's C in a scenario of a system.
 
-    Raises SpecError, MissingToolError, and ValueError if the system has no such instance.
+    The inputs are those of the first instance of the automaton in the system, for at most
+    MAX_COUNTED_STEPS steps. `calibrations` apply to automaton and system, `values` to the automaton
+    only. Raises SpecError, MissingToolError, and ValueError if the system has no such instance.
     """
     program = _load_program(reference, values, root, calibrations, numbers)
     loaded = load(system, scenario, None, root, calibrations)

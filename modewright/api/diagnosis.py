@@ -104,13 +104,18 @@ def diagnose(
     anyway: bool = False,
     tell: Report = lambda text: None,
 ) -> DiagnosisReport:
-    """Find the effects that an automaton lacks to reproduce recordings; write the results to `out`.
+    """Find the effects that an automaton lacks to reproduce recordings.
 
-    Recordings with errors give the verdict `unknown`, unless `anyway`. `effects` is a folder of
-    effects instead of the library. After `budget` seconds without a verdict it is `unknown`.
-    `thresholds` are `kept` (of an earlier bootstrap, else the defaults), `bootstrap` (computed if
-    there are none), `usual` (the defaults) or a file. `tell` is called with lines of progress.
-    Raises SpecError, ValueError, MissingToolError and OutputError.
+    `train` are the recordings to explain, `held_out` those for the validation only; a file in both
+    raises ValueError. `map` is the map of recordings (default: that of the spec). `effects` is a
+    folder of effects instead of those of the project and of the library. `thresholds` are `kept`
+    (of an earlier bootstrap, else the defaults), `bootstrap` (computed if there are none), `usual`
+    (the defaults) or a file.
+
+    Recordings with errors are left out, unless `anyway`; if none remains, or after `budget` seconds
+    without a verdict, the verdict is `unknown`. With `out` the results are written there as by
+    `save_diagnosis`, and an interrupted diagnosis continues from its checkpoints. `tell` is called
+    with lines of progress. Raises SpecError, ValueError, MissingToolError and OutputError.
     """
     time_budget = _Budget(budget, tell)
     tell = time_budget.report
@@ -212,7 +217,10 @@ def _conclude(
 def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
     """Write verdict, variant, report and figures into a folder and return the paths.
 
-    Files of earlier diagnoses that are not written again are removed. Raises OutputError.
+    The folder is created if necessary; `thresholds.json` is written unless the thresholds are the
+    defaults. Files of earlier diagnoses that are not written again are removed, except recordings
+    and effects that the diagnosis read. Checkpoints are removed unless the diagnosis was ended
+    early. `spec` is the name or path of the base. Raises OutputError.
     """
     from diagnosis.report.page import report_files
 
@@ -244,9 +252,10 @@ def _is_input_file(path: Path, report: DiagnosisReport) -> bool:
 
 
 def base_of(report: DiagnosisReport, spec: str, folder: Path) -> str:
-    """Return how a variant in a folder refers to its base.
+    """Return the text by which a variant in `folder` refers to its base `spec`.
 
-    This is the name of the base, or its relative path if the name is ambiguous.
+    This is the name of the base if exactly one file of the project has it, else the path of the
+    base relative to `folder`.
     """
     project = report.case.project
     path = project.path_of(spec)
@@ -317,9 +326,10 @@ def fit(
 ) -> Fit:
     """Fit parameters of an automaton within their ranges to recordings.
 
-    `parameters` are the names to fit; by default all with a range. Findings about recordings are
-    reported through `tell`. Recordings with errors are left out, unless `anyway`. Raises
-    UnusableRecordings, SpecError, ValueError and MissingToolError.
+    `parameters` are the names to fit; None means all with a range. `map` defaults to the map of the
+    spec. Recordings with errors are left out, unless `anyway`. `tell` is called with warnings and
+    errors of recordings, with those left out, and with progress. Writes no file. Raises
+    UnusableRecordings if no recording remains, SpecError, ValueError and MissingToolError.
     """
     require_disjoint(train, ())
     checked = check_recordings(train, map, spec, root=root)

@@ -28,7 +28,12 @@ class HealthCheck:
 
 
 def run_health_checks() -> Iterator[HealthCheck]:
-    """Yield the results of all checks; the last is a self-test if there is a compiler."""
+    """Yield the results of all checks in a fixed order.
+
+    This is Python (at least MIN_PYTHON), modewright, each dependency of the package, C compiler,
+    cache, and a self-test (lock-step of a new project) if the compiler works. An optional
+    dependency that is not installed is `absent`, a required one a `fault`.
+    """
     version = platform.python_version()
     is_new = sys.version_info >= MIN_PYTHON
     yield HealthCheck("python", "ok" if is_new else "fault", f"{version}, {sys.executable}")

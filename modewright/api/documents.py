@@ -15,11 +15,18 @@ Values = Mapping[str, str]
 def load_calibrated_document(
     reference: str, project: Project, calibrations: Sequence[str]
 ) -> Document:
-    """Return a spec with calibrations applied in their order. Raises SpecError."""
+    """Return the document of a spec with calibrations, by name or path, added after its own.
+
+    Later calibrations override earlier ones when the document is expanded; they are not read here.
+    Raises SpecError if the spec cannot be found or read.
+    """
     document = read_document(project.path_of(reference))
     return add_calibrations(document, calibrations, "--calibration")
 
 
 def parse_values(values: Values | None) -> dict[str, ScalarNode]:
-    """Return parameter values as scalar nodes of the language; empty for None. Raises SpecError."""
+    """Return parameter values as scalar nodes by name; empty for None.
+
+    The texts are checked by the reader of the spec only, which places their problems at `--set`.
+    """
     return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

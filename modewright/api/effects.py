@@ -24,9 +24,10 @@ PREFIX_LENGTH = 4
 
 
 def list_effects(at: str | None = None, root: Path | None = None) -> list[EffectDescription]:
-    """Return all effects of the project and of the library.
+    """Return descriptions of all effects of the project and of the library.
 
-    With a spec `at` each has the places where it fits. Raises SpecError.
+    With a spec `at` each has the places where it fits in that spec, else none. Raises SpecError,
+    also if `at` is no valid automaton.
     """
     project = Project(root or Path())
     document = _load_base(at, project) if at else None
@@ -34,10 +35,11 @@ def list_effects(at: str | None = None, root: Path | None = None) -> list[Effect
 
 
 def find_effect(name: str, at: str | None = None, root: Path | None = None) -> EffectDescription:
-    """Return one effect by name; with a spec `at`, also its places in it.
+    """Return the description of one effect; with a spec `at`, also its places in that spec.
 
-    `effect@place` selects one place. Old names of effects are accepted. Raises SpecError for
-    unknown names and places.
+    `name` may be `effect@place`: with `at` only this place is returned, without `at` the place is
+    ignored. Old names of effects (VERDICT_ALIASES) are accepted. Raises SpecError for an unknown
+    name, with similar names as help, and for a place where the effect does not fit.
     """
     project = Project(root or Path())
     document = _load_base(at, project) if at else None
@@ -86,8 +88,11 @@ def draw_signature(
 ) -> Picture:
     """Draw the response of a spec to steps of an input, without and with an effect.
 
-    `name` may contain the place: `coulomb_friction@w_em`; `step` is like `T_em=40 N*m`. Raises
-    SpecError, and ValueError if the effect fits no place or the step is malformed.
+    `name` may contain the place: `coulomb_friction@w_em`; else the first place is taken. `at` is
+    the spec (default: DEFAULT_BASE). `step` is `input=height`, such as `T_em=40 N*m`; by default it
+    is the input at the place of the effect, else the first input without a default. Raises
+    SpecError, and ValueError if the effect fits no place, the step is malformed or there is no such
+    input.
     """
     from diagnosis.model.effect_signature import draw_signature, simulate_signature
 

@@ -38,10 +38,11 @@ Values = Mapping[str, str]
 
 
 def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
-    """Return the text of a spec after a pass. Raises SpecError.
+    """Return the text of a spec after the pass `stage`.
 
-    The passes are `document`, `model`, `lowered`, those of PASSES, and `numbers`. A calibration has
-    its own text for all passes but `document`.
+    The passes are `document`, `model`, `lowered`, the keys of PASSES in their order, and `numbers`
+    (solved numbers). `values` are parameter values as texts; `document` ignores them. A calibration
+    has the same text for all passes but `document`: one line for each value. Raises SpecError.
     """
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
@@ -98,7 +99,8 @@ def compare_specs(
 ) -> str:
     """Return the difference of two specs after a pass as text; empty if they are equal.
 
-    For `document` the differences are by key, else a unified diff. Raises SpecError.
+    For `document` the differences are by key; else they are a unified diff of both results of
+    `explain_spec` with `values`. Raises SpecError.
     """
     if stage == "document":
         project = Project(root or Path())
@@ -112,7 +114,9 @@ def compare_specs(
 def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
     """Return the values of an expanded spec with their places, as a dict for JSON.
 
-    Raises SpecError.
+    The keys are `format`, `kind`, `name` and `values`: one value for each scalar, list and empty
+    mapping, with `path`, `value`, `place`, `layer` (the overlay that gave it) and `changes` (places
+    and overlays that replaced earlier values). Raises SpecError.
     """
     document = _load_expanded(spec, Project(root or Path()))
     found = [_row_json(row) for row in provenance_entries(document.root)]
@@ -121,7 +125,11 @@ def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
 
 
 def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
-    """Return the differences of two expanded specs as a dict for JSON. Raises SpecError."""
+    """Return the differences of two expanded specs as a dict for JSON.
+
+    The keys are `format` and `differences`; each difference has `path`, `old` and `new`, which are
+    values as in `spec_json`, or None where a spec lacks the path. Raises SpecError.
+    """
     project = Project(root or Path())
     old, new = (_load_expanded(name, project).root for name in (spec, other))
     found = [

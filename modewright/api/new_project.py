@@ -27,7 +27,11 @@ TEMPLATE_TARGETS = {
 
 
 def skeleton_files(name: str) -> dict[str, str]:
-    """Return the texts of the project's files by path; its system has the name of the project."""
+    """Return the texts of the files of a new project by relative path, as in TEMPLATE_TARGETS.
+
+    `PROJECT` in the templates is replaced by `name`, which is not checked here; it becomes the name
+    of the system.
+    """
     folder = resources.files("modewright.api") / "new_project_files"
     return {
         place: (folder / source).read_text("utf-8").replace("PROJECT", name)
@@ -36,10 +40,11 @@ def skeleton_files(name: str) -> dict[str, str]:
 
 
 def write_skeleton(name: str, folder: Path) -> list[Path]:
-    """Write a new project into a folder that does not exist yet, and return the paths.
+    """Write a new project into a folder that does not exist yet, and return the paths of its files.
 
-    The folder appears complete or not at all. Raises OutputError, and ValueError for an invalid
-    name.
+    The folder appears complete or not at all; missing parents are created. Raises ValueError for a
+    name that does not match NAME_PATTERN or is in RESERVED_NAMES, and OutputError if the folder
+    exists or cannot be written.
     """
     if not NAME_PATTERN.fullmatch(name) or name in RESERVED_NAMES:
         raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")

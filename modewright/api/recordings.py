@@ -47,7 +47,10 @@ class CheckedRecordings:
     automaton: Automaton | None = field(default=None, repr=False)
 
     def plot(self, title: str = "") -> Picture:
-        """Return a figure of the channels with their excitation and findings."""
+        """Return a figure of the channels of all recordings with their excitation and findings.
+
+        An empty title is replaced by the names of the recordings, separated by `, `.
+        """
         from diagnosis.quality.recording_picture import draw_recordings
 
         names = ", ".join(recording.name for recording in self.recordings)
@@ -61,11 +64,13 @@ def check_recordings(
     databases: Sequence[str] = (),
     root: Path | None = None,
 ) -> CheckedRecordings:
-    """Check rates, gaps, noise and excitation of recordings.
+    """Read recordings and check their rates, gaps, noise and excitation.
 
-    With a spec units, signs and clocks are checked, too. The map defaults to that of the spec;
-    without a spec columns are guessed by name. Raises SpecError, MissingToolError, and ValueError
-    if a file occurs twice.
+    With a spec units, signs and clocks are checked, too, and only the columns that it uses are
+    read. `map` defaults to the map that the spec names. Without map and spec the columns of the
+    first file are guessed by name, with DBC files `databases`. Findings, also missing columns, are
+    returned and not raised. Raises SpecError for unreadable files, for a spec without map and for a
+    map that does not fit; MissingToolError; and ValueError if a file occurs twice.
     """
     project = Project(root or Path())
     automaton = _load_automaton(spec, project) if spec else None
@@ -102,9 +107,10 @@ def check_recordings(
 
 
 def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
-    """Return the warnings and errors of held-out recordings as lines.
+    """Return the warnings and errors of held-out recordings as lines `held out, severity: text`.
 
-    They do not influence the verdict. Recordings that cannot be read are skipped here.
+    Notes are omitted. The findings do not influence the verdict. Recordings that cannot be read are
+    skipped; empty if none remains.
     """
     used = used_columns(case.mapping, automaton)
     recordings = []

@@ -20,18 +20,20 @@ Run = Trajectory | str | Path
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
-    """Write a run to `.csv` (with `.csv.json` beside it) or `.parquet`, atomically.
+    """Write a run to `.csv` (with events and names in `.csv.json` beside it) or to `.parquet`.
 
-    Raises OutputError, MissingToolError, and ValueError for other suffixes.
+    Both files are replaced atomically. Raises OutputError, MissingToolError without pyarrow, and
+    ValueError for other suffixes.
     """
     write_files(encode_run(trajectory, Path(path)))
 
 
 def read(run: Run, root: Path | None = None) -> Trajectory:
-    """Return a run: a trajectory as it is, a file that `save` wrote, or a simulated
-    `system:scenario`.
+    """Return a run as a trajectory; a trajectory is returned as it is.
 
-    Raises SpecError, MissingToolError, and ValueError for other texts.
+    A path with the suffix .csv or .parquet is a file that `save` wrote; another text is
+    `system:scenario`, split at the last colon, and is simulated. Raises SpecError,
+    MissingToolError, and ValueError for a text without colon.
     """
     if isinstance(run, Trajectory):
         return run
@@ -53,7 +55,8 @@ def plot(
 ) -> Picture:
     """Return a figure of one run, or of two runs with the second one dashed in the same colours.
 
-    `signals` are patterns such as `plant.*` (all signals if empty); `span` is in seconds.
+    `signals` are patterns such as `plant.*` (all signals if empty). `span` is the time window [s];
+    None is the whole run. An empty title is replaced by the labels of the runs. Raises as `read`.
     """
     from engine.results.plot import draw_overview
 
@@ -75,11 +78,14 @@ def compare(
     signals: Sequence[str] = (),
     span: tuple[float, float] | None = None,
 ) -> RunDifference:
-    """Compare two runs signal by signal.
+    """Compare two runs signal by signal at the samples of `a`, to which `b` is interpolated.
 
-    `is_within` of the result states whether all are within tolerance. A signal may differ by
-    `relative` times its peak, or by its entry in `tolerances` (patterns of names, values in SI).
-    Modes may disagree for `slack` [s]. Raises ValueError and SpecError.
+    `is_within` of the result states whether all are within tolerance. A signal may differ by the
+    larger of `relative` times its peak in `a` and its entry in `tolerances` (patterns of names,
+    values in SI); by nothing without both. Modes may disagree for `slack` [s]. `signals` are
+    patterns of the names to compare (all if empty), `span` is the time window [s]. Raises as
+    `read`, and ValueError for runs without common time or signal, for different units and for a
+    tolerance that matches no signal.
     """
     return compare_runs(
         read(a), read(b),
@@ -88,7 +94,11 @@ def compare(
 
 
 def run_label(run: Run, default: str) -> str:
-    """Return the label of a run in a figure: its name, its file name, or the default."""
+    """Return the label of a run in a figure.
+
+    A trajectory has its name, or `default` if that is empty; a run file its file name;
+    `system:scenario` is its own label.
+    """
     if isinstance(run, Trajectory):
         return run.name or default
     return Path(run).name if Path(run).suffix.lower() in FORMATS else str(run)

@@ -73,7 +73,11 @@ def load(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> Loaded:
-    """Return a system with a scenario, values and calibrations applied. Raises SpecError."""
+    """Return a checked system with a checked scenario, both by name or path.
+
+    `calibrations` and then `values` (`instance.parameter` or `parameter`) replace parameter values
+    of the system. Raises SpecError.
+    """
     project = Project(root or Path())
     parsed_system = read_system(
         load_calibrated_document(system, project, calibrations), project, parse_values(values)
@@ -96,9 +100,11 @@ def simulate(
     """Return the trajectory of a system or automaton in a scenario.
 
     `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of scipy.
-    `reference` uses scipy (DOP853) and the gains of filterpy, independently of the engine.
-    `compiled` uses C, which has the same bits; None uses C for long runs only. The log names the
-    back end. Raises ValueError and SpecError.
+    `reference` simulates independently of the engine, with scipy (DOP853 unless another method of
+    scipy is named) and the gains of filterpy. `compiled` uses C, which has the same bits; True
+    falls back to the interpreter with a warning in the log, None uses C from COMPILE_THRESHOLD
+    steps on, False never. It is ignored for methods of scipy. Raises ValueError for an unknown
+    method, and SpecError.
     """
     if method not in METHODS:
         raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
@@ -116,7 +122,7 @@ def simulate(
 
 
 def program(reference: str, values: Values | None = None, root: Path | None = None) -> Program:
-    """Return the Program of an automaton. Raises SpecError."""
+    """Return the Program of an automaton with `values` applied. Raises SpecError."""
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
     return program_of(automaton_of(document, project, parse_values(values)))
@@ -137,10 +143,12 @@ def lockstep(
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate a system, run the C of each instance on the same inputs and compare all bits.
 
-    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator, which also counts
-    instructions. `numbers` replaces the number type of each instance. `changes` are calibration
-    pages such as `1.5 s: k_hs = 6000 N*m/rad` instead of those of the scenario. Raises SpecError
-    and MissingToolError.
+    Returns the trajectory and one verdict for each instance; one that was not compared has a note,
+    and a difference is not raised. `target` is where the C runs: `host`, or `cortex-m4f` in an
+    emulator, which also counts instructions. `numbers` replaces the number type of each instance.
+    `changes` are calibration pages such as `1.5 s: k_hs = 6000 N*m/rad`; if there are any, they
+    replace those of the scenario. `compiler` is a C compiler instead of the default, `optimise` its
+    level. Raises SpecError, MissingToolError and BuildError.
     """
     loaded = load(system, scenario, values, root, calibrations)
     if numbers:
@@ -173,11 +181,12 @@ def replay(
     compiled: bool = True,
     calibrations: Sequence[str] = (),
 ) -> Replayed:
-    """Replay a recording through a sampled automaton, in lock-step with its C unless not
-    `compiled`.
+    """Replay a recording through a sampled automaton and compare it with its C in lock-step.
 
-    `map` relates columns to signals; `variant` is an overlay of the automaton. Raises SpecError and
-    MissingToolError.
+    Without `compiled` the comparison is left out and the verdict is None. `map` relates columns of
+    the recording to signals; columns that the automaton does not use are in `left_out`. `variant`
+    is an overlay of the automaton. Raises SpecError, also for a continuous automaton and an input
+    without column, MissingToolError and BuildError.
     """
     automaton, used = _load_estimator(estimator, variant, values, root, calibrations)
     mapping = _load_map(map, root)

@@ -40,26 +40,31 @@ class TestRun:
 
     @property
     def passed(self) -> bool:
-        """Return whether all expectations are met, the run did not stop, and C gave the same
-        run.
-        """
+        """Whether all expectations are met, the run did not stop early, and C gave the same run."""
         all_passed = all(outcome.passed for outcome in self.outcomes)
         return all_passed and not self.difference and self.stopped is None
 
 
 def find_tests(root: Path | None = None) -> list[str]:
-    """Return the files of all tests of a project in the order of their paths."""
+    """Return the paths of all YAML files below `spec/` that contain a test, sorted by path.
+
+    These are files with a line `test: name` without indentation in their first 64 KiB; they are not
+    parsed.
+    """
     return [str(path) for path in spec_files(root or Path()) if _is_test(path)]
 
 
 def load_test(reference: str, root: Path | None = None) -> Test:
-    """Return a test by name or path. Raises SpecError with all problems."""
+    """Return a test by name or path. Raises SpecError with all its problems."""
     project = Project(root or Path())
     return read_test(project.read(project.path_of(reference)), project)
 
 
 def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:
-    """Return tests by name or path. Raises SpecError with the problems of all of them."""
+    """Return tests by name or path in the given order.
+
+    Raises SpecError with the problems of all of them after all were read.
+    """
     problems, tests = Problems(), []
     for reference in references:
         with problems.collect_errors():
@@ -71,9 +76,11 @@ def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test
 def run_tests(
     references: Sequence[str] = (), root: Path | None = None, *, compiled: bool = True
 ) -> Iterator[TestRun]:
-    """Yield the result of each test; without references of all tests of the project.
+    """Yield the result of each test; without references, of all tests of the project.
 
-    Raises SpecError before any test runs, and MissingToolError without a compiler.
+    All tests are read before the first one runs. `compiled` also runs them in C. Raises SpecError,
+    also if the project has no test, and MissingToolError without a compiler; a failed test is a
+    result.
     """
     named = list(references) or find_tests(root)
     if not named:
@@ -88,7 +95,8 @@ def run_tests(
 def run_test(test: Test, *, compiled: bool = True) -> TestRun:
     """Return the result of a test on the engine and, if `compiled`, in C.
 
-    Raises MissingToolError.
+    The difference to C is the first one among outcomes, stop, events and signals (exact values).
+    Raises MissingToolError and BuildError.
     """
     start = time.perf_counter()
     trajectory = simulate(test.system, test.scenario)

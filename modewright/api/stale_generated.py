@@ -14,7 +14,11 @@ MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
 
 
 def generated_files(root: Path) -> dict[Path, bytes]:
-    """Return the bytes of each file that belongs below `generated/`. Raises SpecError."""
+    """Return the bytes of each file that belongs below `generated/`, by path.
+
+    The C of each automaton in `spec/<folder>/` belongs in `generated/<folder>/`; other kinds of
+    specs are skipped. Writes no file. Raises SpecError.
+    """
     project = Project(root)
     files: dict[Path, bytes] = {}
     for path in spec_files(root):
@@ -29,7 +33,11 @@ def generated_files(root: Path) -> dict[Path, bytes]:
 
 
 def stale_files(root: Path) -> list[str]:
-    """Return one line for each missing, different or superfluous file below `generated/`."""
+    """Return one line for each missing, different or superfluous file below `generated/`.
+
+    A line is `path: reason`. Superfluous are `*.h` and `*.c` that no spec generates; they come
+    last. Empty if all is up to date. Raises SpecError.
+    """
     expected = generated_files(root)
     present = {path for path in (root / "generated").rglob("*.[ch]") if path.is_file()}
     lines = []

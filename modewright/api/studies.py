@@ -56,13 +56,15 @@ def sweep(
     cluster: str | None = None,
     credentials: Credentials | None = None,
 ) -> StudyRun:
-    """Run a study into a folder, or continue it; finished blocks are always kept.
+    """Run a study into the folder `out`, or continue it there; finished blocks are always kept.
 
-    `workers` is the number of processes (default: all cores; 1: this process). `cluster` is
-    `local:4` or the address of a Dask scheduler, with `credentials` for TLS. `block` is the number
-    of variants that are stored at once; `samples` and `seed` replace those of the study. `warn` is
-    called with warnings of the study and with damaged blocks; by default these are Python warnings.
-    Raises SpecError, ValueError, ClusterError, MissingToolError and OutputError.
+    `values` are parameter values that the study does not set. `workers` is the number of processes
+    (default: all cores; 1: this process); `executor` replaces them. `cluster` is `local:4` or the
+    address of a Dask scheduler, with `credentials` for TLS, and takes precedence. `block` is the
+    number of variants that are stored at once; `samples` and `seed` replace those of the study.
+    `progress` is called with the finished variants. `warn` is called with warnings of the study and
+    with damaged blocks; by default these are Python warnings. Raises SpecError, ValueError,
+    ClusterError, MissingToolError and OutputError.
     """
     place = parse_address(cluster) if cluster else None
     if place and place.count:
@@ -136,19 +138,31 @@ def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Exec
 
 
 def study_summary(out: str | Path) -> Summary:
-    """Return the summary of the results in the folder of a study. Raises SpecError."""
+    """Return the summary of the results in the folder of a study, which may be incomplete.
+
+    Nothing is simulated. Raises SpecError if the folder has no results or a damaged block, and
+    MissingToolError without pyarrow.
+    """
     return summary_of(read_store(Path(out)))
 
 
 def study_pictures(out: str | Path) -> dict[str, Picture]:
-    """Return the plots of a study by name, from the results in its folder. Raises SpecError."""
+    """Return the plots that a study defines, by name, from the results in its folder.
+
+    No file is written. Raises SpecError if the folder has no results or a damaged block, and
+    MissingToolError without pyarrow.
+    """
     from sweep.analysis.plots import draw_pictures
 
     return draw_pictures(read_store(Path(out)))
 
 
 def sensitivity(out: str | Path) -> Sensitivity:
-    """Return the sensitivity indices of the random variables of a study. Raises SpecError."""
+    """Return the sensitivity indices of the random variables of a study, from its stored results.
+
+    Only finished variants count. Raises SpecError if the study was not sampled by `saltelli` or
+    `morris` and if the folder has no results or a damaged block; MissingToolError without pyarrow.
+    """
     from sweep.analysis.sensitivity import sensitivity_of
 
     return sensitivity_of(read_store(Path(out)))

@@ -21,7 +21,11 @@ from modewright.diagram.diagram import Diagram, graph
 
 
 def coverage_lines(coverage: Coverage) -> Iterator[str]:
-    """Yield the lines of a coverage report: the counts, then what is not covered."""
+    """Yield the lines of a coverage report: the counts, then what is not covered.
+
+    The first line is `name: 3 of 4 modes, ... (MC/DC)`; each line about a missed item is indented
+    by two blanks.
+    """
     counts = coverage.count()
     counts_text = ", ".join(f"{done} of {total} {what}" for what, (done, total) in counts.items())
     yield f"{coverage.name}: {counts_text} (MC/DC)"
@@ -29,7 +33,11 @@ def coverage_lines(coverage: Coverage) -> Iterator[str]:
 
 
 def coverage_json(coverage: Coverage) -> dict[str, Any]:
-    """Return the coverage of an automaton as a dict for JSON."""
+    """Return the coverage of an automaton as a dict for JSON.
+
+    The keys are automaton, file, counts (reached and of), modes (key, entered) and transitions
+    (key, taken, outcomes, conditions).
+    """
     return {
         "automaton": coverage.name,
         "file": coverage.automaton.span.source.name,
@@ -42,14 +50,18 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
 
 
 def coverage_diagram(coverage: Coverage, root: Path | None = None) -> Diagram:
-    """Return the diagram of an automaton shaded by coverage. Raises SpecError."""
+    """Return the diagram of the covered automaton, read again from its file, shaded by coverage.
+
+    Raises SpecError.
+    """
     return shade_diagram(graph(coverage.automaton.span.source.name, root), coverage)
 
 
 def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton shaded by the coverage of the project's tests.
 
-    Raises SpecError, also if no test runs the automaton.
+    The tests whose system has an instance of the automaton are run on the engine and their
+    coverages merged. Raises SpecError, also if there is no such test.
     """
     diagram = graph(reference, root)
     tests = load_tests(find_tests(root), root)
@@ -65,7 +77,12 @@ def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagra
 
 
 def shade_diagram(diagram: Diagram, coverage: Coverage) -> Diagram:
-    """Return a diagram whose modes and transitions are shaded by a coverage."""
+    """Return a diagram whose modes and transitions are shaded by a coverage.
+
+    A mode is `covered` if it was entered, else `missed`. A transition is `missed` if it was never
+    taken, `part` if a condition is not covered by MC/DC, else `covered`; its label gets a line `?
+    condition` for each such condition. Arrows without a decision in the coverage do not change.
+    """
     entered = {names_of(key) for key in coverage.modes}
     decisions = {names_of(decision.key): decision for decision in coverage.decisions}
     return dataclasses.replace(

@@ -36,8 +36,10 @@ def trace(
 ) -> RequirementTrace:
     """Return the requirements that specs, their C and the tests of the project name.
 
-    A system includes the automata of its instances. `listed` is a CSV file of requirements with
-    texts; with `run` the tests are run. Raises SpecError and MissingToolError.
+    A system includes the automata of its instances and their models. Only tests that run one of
+    these specs count. `listed` is a CSV file of requirements with texts, which come first and are
+    included if nothing names them. With `run` the tests are run on engine and C; else they have no
+    verdicts. Raises SpecError and MissingToolError.
     """
     project = Project(root or Path())
     documents = _load_documents(specs, project)
@@ -67,9 +69,10 @@ class KeyTraceReport:
 
 
 def trace_keys(specs: Sequence[str], root: Path | None = None) -> KeyTraceReport:
-    """Return the lines of C that come from each key of the specs; a system includes its automata.
+    """Return the lines of C that come from each key of the specs.
 
-    Raises SpecError.
+    A system includes the automata of its instances and their models; an automaton alone only its
+    own C. The texts of ha_math are left out of `code`. Raises SpecError.
     """
     project = Project(root or Path())
     documents = _load_documents(specs, project)
@@ -86,9 +89,11 @@ def trace_keys(specs: Sequence[str], root: Path | None = None) -> KeyTraceReport
 
 
 def read_requirements(path: Path | None) -> dict[str, str]:
-    """Return the requirements of a CSV file: name in the first column, text in the second.
+    """Return the requirements of a CSV file as texts by name.
 
-    A first row of headings is skipped; None as path gives an empty dict. Raises SpecError.
+    The name is in the first column, the text in the second (empty if there is none); rows without
+    name are skipped. A first row is skipped if its first cell is one of HEADINGS in any case. None
+    as path gives an empty dict. Raises SpecError if the file cannot be read.
     """
     if path is None:
         return {}
