@@ -56,9 +56,10 @@ MULTI_VALUE_OPTIONS = ("--train", "--held-out")
 
 
 def expand_arguments(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments with such an option inserted before each of its values.
+    """Return the arguments with the option inserted before each further value of it.
 
-    Unchanged if the first argument of the command is an option, because the positional argument
+    This holds for MULTI_VALUE_OPTIONS: `--train a b` becomes `--train a --train b`. The arguments
+    are unchanged if the second one begins with `-`, because the positional argument of the command
     could then be among the values.
     """
     if len(arguments) < 2 or arguments[1].startswith("-"):
@@ -86,9 +87,11 @@ COMMANDS = (
 
 
 def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
-    """Return the application; given the arguments, with full parameters only for named commands.
+    """Return the application with all COMMANDS and the groups `recording` and `calibration`.
 
-    The inspection of parameters is slow, so other commands have their name and help only.
+    Given the arguments of the command line, only commands that are named in them have their
+    parameters; the others are stubs with name and help, because the inspection of parameters is
+    slow. None gives all commands their parameters.
     """
     typer_app = typer.Typer(
         no_args_is_help=True,
@@ -107,7 +110,10 @@ def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
 
 
 def command_stub(command: Callable[..., None]) -> Callable[[], None]:
-    """Return a function with the name and the help of a command but without parameters."""
+    """Return a function with the name and the docstring of a command but without parameters.
+
+    A call raises AssertionError; it serves for the list of commands only.
+    """
 
     def stub() -> None:
         raise AssertionError(f"{command.__name__} has no parameters")
@@ -136,7 +142,11 @@ app = build_application()
 
 
 def main() -> None:
-    """Run the command line and exit with its exit code."""
+    """Run the command line on `sys.argv` and exit with its exit code.
+
+    Missing stdout and stderr are replaced by the null device. After an interrupt further ones are
+    ignored during the exit.
+    """
     raise_gc_threshold()
     logging.raiseExceptions = False  # do not stop if the log cannot be written
     for name in ("stdout", "stderr"):

@@ -26,7 +26,11 @@ log = logging.getLogger("modewright")
 
 @cache
 def console() -> Console:
-    """Return the console for stdout, without colours in pipes and under NO_COLOR."""
+    """Return the console for stdout, the same one at each call.
+
+    It has no colours in pipes and under NO_COLOR. Its width is PIPE_WIDTH if stdout is no terminal
+    and COLUMNS is not set.
+    """
     from rich.console import Console  # deferred: the import is slow and --help does not need it
 
     has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
@@ -34,7 +38,12 @@ def console() -> Console:
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
-    """Set the verbosity: --quiet prints problems only, --verbose each step; --log-file gets all."""
+    """Set the verbosity of console and log.
+
+    `quiet` suppresses the output of the console. `verbose` writes the log to stderr, and `log_file`
+    appends it to a file with UTC times, which begins with the command; else only warnings are
+    logged, to nowhere. Handlers of an earlier call are removed.
+    """
     if quiet or console.cache_info().currsize:
         console().quiet = quiet
     for handler in list(log.handlers):
@@ -54,7 +63,11 @@ def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None 
 
 @contextmanager
 def progress_spinner(description: str) -> Iterator[None]:
-    """Show a spinner with the elapsed time on a terminal; log the duration at the end."""
+    """Show a spinner with the elapsed time on stderr; log the duration at the end.
+
+    The spinner is hidden if stderr is no terminal or the console is quiet. No duration is logged
+    after an exception.
+    """
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -70,10 +83,12 @@ def progress_spinner(description: str) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Show a progress bar with rate and remaining time on a terminal; elsewhere print lines.
+    """Show a progress bar with rate and remaining time on stderr; elsewhere print lines.
 
-    Yields a function of three numbers: finished, finished before the start, and total. Lines are
-    printed each REPORT_INTERVAL.
+    Yields a function of three numbers: finished, finished before the start, and total; the rate
+    counts `noun` per second without those before the start. If stderr is no terminal, a line is
+    printed at most each REPORT_INTERVAL; nothing if the console is quiet. The duration is logged at
+    the end.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -109,7 +124,7 @@ def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, in
 
 
 def report_written_files(files: Sequence[Path]) -> None:
-    """Print and log the paths of written files."""
+    """Print and log a line `wrote path` for each path, in the given order."""
     for path in files:
         log.info("wrote %s", path)
         console().print(f"wrote {path}", highlight=False, soft_wrap=True)

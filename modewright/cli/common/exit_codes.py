@@ -30,7 +30,13 @@ modewright (one line and a report file); 130 interrupted."""
 
 
 def run_with_exit_code(run: Callable[[], object]) -> int:
-    """Run a command line and return its exit code; messages of exceptions go to stderr."""
+    """Run a command line and return its exit code; messages of exceptions go to stderr.
+
+    The code is the int that `run` returns, else DONE. A usage error gives USAGE, Ctrl-C
+    INTERRUPTED, typer.Exit its own code. SpecError, OutputError, ClusterError and an OSError of
+    USER_ERRNOS give PROBLEMS, MissingToolError gives TOOL. A closed pipe on stdout gives DONE. Any
+    other Exception gives DEFECT and writes a report file.
+    """
     try:
         code = run()
         _flush_stdout()
@@ -96,7 +102,11 @@ def _discard_output() -> int:
 
 
 def report_problems(error: SpecError) -> None:
-    """Print the problems of a SpecError and the number of errors to stderr."""
+    """Print the problems of a SpecError, sorted by place, and the number of errors to stderr.
+
+    At most MAX_SHOWN problems are printed, with the number of the others; the count at the end
+    includes all errors but no warnings.
+    """
     problems = sort_problems(error.problems)
     count = sum(problem.severity == "error" for problem in problems)
     print(render_all(problems[:MAX_SHOWN]), file=sys.stderr)

@@ -14,9 +14,10 @@ GRACE_PERIOD = 15.0
 
 @contextmanager
 def debounce_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt at the first Ctrl-C and ignore others for GRACE_PERIOD.
+    """Raise KeyboardInterrupt at the first Ctrl-C in the context; ignore others for GRACE_PERIOD.
 
-    This does nothing outside the main thread or with another handler of SIGINT.
+    A Ctrl-C after this time raises again. The default handler is restored at the end. This does
+    nothing outside the main thread or with another handler of SIGINT.
     """
     is_ours = threading.current_thread() is threading.main_thread()
     if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

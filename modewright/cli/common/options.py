@@ -50,7 +50,11 @@ Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 
 def values_of(sets: Sequence[str] | None) -> dict[str, str]:
-    """Return the values of --set by parameter. Raises BadParameter."""
+    """Return the values of --set (`parameter=value`, split at the first `=`) by parameter.
+
+    Blanks around both are removed; the last value of a parameter counts; None gives an empty dict.
+    Raises BadParameter for a text without name, `=` or value.
+    """
     found = {}
     for text in sets or []:
         name, equals, value = text.partition("=")
@@ -61,7 +65,10 @@ def values_of(sets: Sequence[str] | None) -> dict[str, str]:
 
 
 def span_of(start: float | None, end: float | None) -> tuple[float, float] | None:
-    """Return the time window [s] of --from and --to; None without both. Raises BadParameter."""
+    """Return the time window [s] of --from and --to; None without both.
+
+    A missing end is infinite. Raises BadParameter unless start < end.
+    """
     if start is None and end is None:
         return None
     span = (-math.inf if start is None else start, math.inf if end is None else end)
@@ -80,9 +87,10 @@ def usage_errors() -> Iterator[None]:
 
 
 def calibration_title(out: Path | None, name: str | None, date: str) -> str:
-    """Return the name of a calibration: --name, the stem of the file, or `fitted`.
+    """Return the name of a new calibration: `name`, else the stem of the file `out`, else `fitted`.
 
-    Raises OutputError if the file cannot be written, and BadParameter for an invalid name or date.
+    Raises OutputError if `out` does not end in .yaml, is another kind of spec or cannot be written;
+    BadParameter for an invalid name and for a non-empty date that is not like `2026-11-21`.
     """
     from language.expressions.name_rules import NAME_PATTERN
     from language.overlays.calibration import DATE
@@ -100,20 +108,29 @@ def calibration_title(out: Path | None, name: str | None, date: str) -> str:
 
 
 def require_run_format(path: Path | None) -> None:
-    """Raise OutputError for a run file that is neither .csv nor .parquet."""
+    """Raise OutputError for a run file that ends neither in .csv nor in .parquet, in any case.
+
+    None is accepted.
+    """
     if path and path.suffix.lower() not in (".csv", ".parquet"):
         raise OutputError(f"{path}: a run ends with .csv or .parquet")
 
 
 def picture_format(path: Path) -> str:
-    """Return the format of a figure by its suffix. Raises OutputError for unknown ones."""
+    """Return the format of a figure, `png`, `svg` or `pdf`, by the suffix of its path in any case.
+
+    Raises OutputError for other suffixes.
+    """
     if path.suffix.lower() not in GRAPHIC_FORMATS:
         raise OutputError(f"{path}: a picture ends with {', '.join(GRAPHIC_FORMATS)}")
     return path.suffix.lower()[1:]
 
 
 def exit_if_failed(failed: bool, trajectory: Trajectory) -> None:
-    """Print latched faults and the reason of a stop; exit with code 1 if `failed`."""
+    """Print latched faults and the reason of a stop to stderr; exit with code PROBLEMS if `failed`.
+
+    Faults and a stop alone do not change the exit code.
+    """
     for fault in trajectory.faults:
         print(f"warning: a fault bit is set: {fault}", file=sys.stderr)
     if trajectory.stopped:

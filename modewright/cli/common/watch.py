@@ -20,7 +20,11 @@ def wait_for_poll() -> None:
 def watch_changes(
     folders: Collection[Path], wait: Callable[[], None] | None = None
 ) -> Iterator[list[Path]]:
-    """Yield the files that were written, created or removed, whenever there are any; never ends."""
+    """Yield the YAML files that were written, created or removed, sorted; never ends.
+
+    The first comparison is with the state at the first `next`. Between two comparisons it calls
+    `wait` (default: sleep for POLL_INTERVAL). Without changes nothing is yielded.
+    """
     before = read_stamps(folders)
     while True:
         (wait or wait_for_poll)()
@@ -32,7 +36,10 @@ def watch_changes(
 
 
 def read_stamps(folders: Collection[Path]) -> FileStamps:
-    """Return modification time [ns] and size of each YAML file below the folders."""
+    """Return modification time [ns] and size of each file `*.yaml` below the folders, at any depth.
+
+    Files that disappear meanwhile are left out.
+    """
     found: FileStamps = {}
     for folder in folders:
         for path in folder.rglob("*.yaml"):
@@ -45,7 +52,10 @@ def read_stamps(folders: Collection[Path]) -> FileStamps:
 
 
 def spec_folders(names: Collection[str]) -> list[Path]:
-    """Return the folders to watch: `spec/`, and the folders of named files outside it."""
+    """Return the folders to watch: `spec/`, then the folders of the named files outside it, sorted.
+
+    Names that do not end in .yaml are names of specs and add no folder.
+    """
     named = {Path(name).parent for name in names if name.endswith(".yaml")}
     inside = [folder for folder in sorted(named) if Path("spec") not in (folder, *folder.parents)]
     return [Path("spec"), *inside]
