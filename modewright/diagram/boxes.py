@@ -38,7 +38,7 @@ class ModeBox:
 
     @property
     def name(self) -> str:
-        """The name without the path."""
+        """The last key of the path."""
         return self.path[-1]
 
 
@@ -52,9 +52,11 @@ class RegionBox:
 
 
 def lift_arrow(arrow: Arrow) -> Arrow:
-    """Return an arrow between the enclosing modes of both ends that are in the same region.
+    """Return the arrow between the enclosing modes of both ends that are in the same region.
 
-    The label names an end that is inside the enclosing mode (`from`, `to`).
+    The path of an end is cut one key behind the common prefix of both paths. An end that is inside
+    such a mode is named in a line before the label: `from a.b`, `to a.b` (without the cut path). An
+    arrow within one region does not change.
     """
     depth = 0
     for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):

@@ -28,13 +28,13 @@ class Diagram:
     arrows: tuple[Arrow, ...]
 
     def mermaid(self) -> str:
-        """Return the diagram as Mermaid text for Markdown."""
+        """Return the diagram as Mermaid text (`stateDiagram-v2`) for Markdown; without coverage."""
         from modewright.diagram.mermaid import render_mermaid
 
         return render_mermaid(self.name, self.regions, self.arrows)
 
     def svg(self) -> str:
-        """Return the diagram as an SVG document."""
+        """Return the diagram as an SVG document; shades of test coverage are shown as colours."""
         from modewright.diagram.svg import render_svg
 
         return render_svg(self.name, self.regions, self.arrows)
@@ -47,7 +47,9 @@ class Diagram:
 def diagram_of(document: Document) -> Diagram:
     """Return the diagram of the expanded document of an automaton.
 
-    The automaton must be valid, so that all targets exist.
+    Templates and transition tables are expanded first. There is an arrow for each target of a
+    transition, and one from a mode to itself for an internal transition; unknown targets are
+    skipped, because the automaton is expected to be valid.
     """
     templates = document.root.get("templates")
     root = (
@@ -188,7 +190,10 @@ def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> Mod
 
 
 def graph(reference: str, root: Path | None = None) -> Diagram:
-    """Return the diagram of an automaton. Raises SpecError with all its problems."""
+    """Return the diagram of an automaton given by name or path, as the expanded spec writes it.
+
+    Raises SpecError with all its problems if it is no valid automaton.
+    """
     from language.loading.load import automaton_of
     from language.overlays.expand_document import Project, expand_document, read_document
 

@@ -21,14 +21,19 @@ ModeKind = Literal["", "final", "history"]
 
 
 def mode_kind_of(mode: MappingNode) -> ModeKind:
-    """Return the kind of a mode according to its keys."""
+    """Return `history` for a mode with that key, `final` for `final: true`, else an empty text."""
     if mode.get("history") is not None:
         return "history"
     return "final" if node_text(mode.get("final")) == "true" else ""
 
 
 def label_lines(transition: MappingNode) -> Iterator[str]:
-    """Yield the lines of a transition's label: priority, event, guard, wait, resets, other keys."""
+    """Yield the lines of a transition's label: condition, wait, resets, other keys.
+
+    The first line is `(priority) on event and guard` with the parts that exist, empty without any;
+    then `for wait`, `/ name = value` for each reset, and `/ key: value` for raise, history, memory,
+    internal and rewind. Lines are broken at LABEL_WIDTH.
+    """
     when, event = node_text(transition.get("when")), node_text(transition.get("event"))
     priority = node_text(transition.get("priority"))
     start = f"({priority}) " if priority else ""
@@ -47,9 +52,11 @@ def label_lines(transition: MappingNode) -> Iterator[str]:
 
 
 def mode_lines(node: YamlNode) -> list[str]:
-    """Return the lines of a mode: equations, updates, entry, exit, flow, observer; truncated.
+    """Return the lines of a mode; an empty list if the node is no mapping.
 
-    Return an empty list for other nodes.
+    The order is: history or final, equations, update, entry, exit, flow, observer and run. Lines
+    are broken at LABEL_WIDTH. Of more than MAX_MODE_LINES lines the last ones are replaced by
+    `...`.
     """
     if not isinstance(node, MappingNode):
         return []
@@ -94,7 +101,11 @@ def _wrap_text(text: str) -> list[str]:
 
 
 def node_text(node: YamlNode | None) -> str:
-    """Return a node as one line of text; empty for None."""
+    """Return a node as one line of text; empty for None.
+
+    Items of lists are separated by `, `, entries of mappings are `key value`; runs of white space
+    become one blank and invisible characters escapes.
+    """
     if isinstance(node, ScalarNode):
         return escape_invisible(" ".join(node.text.split()))
     if isinstance(node, MappingNode):

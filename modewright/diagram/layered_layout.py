@@ -65,9 +65,11 @@ class _Item:
 def compute_layout(
     boxes: Sequence[Size], edges: Sequence[Edge], top_margins: Sequence[float] = ()
 ) -> Layout:
-    """Return the layout of boxes and of edges between different boxes; the first box is the start.
+    """Return the layout of boxes and of labelled edges in columns from left to right.
 
-    `boxes` are sizes [px]. Edges do not end in the upper `top_margins` [px] of a box.
+    `boxes` are sizes [px]; the first box is the start and is in the first column. `edges` connect
+    different boxes by index. Edges do not end in the upper `top_margins` [px] of a box (none if
+    empty). Without boxes the size is (0, 0).
     """
     backward = _find_backward_edges(len(boxes), edges)
     ranks = _assign_ranks(len(boxes), edges, backward)

@@ -16,9 +16,10 @@ KIND_MARKS = {"history": "(H) "}
 
 
 def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...]) -> str:
-    """Return regions as Mermaid text.
+    """Return regions as Mermaid text `stateDiagram-v2` with a final line feed.
 
-    A transition appears in the region that contains both ends.
+    One region is drawn directly; several are parallel in a state with the label `name`. A
+    transition appears in the innermost region that contains both ends. Shades are not shown.
     """
     lines = ["stateDiagram-v2", "    direction LR"]
     if len(regions) == 1:
@@ -31,7 +32,11 @@ def render_mermaid(name: str, regions: tuple[RegionBox, ...], arrows: tuple[Arro
 
 
 def identifier_of(path: ModePath) -> str:
-    """Return the Mermaid identifier of a mode, made of its path."""
+    """Return the Mermaid identifier of a mode: the keys of its path joined with `__`.
+
+    Characters other than ASCII letters, digits and `_` become `_`; `_` is appended to a word of
+    RESERVED. Different paths may have the same identifier.
+    """
     name = re.sub(r"\W", "_", "__".join(path), flags=re.ASCII)
     return name + "_" if name in RESERVED else name
 

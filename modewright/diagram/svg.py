@@ -52,7 +52,12 @@ def _escape_xml(text: str) -> str:
 
 
 def render_svg(name: str, regions: Sequence[RegionBox], arrows: Sequence[Arrow]) -> str:
-    """Return the regions and arrows of a diagram as an SVG document."""
+    """Return the regions and arrows of a diagram as an SVG document with a final line feed.
+
+    Regions are below each other, several ones in frames; in each the modes are in columns from left
+    to right, the initial one first. If an arrow has a shade, a legend of test coverage follows the
+    title `name`.
+    """
     drawn = _draw_regions(regions, arrows)
     title = CHARACTER_WIDTH * 1.2 * len(name)
     if any(arrow.shade for arrow in arrows):
