@@ -23,9 +23,10 @@ COMMENT_GAP = 2
 
 
 def strip_blanks(text: str) -> str:
-    """Return a text without trailing blanks and without consecutive blank lines.
+    """Return a text without trailing blanks and tabs, and with single blank lines.
 
-    Lines inside multi-line values do not change.
+    Blank lines at the start and the end are removed; the text ends with one line feed. Lines inside
+    multi-line values do not change.
     """
     tokenised = tokenise(text)
     result: list[str] = []
@@ -39,9 +40,11 @@ def strip_blanks(text: str) -> str:
 
 
 def indent_blocks(text: str) -> str:
-    """Return a text whose blocks are indented by two blanks for each level.
+    """Return a text whose blocks are indented by INDENTATION blanks for each level.
 
-    Continuation lines move with the line on which their value starts.
+    Continuation lines move with the line on which their value starts. A comment line moves with the
+    line below it, or with the line above if it is indented more than the line below. A comment
+    behind a value keeps its column if COMMENT_GAP blanks fit before it.
     """
     tokenised = tokenise(text)
     shifts = _line_shifts(tokenised)
@@ -89,7 +92,9 @@ def _comment_shift(tokenised: TokenisedText, number: int, shifts: dict[int, int]
 def space_tokens(text: str) -> str:
     """Return a text with normalised blanks inside brackets and after the dashes of lists.
 
-    Columns of tables are preserved.
+    There is no blank inside brackets at both ends and before a comma or colon, and one after a
+    comma, a dash, and a colon in brackets. Several blanks after a comma are preserved if the item
+    starts in the same column as a token of the line above or below.
     """
     tokenised = tokenise(text)
     lines = list(tokenised.lines)
@@ -126,7 +131,12 @@ def _is_in_column(left: Token, right: Token, starts: set[tuple[int, int]]) -> bo
 
 
 def align_values(text: str) -> str:
-    """Return a text whose values are aligned where the author aligned some of them."""
+    """Return a text whose values are aligned where the author aligned some of them.
+
+    This is done in groups of consecutive lines `key: value` of the same level. A group counts as
+    aligned if two of its values start in the same column after more than one blank; the column is
+    moved left or right if a value does not fit. In other groups one blank follows each colon.
+    """
     tokenised = tokenise(text)
     lines = list(tokenised.lines)
     for group in _iter_entry_groups(tokenised):

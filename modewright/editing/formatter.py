@@ -23,10 +23,12 @@ BYTE_ORDER_MARK = "\ufeff"
 
 
 def format_text(text: str, name: str = "") -> str:
-    """Return the formatted text of a spec. Raises SpecError if it is no valid YAML of the language.
+    """Return the formatted text of a spec, with the layout that the module describes.
 
-    A pass that would change the content is skipped. Byte order mark and line ends (of the first
-    line) are preserved.
+    Passes are repeated up to MAX_ROUNDS times; a pass that would change keys, values, quotes or
+    comments is skipped. A byte order mark is preserved; all line ends become those of the first
+    line. `name` is the name of the file in problems. Raises SpecError if the text is no valid YAML
+    of the language.
     """
     result = _run_passes(text.removeprefix(BYTE_ORDER_MARK).replace("\r\n", "\n"), name)
     if text.partition("\n")[0].endswith("\r"):

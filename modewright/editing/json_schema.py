@@ -44,9 +44,9 @@ JsonSchema = dict[str, Any]
 
 
 def json_schema(kind: str | None = None) -> JsonSchema:
-    """Return the JSON Schema of one kind of file, or of all.
+    """Return the JSON Schema (draft-07) of one of DOCUMENT_KINDS, or for None of all of them.
 
-    Raises ValueError for unknown kinds.
+    It contains the definitions to which it refers only. Raises ValueError for unknown kinds.
     """
     if kind is not None and kind not in DOCUMENT_KINDS:
         raise ValueError(f"`{kind}` is not one of {', '.join(DOCUMENT_KINDS)}")
@@ -79,7 +79,10 @@ def _kind_condition(name: str) -> JsonSchema:
 
 
 def schema_text(kind: str | None = None) -> str:
-    """Return the JSON Schema as text with a final line feed."""
+    """Return the schema of `json_schema` as indented text with a final line feed.
+
+    Raises ValueError for unknown kinds.
+    """
     return json.dumps(json_schema(kind), indent=1) + "\n"
 
 

@@ -102,7 +102,10 @@ COMMON_KEYS = (
 
 @cache
 def shapes() -> Mapping[str, Shape]:
-    """Return all shapes by name; the shape of a kind of file has the name of the kind."""
+    """Return all shapes by name, read from `key_shapes/*.yaml` at the first call and cached.
+
+    The shape of a kind of file has the name of the kind. Each shape with keys also has COMMON_KEYS.
+    """
     folder = files("modewright.editing") / "key_shapes"
     found: dict[str, Shape] = {}
     for file in sorted(folder.iterdir(), key=lambda file: file.name):
@@ -152,7 +155,9 @@ def _parse_key(name: str, text: str) -> Key:
 def parse_kind(text: str) -> ValueKind:
     """Return the kind of a text such as `list of name of mode | any literal or course`.
 
-    `or` separates the alternatives of items, ` | ` those of the whole value. Raises ValueError.
+    ` | ` separates the alternatives of the whole value, ` or ` those of items. A single word that
+    is not in VALUE_TYPES is the name of a shape, which need not exist. Raises ValueError for
+    another text of several words.
     """
     return _parse_alternatives(text.split(" | "))
 
@@ -187,7 +192,11 @@ def _parse_single_kind(words: list[str]) -> ValueKind:
 
 
 def alternatives_of(kind: ValueKind) -> Iterator[ValueKind]:
-    """Yield the alternatives of a kind, without nested alternatives."""
+    """Yield the alternatives of a kind, with those of an `Either` in it in its place.
+
+    A reference to a shape with `alternatives` yields references to these. Any other kind yields
+    itself.
+    """
     if isinstance(kind, Either):
         for each in kind.kinds:
             yield from alternatives_of(each)

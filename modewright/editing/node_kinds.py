@@ -35,12 +35,15 @@ class Place:
 
 
 def kind_of_file(root: MappingNode) -> str:
-    """Return the kind of a document according to its keys; empty if there is none."""
+    """Return the first key of a root that is one of DOCUMENT_KINDS; empty if there is none."""
     return next((entry.key for entry in root if entry.key in DOCUMENT_KINDS), "")
 
 
 def root_shape(kind: str) -> Shape | None:
-    """Return the shape of a whole file; a variant has the keys of all kinds that it may overlay."""
+    """Return the shape of a whole file of a kind; None for an unknown kind.
+
+    The shape of a variant has the keys of all kinds that it may overlay, except their head keys.
+    """
     shape = shapes().get(kind)
     if shape is None or not shape.overlay_kinds:
         return shape
@@ -53,9 +56,11 @@ def root_shape(kind: str) -> Shape | None:
 
 
 def places(root: MappingNode, base: str = "") -> Iterator[Place]:
-    """Yield all nodes of a document with their expected kinds, parents first.
+    """Yield the nodes of a document whose kind is known, with this kind, parents first.
 
-    `base` is the kind of the base of a variant, if known.
+    Nodes below unknown keys are left out; nothing is yielded for a document of unknown kind. `base`
+    is the kind of the base of a variant, whose keys are then expected; without it those of all
+    kinds.
     """
     kind = kind_of_file(root)
     shape = root_shape(kind)
@@ -89,7 +94,11 @@ def _iter_below(path: tuple[str, ...], node: YamlNode, kind: ValueKind) -> Itera
 
 
 def select_alternative(node: YamlNode, kind: ValueKind) -> ValueKind:
-    """Return the alternative of a kind that fits a node best; the first one in case of a tie."""
+    """Return the alternative of a kind that fits a node best; the first one in case of a tie.
+
+    A fitting structure (scalar, list, mapping) counts most, then a word of a choice or the fraction
+    of known keys.
+    """
     options = list(alternatives_of(kind))
     return max(options, key=lambda option: _match_score(node, option))
 

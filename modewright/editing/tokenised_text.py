@@ -46,7 +46,7 @@ class TokenisedText:
 
     @property
     def first_tokens(self) -> dict[int, Token]:
-        """The first token of each line at which one starts."""
+        """The first token that starts on a line, by number of the line (from 0)."""
         tokens: dict[int, Token] = {}
         for token in self.tokens:
             tokens.setdefault(token.line, token)
@@ -55,7 +55,11 @@ class TokenisedText:
 
 @lru_cache(maxsize=4)
 def tokenise(text: str) -> TokenisedText:
-    """Return the tokenised form of a YAML text; the last four are cached."""
+    """Return the tokenised form of a YAML text; the last four results are cached.
+
+    A comment is a `#` behind the last token of a line, outside multi-line tokens. Raises
+    yaml.YAMLError for invalid YAML.
+    """
     lines = lines_of(text)
     tokens = tuple(_scan_tokens(text))
     inside = frozenset(
@@ -95,5 +99,5 @@ def _scan_tokens(text: str) -> Iterable[Token]:
 
 
 def join_lines(lines: Iterable[str]) -> str:
-    """Return lines as a text with a final line feed."""
+    """Return lines joined with line feeds, with a final line feed (also without lines)."""
     return "\n".join(lines) + "\n"

@@ -37,9 +37,12 @@ ORDERED_SECTIONS = {
 
 
 def describe_reordering(section: str, old: MappingNode, new: MappingNode) -> str:
-    """Return the effect of another order of the common keys of a section.
+    """Return the effect of another order of the keys that a section has in both specs.
 
-    The result is empty if there is none.
+    `section` is the key of the section, `old` and `new` are its nodes. For NUMBERED_SECTIONS the
+    number of a common key must change, also because a key was inserted before it; modes with an
+    explicit `number` do not count. The result is empty for the same order and for sections in which
+    the order has no effect.
     """
     before, after = _numbered_keys(section, old), _numbered_keys(section, new)
     both = [key for key in before if key in after]
@@ -66,7 +69,10 @@ def _numbered_keys(section: str, table: MappingNode) -> list[str]:
 
 
 def expand_templates(root: MappingNode) -> MappingNode:
-    """Return the tree of a spec with all templates applied to modes and removed."""
+    """Return the tree of a spec with its templates applied to all modes that are `like` one.
+
+    The keys `templates`, and `like` with a known template, are removed; an unknown `like` stays.
+    """
     templates = root.get("templates")
     known = templates if isinstance(templates, MappingNode) else MappingNode({}, root.span)
     made = _expand_node(without_keys(root, "templates"), known)
@@ -130,9 +136,11 @@ class SpecChange:
 
 
 def diff_documents(before: Document, after: Document) -> tuple[SpecChange, ...]:
-    """Return the differences of two expanded documents, grouped; texts come last.
+    """Return the differences of two expanded documents; empty if there are none.
 
-    Raises SpecError if the kinds differ.
+    They are grouped in the order of the first change of each group, with texts (`about`, `req`)
+    last. Templates are applied first; the names of the specs, the order of keys without effect and
+    the spelling of expressions do not count. Raises SpecError if the kinds differ.
     """
     if before.kind != after.kind:
         problems = Problems()

@@ -23,9 +23,12 @@ from language.text.project_files import Project
 
 @contextmanager
 def load_documents(*references: str) -> Iterator[list[Document]]:
-    """Yield expanded specs by name or file, with an optional prefix `REVISION:`.
+    """Yield the expanded specs in the given order, with the parameters of their models.
 
-    Bases and models come from the same revision. Raises SpecError.
+    A reference is the name or file of a spec below the working folder, or `REVISION:spec` for a
+    revision of Git; an existing file takes precedence. Bases and models come from the same
+    revision. Files of a revision are in a temporary folder until the context ends. Raises
+    SpecError, also if Git does not know the revision.
     """
     with tempfile.TemporaryDirectory() as folder:
         yield [

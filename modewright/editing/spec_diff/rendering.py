@@ -20,7 +20,11 @@ SIGNS = {"added": "+", "removed": "-", "changed": "~"}
 
 
 def diff_text(changes: Sequence[SpecChange]) -> str:
-    """Return the changes as lines of text by group; empty without changes."""
+    """Return the changes as text; empty without changes.
+
+    The summary is followed by a section for each group, with a line `sign title before -> after
+    (note)` for each change; signs are in SIGNS. Values are cut to MAX_VALUE_LENGTH.
+    """
     return "".join(f"{line}\n" for line in _diff_lines(changes))
 
 
@@ -56,7 +60,10 @@ def _shorten(text: str) -> str:
 
 
 def diff_summary(changes: Sequence[SpecChange]) -> str:
-    """Return the number of changed subjects of each group in one line."""
+    """Return the number of changed subjects of each group in one line.
+
+    The line is like `differs: parameters 2, modes 1`; several changes of one subject count once.
+    """
     things: dict[str, set[str]] = {}
     for change in changes:
         things.setdefault(change.group, set()).add(change.thing)
@@ -64,7 +71,7 @@ def diff_summary(changes: Sequence[SpecChange]) -> str:
 
 
 def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
-    """Return the changes as a dict for JSON."""
+    """Return the changes, with all fields and full values, as a dict for JSON."""
     return {
         **format_entry("diff"),
         "changes": [dataclasses.asdict(change) for change in changes],
@@ -72,7 +79,10 @@ def diff_json(changes: Sequence[SpecChange]) -> dict[str, Any]:
 
 
 def diff_html(changes: Sequence[SpecChange], before: str, after: str) -> str:
-    """Return the changes as a self-contained HTML page."""
+    """Return the changes as a self-contained HTML page.
+
+    `before` and `after` are the names of the specs in the title. Without changes the page says so.
+    """
     groups = [
         (group, list(members))
         for group, members in itertools.groupby(changes, lambda change: change.group)

@@ -47,7 +47,13 @@ class Subject:
 
 
 def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
-    """Return the subject of a path; None for a section."""
+    """Return the subject of a key path; None for a section, a region or a table of transitions.
+
+    Below a mode the groups are modes, transitions (title `mode -> target`), those of
+    MODE_SECTION_GROUPS (title `name in mode`) and `observers and runs`. At the root a key of
+    NAMED_SECTIONS is the group of its entries; other keys are in `settings`. Paths that end in
+    `about` or `req` are in TEXT_GROUP.
+    """
     subject = _find_subject(path, root)
     if subject and path[-1] in ("about", "req"):
         return Subject(TEXT_GROUP, subject.title, subject.aspect)
@@ -57,7 +63,8 @@ def subject_of(path: KeyPath, root: MappingNode) -> Subject | None:
 def is_section(path: KeyPath) -> bool:
     """Return whether a path leads to a section of named entries.
 
-    Sections are keys at the root, and `modes` and `regions` in modes and regions.
+    Sections are the keys at the root, and `modes` and `regions` in modes and regions; not other
+    sections of a mode, such as `transitions`.
     """
     return len(_split_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
 
