@@ -18,7 +18,11 @@ from modewright.lsp.workspace import Workspace
 
 
 async def run_background_check(workspace: Workspace, path: Path) -> list[types.Diagnostic] | None:
-    """Return all problems of a file; None if the process failed. Cancellation kills the process."""
+    """Return all problems of a file, also those of slow checks, computed in a new process.
+
+    The process gets the open texts of the workspace. None if it failed; its stderr is discarded.
+    Cancellation kills it.
+    """
     request = {
         "path": str(path),
         "root": str(workspace.root),
@@ -43,7 +47,7 @@ async def run_background_check(workspace: Workspace, path: Path) -> list[types.D
 
 
 def main() -> None:
-    """Answer one request."""
+    """Read one request (path, root, encoding, texts) as JSON and print its diagnostics as JSON."""
     request = json.loads(sys.stdin.read())
     texts = {Path(file): text for file, text in request["texts"].items()}
     path = Path(request["path"])

@@ -60,7 +60,13 @@ K = types.CompletionItemKind
 
 
 def complete(workspace: Workspace, path: Path, text: str, position: types.Position) -> list[Item]:
-    """Return the completions at a position, independent of the part of the word already written."""
+    """Return the completions at a position, independent of the part of the word already written.
+
+    The editor filters them by this part. These are keys, or values by the kind that is expected
+    there; restricted places, such as after `mode ==`, give the fitting names only. A dotted name is
+    replaced as a whole. Where the text cannot be completed to valid YAML or the kind of the file is
+    unknown, the heads of files are returned.
+    """
     marked_document = _insert_mark(path, text, position, workspace.encoding)
     if marked_document is None:
         return _root_items()

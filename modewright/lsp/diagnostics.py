@@ -23,9 +23,9 @@ FILE_START = types.Range(types.Position(0, 0), types.Position(0, 0))
 
 
 def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
-    """Return the problems of a file without slow checks.
+    """Return the problems of a file as by `check_without_proofs`, with the open texts.
 
-    Problems in other files are shown at the start of this one. An internal error becomes a
+    Problems in other files are shown at the start of this one. An exception becomes a single
     diagnostic, so that other files are still checked.
     """
     try:
@@ -38,7 +38,11 @@ def check_quickly(workspace: Workspace, path: Path) -> list[types.Diagnostic]:
 
 
 def to_diagnostics(result: CheckResult, path: Path, encoding: str) -> list[types.Diagnostic]:
-    """Return the problems of a check as diagnostics of a file."""
+    """Return the problems of a check as diagnostics of the file `path`, in their order.
+
+    The message contains the help in a line `help: ...`. A problem in another file is at the start
+    of `path`, with a related location. `encoding` is that of columns.
+    """
     return [_to_diagnostic(problem, path.resolve(), encoding) for problem in result.problems]
 
 

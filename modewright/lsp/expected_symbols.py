@@ -23,9 +23,11 @@ NamedSymbol = tuple[str, Symbol]
 
 
 def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[NamedSymbol] | None:
-    """Return the symbols that fit at a place; None if any name is possible.
+    """Return the names that fit at a place with their symbols; None if any name is possible.
 
-    `before` is the text of the line before the word.
+    `before` is the text of the line before the word. Restricted are: arguments of `in(` and
+    `fault(`, the other side of `==` and `!=` with a mode or an enumeration, expected modes of
+    tests, events of `raise` and `event`, times of `wait`, and values of enumerations.
     """
     query = re.search(r"\b(in|fault)\(\s*$", before)
     if query:
@@ -50,7 +52,10 @@ def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[Na
 
 
 def all_modes(symbols: SymbolTable) -> Iterator[NamedSymbol]:
-    """Yield the modes by path, including those of instances and of the model with prefixes."""
+    """Yield the modes by path: own ones, those of instances, those of the model.
+
+    The names of the last two have the name of the instance or model and a dot as prefix.
+    """
     yield from _qualified_symbols(symbols, ("mode",))
     if symbols.model:
         for each in symbols.model.in_groups("mode"):

@@ -26,7 +26,10 @@ MAX_READERS = 12
 
 
 def reference_at(workspace: Workspace, path: Path, position: types.Position) -> Reference | None:
-    """Return the reference at a position; the last one if parts of a name meet there."""
+    """Return the reference that contains a position or ends at it; None if there is none.
+
+    If two parts of a name meet at the position, it is the last one.
+    """
     found = [
         each
         for each in find_references(workspace, path)
@@ -36,7 +39,12 @@ def reference_at(workspace: Workspace, path: Path, position: types.Position) -> 
 
 
 def hover(workspace: Workspace, path: Path, position: types.Position) -> types.Hover | None:
-    """Return the description of the name or key at a position; None if there is none."""
+    """Return a description in Markdown of the name or key at a position; None if there is none.
+
+    A name has kind, place, `about`, the keys of SHOWN_KEYS, the value in SI of a derived parameter,
+    and up to MAX_READERS places that refer to it; a known key has its description. Names take
+    precedence.
+    """
     reference = reference_at(workspace, path, position)
     if reference:
         return _make_hover(workspace, _describe_symbol(workspace, reference.symbol), reference.span)

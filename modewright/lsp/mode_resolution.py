@@ -19,7 +19,7 @@ KeyPath = tuple[str, ...]
 
 
 def split_name(text: str) -> list[NamePart]:
-    """Return the parts of a dotted name with their offsets."""
+    """Return the parts of a name between dots, each with its offset in the name."""
     parts, offset = [], 0
     for part in text.split("."):
         parts.append((offset, part))
@@ -30,9 +30,12 @@ def split_name(text: str) -> list[NamePart]:
 def resolve_mode_parts(
     symbols: SymbolTable, parts: Sequence[NamePart], path: KeyPath = ()
 ) -> Resolution:
-    """Yield the parts of the name of a mode with the modes and regions that they denote.
+    """Yield each part of the name of a mode with the mode or region that it denotes.
 
-    `path` are the keys that lead to the name. Yields nothing if no part is known.
+    `path` are the keys that lead to the name; they determine where it is searched. A scope in which
+    the whole name is known takes precedence over one in which only the first part is; unknown parts
+    have None. Yields nothing if no scope has the first part. A leading `chart` is the main region,
+    whose rest is searched from the root.
     """
     if len(parts) > 1 and parts[0][1] == CHART:
         yield parts[0], symbols.names.get(("region", CHART))

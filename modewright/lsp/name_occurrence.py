@@ -39,7 +39,11 @@ class NameOccurrence:
 
 
 def find_names(document: Document) -> tuple[NameOccurrence, ...]:
-    """Return the names in a document in its order."""
+    """Return the names in a document in the order of its nodes, the name of the document first.
+
+    This includes names in keys, in expressions and in references. Nodes of unknown kind and invalid
+    expressions give none.
+    """
     return tuple(_iter_names(document))
 
 

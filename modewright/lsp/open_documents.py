@@ -32,7 +32,7 @@ class ProofResult:
     diagnostics: tuple[types.Diagnostic, ...]
 
     def unchanged_diagnostics(self, lines: tuple[str, ...]) -> list[types.Diagnostic]:
-        """Return the diagnostics on lines that did not change."""
+        """Return the diagnostics whose first line has the same text and number in `lines`."""
         places = [(each, each.range.start.line) for each in self.diagnostics]
         return [each for each, k in places if lines[k : k + 1] == self.lines[k : k + 1]]
 
@@ -52,7 +52,10 @@ class OpenDocuments:
     proof_task: asyncio.Task[None] | None = None
 
     def workspace_of(self, uri: str) -> tuple[Workspace, Path]:
-        """Return the workspace of a file and its path."""
+        """Return the workspace of the project of a file, and the path of the file.
+
+        The workspace is created at the first call for a project.
+        """
         path = path_of(uri)
         root = project_root_of(path)
         if root not in self.workspaces:
@@ -60,10 +63,11 @@ class OpenDocuments:
         return self.workspaces[root], path
 
     def update(self, uri: str, version: int | None, text: str | None) -> None:
-        """Store the new text of a file and schedule checks.
+        """Store the new text of a file, restart pending slow checks and schedule quick checks.
 
         The file is checked first, then the other open files of its project. None as text closes the
-        file.
+        file: its diagnostics are cleared. `version` is published with the diagnostics. Must be
+        called in an event loop.
         """
         workspace, path = self.workspace_of(uri)
         workspace.set_text(path, None if text is None else _replace_surrogates(text))

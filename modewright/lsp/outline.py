@@ -42,7 +42,11 @@ KeyPath = tuple[str, ...]
 
 
 def outline(workspace: Workspace, path: Path) -> list[types.DocumentSymbol]:
-    """Return the symbol of the document with sections and declarations as children."""
+    """Return the symbol of the document with sections and declarations as children.
+
+    Only keys in sections of SECTION_KINDS are listed; a declaration is a child of the nearest
+    listed one that encloses it. Empty if the file was never valid YAML.
+    """
     document = workspace.document(path)
     if document is None:
         return []

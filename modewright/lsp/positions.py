@@ -17,7 +17,7 @@ CODECS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-
 
 
 def range_of(span: Span, encoding: str) -> types.Range:
-    """Return the range of a span, clipped to its line."""
+    """Return the range of a span, on its first line only, with columns clipped to that line."""
     line = max(0, span.line - 1)
     lines = span.source.lines
     text = lines[line] if line < len(lines) else ""
@@ -27,7 +27,7 @@ def range_of(span: Span, encoding: str) -> types.Range:
 
 
 def contains_position(span: Span, position: types.Position, encoding: str) -> bool:
-    """Return whether a span contains a position or ends at it."""
+    """Return whether a span contains a position, its start and its end included."""
     found = range_of(span, encoding)
     return found.start.line == position.line and (
         found.start.character <= position.character <= found.end.character
@@ -35,30 +35,30 @@ def contains_position(span: Span, position: types.Position, encoding: str) -> bo
 
 
 def column_of(text: str, position: types.Position, encoding: str) -> int:
-    """Return the number of characters before a position in its line."""
+    """Return the number of characters before a position in its line `text`; clipped to the line."""
     codec, width = CODECS[encoding]
     encoded = text.encode(codec, errors="replace")
     return len(encoded[: width * position.character].decode(codec, errors="replace"))
 
 
 def source_text(span: Span) -> str:
-    """Return the text of a span; empty if its line does not exist."""
+    """Return the text of a span in its source; empty if its line does not exist."""
     lines = span.source.lines
     text = lines[span.line - 1] if 0 < span.line <= len(lines) else ""
     return text[span.column - 1 : span.column - 1 + span.width]
 
 
 def path_of(uri: str) -> Path:
-    """Return the resolved path of a URI."""
+    """Return the resolved path of a file URI with percent escapes decoded; the scheme is ignored."""
     return Path(unquote(urlparse(uri).path)).resolve()
 
 
 def uri_of(path: Path) -> str:
-    """Return the URI of a path."""
+    """Return the `file:` URI of the resolved path."""
     return path.resolve().as_uri()
 
 
 def encoded_column(text: str, count: int, encoding: str) -> int:
-    """Return the number of code units of the first `count` characters of a line."""
+    """Return the number of code units of the first `count` characters of a line; clipped to it."""
     codec, width = CODECS[encoding]
     return len(text[: max(0, count)].encode(codec, errors="replace")) // width

@@ -17,7 +17,11 @@ REPLACEMENT_PATTERNS = (
 
 
 def quick_fixes(uri: str, diagnostics: Sequence[types.Diagnostic]) -> Iterator[types.CodeAction]:
-    """Yield an edit for each problem of this server whose help contains a replacement."""
+    """Yield an edit for each problem of this server whose help contains a replacement.
+
+    The forms of such a help are REPLACEMENT_PATTERNS, of which the first match counts. The edit
+    replaces the range of the problem in the file `uri`. Problems of other files are skipped.
+    """
     for problem in diagnostics:
         found = [match for each in REPLACEMENT_PATTERNS if (match := each.search(problem.message))]
         if not found or problem.source != SOURCE or problem.related_information:

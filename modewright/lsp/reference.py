@@ -42,7 +42,8 @@ class Reference:
     def is_declaration(self) -> bool:
         """Whether this declares the symbol.
 
-        An equation is declared in each mode that defines it.
+        Besides the place of the symbol these are, for an equation, its keys in all modes of the
+        declaring file.
         """
         is_equation = self.is_key and self.path[-2:-1] == ("equations",)
         return self.span == self.symbol.span or (is_equation and self.is_in_declaring_file)
@@ -54,7 +55,11 @@ class Reference:
 
 
 def find_references(workspace: Workspace, path: Path) -> list[Reference]:
-    """Return the references in a spec in the order of the file; empty if it cannot be read."""
+    """Return the references to known symbols in a spec, in the order of the file.
+
+    Each part of a dotted name is a reference of its own; unknown parts are left out. Empty if the
+    spec was never valid.
+    """
     symbols = load_symbol_table(workspace, path)
     result = []
     for name in workspace.names(path) if symbols else ():
@@ -67,7 +72,10 @@ def find_references(workspace: Workspace, path: Path) -> list[Reference]:
 
 
 def references_to(workspace: Workspace, symbol: Symbol) -> list[Reference]:
-    """Return all references to a symbol in the project and in the file that declares it."""
+    """Return all references to a symbol, declarations included, in the project and its own file.
+
+    Those of the file that declares it come first, then those of other files sorted by path.
+    """
     files = dict.fromkeys((symbol.file, *(path for path, _ in workspace.documents())))
     return [
         reference
@@ -78,7 +86,12 @@ def references_to(workspace: Workspace, symbol: Symbol) -> list[Reference]:
 
 
 def resolve_name(workspace: Workspace, symbols: SymbolTable, name: NameOccurrence) -> Resolution:
-    """Yield the parts of a dotted name with the symbols that they denote."""
+    """Yield the parts of a name with the symbols that they denote, None for an unknown part.
+
+    The kind of the name decides where it is searched: the files of the project, modes, columns,
+    templates, faults and events, else values, instances and modes. A name that is not dotted or
+    denotes a file is one part. May yield nothing for unknown names.
+    """
     whole = (0, name.text)
     if name.kind in SPEC_TARGETS:
         yield whole, _resolve_spec(workspace, symbols, name)
@@ -163,7 +176,8 @@ def _resolve_value(
 def region_of(symbols: SymbolTable, path: str) -> tuple[SymbolTable, str] | None:
     """Return the symbol table and the region whose mode a name denotes; None for other names.
 
-    Such names are `mode`, `est.mode`, `est.gap` or `gap`.
+    Such names are `mode` (the region is empty), `gap` for a region of that name, both with an
+    instance as prefix, and each of them with `.mode`: `est.mode`, `est.gap`, `est.gap.mode`.
     """
     inner, region = _split_instance(symbols, path)
     if region.rpartition(".")[2] == "mode":

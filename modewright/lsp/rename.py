@@ -19,7 +19,10 @@ from modewright.lsp.workspace import Workspace
 
 
 def definition(workspace: Workspace, path: Path, position: types.Position) -> list[types.Location]:
-    """Return the declarations of the symbol at a position; an equation may have several."""
+    """Return the declarations of the symbol at a position, all in the file of the symbol.
+
+    An equation may have several; empty if there is no symbol.
+    """
     reference = reference_at(workspace, path, position)
     found = find_references(workspace, reference.symbol.file) if reference else []
     return [
@@ -32,7 +35,10 @@ def definition(workspace: Workspace, path: Path, position: types.Position) -> li
 def references(
     workspace: Workspace, path: Path, position: types.Position, with_declaration: bool
 ) -> list[types.Location]:
-    """Return the references to the symbol at a position in the whole project."""
+    """Return the places in the project that refer to the symbol at a position.
+
+    Declarations are left out unless `with_declaration`; empty if there is no symbol.
+    """
     reference = reference_at(workspace, path, position)
     found = references_to(workspace, reference.symbol) if reference else []
     return [
@@ -43,7 +49,12 @@ def references(
 def rename(
     workspace: Workspace, path: Path, position: types.Position, name: str
 ) -> types.WorkspaceEdit:
-    """Return the edits that rename the symbol at a position everywhere. Raises RenameRefused."""
+    """Return the edits that give the symbol at a position the new last part `name` everywhere.
+
+    Raises RenameRefused if there is no symbol, the name is invalid or used, the symbol is outside
+    the project, in a template or the main region, its name is broken over lines, or the new name
+    would mean something else or cause errors.
+    """
     reference = reference_at(workspace, path, position)
     if reference is None:
         raise RenameRefused("there is nothing here that has a name")

@@ -20,7 +20,7 @@ class RenameRefused(Exception):
 
 
 def replace_last_part(path: str, name: str) -> str:
-    """Return a dotted path with another last part."""
+    """Return a dotted path with `name` as its last part; `name` itself if there is no dot."""
     outer, dot, _ = path.rpartition(".")
     return f"{outer}{dot}{name}"
 
@@ -28,7 +28,12 @@ def replace_last_part(path: str, name: str) -> str:
 def require_same_meaning(
     workspace: Workspace, symbol: Symbol, spans: Sequence[Span], name: str
 ) -> None:
-    """Raise RenameRefused if the new name denotes something else or causes errors."""
+    """Raise RenameRefused if the new name denotes something else or causes errors.
+
+    `spans` are the places to edit. They are edited in a copy of the workspace, where the renamed
+    symbol must have as many references on each line as before. An edited file, or one that contains
+    the old name, must not have more errors than before; slow checks are not run.
+    """
     after = Workspace(
         workspace.root, workspace.encoding, workspace.texts | _edited_texts(spans, name)
     )

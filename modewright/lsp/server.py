@@ -25,7 +25,11 @@ TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
 
 
 def create_server() -> LanguageServer:
-    """Return a language server without open documents."""
+    """Return a language server, not yet started and without open documents.
+
+    Its features are diagnostics, hover, completion, quick fixes, formatting, definition,
+    references, outline and rename. Refused requests are no longer logged as errors.
+    """
     logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_unexpected)
     server = LanguageServer("modewright", version("modewright"))
 

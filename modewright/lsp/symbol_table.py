@@ -56,7 +56,7 @@ class Symbol:
 
     @property
     def identity(self) -> tuple[Path, str, str]:
-        """The file, group and name, which are equal for all references."""
+        """The file, group and name; two symbols are the same if these are equal."""
         return self.file, self.group, self.name
 
 
@@ -73,16 +73,26 @@ class SymbolTable:
 
     @property
     def is_automaton(self) -> bool:
-        """Whether the spec is an automaton or a variant of one."""
+        """Whether the names contain an automaton: the spec itself, or one to which it refers.
+
+        References are the base, or the spec `of` a scenario, study or calibration and of a test's
+        scenario.
+        """
         return ("spec", "automaton") in {(each.group, each.kind) for each in self.names.values()}
 
     def in_groups(self, *groups: str) -> list[Symbol]:
-        """Return the symbols of some groups."""
+        """Return the symbols of the named groups in the order in which they were added.
+
+        Symbols of instances and of the model are in their own tables.
+        """
         return [each for (group, _), each in self.names.items() if group in groups]
 
 
 def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> SymbolTable | None:
-    """Return the symbol table of a file; None if it cannot be read or the depth is too large."""
+    """Return the symbol table of a file; None if it was never valid or `depth` is over MAX_DEPTH.
+
+    `depth` counts the references (bases, models, instances) that led to the file.
+    """
     document = workspace.document(path)
     if document is None or depth > MAX_DEPTH:
         return None
@@ -92,7 +102,13 @@ def load_symbol_table(workspace: Workspace, path: Path, depth: int = 0) -> Symbo
 def build_symbol_table(
     workspace: Workspace, path: Path, document: Document, depth: int = 0
 ) -> SymbolTable:
-    """Return the symbol table of a document; `depth` counts the references to it."""
+    """Return the symbol table of a document, with the names of the specs to which it refers.
+
+    These are its base (`extends`), parameters, states and inputs of its model, and all names of the
+    system `of` or of a test's scenario; they take precedence over its own. A study also has the
+    parameters of its instances without prefix. Specs that cannot be read are left out. `depth`
+    counts the references that led to it.
+    """
     symbols = SymbolTable(path.resolve(), document)
     base = _referenced_symbols(workspace, symbols, "extends", depth)
     if base:
@@ -199,9 +215,10 @@ def _symbol_name(word: str, path: tuple[str, ...], key: str) -> str:
 
 
 def mode_path(path: tuple[str, ...]) -> str:
-    """Return the path of a mode: `gap`, in a region `tyre.upper`, nested `drive.creep`.
+    """Return the path of the mode to which keys lead, joined with dots; empty for no mode.
 
-    `path` are the keys that lead to it; keys below the mode are ignored.
+    Examples are `gap`, `tyre.upper` in a region and `drive.creep` nested. The region `chart` does
+    not appear; keys below the mode are ignored.
     """
     found: list[str] = []
     k = 0
@@ -213,5 +230,8 @@ def mode_path(path: tuple[str, ...]) -> str:
 
 
 def column_name(path: tuple[str, ...], key: str) -> str:
-    """Return the name of a column with the mode of its table, which makes it unique."""
+    """Return `mode.key` for a column of the transition table at a path, which makes it unique.
+
+    The mode is empty for a table at the root.
+    """
     return f"{mode_path(path)}.{key}"

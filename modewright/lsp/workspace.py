@@ -30,17 +30,17 @@ class Workspace:
     )
 
     def project(self) -> Project:
-        """Return the project; it is cached until `refresh`, because its index is slow."""
+        """Return the project with the open texts; it is cached until `refresh`."""
         if self._project is None:
             self._project = Project(self.root, dict(self.texts))
         return self._project
 
     def refresh(self) -> None:
-        """Discard the cached project."""
+        """Discard the cached project; documents are read again only if they changed."""
         self._project = None
 
     def set_text(self, path: Path, text: str | None) -> None:
-        """Store the text of an open file; None removes it."""
+        """Store the text of an open file; None removes it. The cached project is discarded."""
         path = path.resolve()
         if text is None:
             self.texts.pop(path, None)
@@ -49,7 +49,11 @@ class Workspace:
         self.refresh()
 
     def document(self, path: Path) -> Document | None:
-        """Return the document of a file; None if it was never valid."""
+        """Return the document of a file from its open text, else from the disk.
+
+        While it is not valid, the last valid document is returned; None if there is none or the
+        file does not exist. The document is cached by text or modification time.
+        """
         path = path.resolve()
         stamp: object = self.texts.get(path)
         if stamp is None:
@@ -67,7 +71,7 @@ class Workspace:
         return cached[1]
 
     def names(self, path: Path) -> tuple[NameOccurrence, ...]:
-        """Return the names in a file, cached with its document."""
+        """Return the names in a file, cached with its document; empty if it was never valid."""
         document = self.document(path)
         if document is None:
             return ()
@@ -77,7 +81,11 @@ class Workspace:
         return known[1]
 
     def documents(self) -> Iterator[tuple[Path, Document]]:
-        """Yield path and document of each spec of the project, without the library."""
+        """Yield path and document of each valid spec of the project, sorted by path.
+
+        These are the YAML files below `spec/` and the open texts, not the specs of the
+        distribution.
+        """
         found = {path.resolve() for path in (self.root / "spec").rglob("*.yaml")}
         for path in sorted(found | set(self.texts)):
             document = self.document(path)
@@ -85,7 +93,12 @@ class Workspace:
                 yield path, document
 
     def find_file(self, name: str, referring_file: Path, is_effect: bool = False) -> Path | None:
-        """Return the file of a name or a path that a spec refers to; None if there is none."""
+        """Return the resolved file of a name or path to which a spec refers; None if there is none.
+
+        A name that ends in .yaml or .yml is a path relative to the folder of `referring_file`. Else
+        open files are searched before the index of the project; a name that several files have
+        gives None. Only effects are searched with `is_effect`, and none without.
+        """
         if name.endswith((".yaml", ".yml")):
             beside = referring_file.parent / name
             return beside.resolve() if beside.is_file() else None
@@ -98,20 +111,20 @@ class Workspace:
         return found[0].resolve() if len(found) == 1 else None
 
     def is_in_project(self, path: Path) -> bool:
-        """Return whether a file belongs to the project and may be edited."""
+        """Return whether a file is below the folder of the project, so that it may be edited."""
         return path.resolve().is_relative_to(self.root.resolve())
 
 
 def project_root_of(path: Path) -> Path:
     """Return the folder of the project of a file.
 
-    It is the outermost folder that contains the file below `spec/`, else the folder of the file.
+    It is the parent of the outermost folder `spec` above the file, else the folder of the file.
     """
     above = [folder.parent for folder in path.resolve().parents if folder.name == "spec"]
     return above[-1] if above else path.resolve().parent
 
 
 def root_text(document: Document, key: str) -> str:
-    """Return the text of a key at the root of a document; empty if it is absent."""
+    """Return the text of a key at the root of a document; empty if it is absent or no scalar."""
     node = document.root.get(key)
     return node.text if isinstance(node, ScalarNode) else ""
