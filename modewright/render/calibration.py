@@ -24,7 +24,10 @@ MAX_SHOWN = 12
 
 
 def print_page(screen: Console, page: CalibrationPage) -> None:
-    """Print the tunable parameters of a page and the number of solved numbers."""
+    """Print each tunable parameter with value and unit, and the numbers of both kinds.
+
+    A table is printed with the number of its values only; solved numbers are counted only.
+    """
     for constant in page.tunable:
         screen.print(_constant_line(page, constant), highlight=False, markup=False, soft_wrap=True)
     solved = pluralise(len(page.solved), "solved number")
@@ -36,7 +39,11 @@ def print_page(screen: Console, page: CalibrationPage) -> None:
 
 
 def print_import(screen: Console, imported: ImportedPage) -> None:
-    """Print the imported values with warnings and remarks."""
+    """Print warnings, the imported values, remarks, stale solved numbers and the number of values.
+
+    At most MAX_SHOWN warnings and remarks of each kind are printed; of the stale numbers the count
+    and the largest change.
+    """
     _print_warnings(screen, imported.warnings)
     for name, text in imported.values.items():
         screen.print(f"{name} = {text}", highlight=False, markup=False, soft_wrap=True)
@@ -56,7 +63,10 @@ def print_import(screen: Console, imported: ImportedPage) -> None:
 
 
 def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
-    """Print the changed solved numbers, the largest change first."""
+    """Print warnings, the page, remarks and the changed solved numbers, the largest change first.
+
+    At most MAX_SHOWN of each are printed. Added solved numbers are counted only.
+    """
     _print_warnings(screen, resolved.warnings)
     print_page(screen, resolved.page)
     _print_remarks(screen, resolved.remarks)
@@ -85,7 +95,11 @@ def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
 
 
 def page_json(page: CalibrationPage) -> dict[str, Any]:
-    """Return a page as a dict for JSON; values in SI."""
+    """Return a page as a dict for JSON, with values in SI.
+
+    The keys are automaton, numbers (the number type), tunable (value and unit) and solved (value).
+    A value is a number, the word of an enumeration, or the list of a table.
+    """
     return {
         **format_entry("calibration"),
         "automaton": page.program.name,
@@ -102,7 +116,11 @@ def page_json(page: CalibrationPage) -> dict[str, Any]:
 
 
 def import_json(imported: ImportedPage) -> dict[str, Any]:
-    """Return an import as a dict for JSON."""
+    """Return an import as a dict for JSON.
+
+    The keys are automaton, values (literals with unit), remarks, stale (changes of solved numbers)
+    and problems (warnings).
+    """
     return {
         **format_entry("calibration-import"),
         "automaton": imported.page.program.name,
@@ -114,7 +132,10 @@ def import_json(imported: ImportedPage) -> dict[str, Any]:
 
 
 def resolved_json(resolved: ResolvedPage) -> dict[str, Any]:
-    """Return a recomputed page with its changes as a dict for JSON."""
+    """Return a recomputed page as a dict for JSON.
+
+    It has the keys of `page_json`, and changed, added, remarks and problems.
+    """
     return {
         **page_json(resolved.page),
         **format_entry("calibration-resolution"),

@@ -15,7 +15,10 @@ from modewright.runtime.json_format import format_entry
 
 
 def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
-    """Print a table of the checks and all findings."""
+    """Print a table with a row for each check, then each finding in a line `check: finding`.
+
+    A check that was not run is `not asked`, one without findings has `nothing`.
+    """
     table = Table(box=None, pad_edge=False)
     for title in ("check", "tool", "of", "found"):
         table.add_column(title, overflow="fold")
@@ -30,12 +33,12 @@ def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
 
 
 def proof_json(proof: ToolVerdict) -> dict[str, Any]:
-    """Return a check of generated C as a dict for JSON."""
+    """Return the fields of a verdict, with `holds`, as a dict for JSON."""
     return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
 
 
 def print_fuzzing(console: Console, result: FuzzReport) -> None:
-    """Print the counts of a fuzzing run, the findings and the first difference."""
+    """Print the counts of a fuzzing run, the modes, the findings and the first difference."""
     console.print(
         f"{result.program}: {result.distinct} different sequences of {result.runs}, "
         f"{result.ticks} ticks, {result.transitions} transitions, {result.edges} edges of the C",
@@ -51,7 +54,10 @@ def print_fuzzing(console: Console, result: FuzzReport) -> None:
 
 
 def fuzzing_json(result: FuzzReport) -> dict[str, Any]:
-    """Return the result of a fuzzing run as a dict for JSON."""
+    """Return the fields of a fuzzing report, with `clean`, as a dict for JSON.
+
+    `first` is the first difference, or None.
+    """
     first = vars(result.first) if result.first else None
     lists = {"modes": list(result.modes), "findings": list(result.findings)}
     values = {**vars(result), **lists, "first": first, "clean": result.is_clean}
@@ -59,7 +65,11 @@ def fuzzing_json(result: FuzzReport) -> dict[str, Any]:
 
 
 def print_mcdc(console: Console, coverage: McdcCoverage) -> None:
-    """Print the decisions that are not covered, and the counts."""
+    """Print a line for each decision that is not fully covered, and a line with the counts.
+
+    A decision has a mark for each condition: `+` shown to matter, `T` or `F` proven to be always
+    true or false, `-` open.
+    """
     for decision in coverage.uncovered:
         text = f"{coverage.file}:{decision.line}: {_marks(decision)} {decision.text}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
@@ -80,7 +90,10 @@ def _marks(decision: Decision) -> str:
 
 
 def mcdc_json(coverage: McdcCoverage) -> dict[str, Any]:
-    """Return an MC/DC coverage as a dict for JSON."""
+    """Return the fields of an MC/DC coverage as a dict for JSON, with all decisions.
+
+    It also has the counts `conditions`, `shown` and `open`.
+    """
     decisions = [
         {**vars(each), "shown": list(each.shown), "never": list(each.never)}
         for each in coverage.decisions

@@ -20,9 +20,9 @@ WINDOW = (0.45, 1.15)
 
 
 def run_demo(folder: Path, console: Console) -> bool:
-    """Run the demo, print its tables and write `tip_out.png`.
+    """Simulate SCENARIO of SYSTEM in lock-step, print tables and write `tip_out.png` to a folder.
 
-    Return whether the run completed and no bit differs between engine and C.
+    Returns whether the run did not stop early and no bit differs between engine and C.
     """
     console.print("Tip-out of an EV driveline with backlash, 30 -> -20 N*m at 0.4785 s")
     trajectory, verdicts = api.lockstep(SYSTEM, SCENARIO)

@@ -14,14 +14,16 @@ from modewright.runtime.json_format import format_entry
 
 
 def print_diagnosis(screen: Console, report: DiagnosisReport) -> None:
-    """Print the summary of a diagnosis in at most four lines."""
+    """Print the lines of `summary_lines` for a diagnosis, without backticks."""
     for line in summary_lines(report):
         screen.print(line.replace("`", ""), highlight=False, markup=False, soft_wrap=True)
 
 
 def print_fit(screen: Console, fit: Fit) -> None:
-    """Print the fitted parameters, misfits, strong correlations and parameters that are not
-    identifiable.
+    """Print a table of the fitted parameters, then misfits, strong correlations and other notes.
+
+    Misfits are those of free simulation before and after the fit. Correlations are printed from
+    STRONG_CORRELATION on. Parameters that the data do not determine are named last.
     """
     table = Table(
         "parameter", "declared", "fitted", "std", "unit", "of prior", "goes with", "",
@@ -52,7 +54,10 @@ def print_fit(screen: Console, fit: Fit) -> None:
 
 
 def fit_json(fit: Fit) -> dict[str, Any]:
-    """Return a fit as a dict for JSON; values in SI, values that are not finite are null."""
+    """Return a fit as a dict for JSON; values in SI, numbers that are not finite are null.
+
+    The keys are of, parameters, correlations, undetermined, misfits and inputs.
+    """
     found = {
         **format_entry("fit"),
         "of": fit.automaton.name,

@@ -16,7 +16,11 @@ from diagnosis.result.effect_naming import VERDICT_ALIASES
 
 
 def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str | None) -> None:
-    """Print one line for each effect; with a spec those that fit it, with places."""
+    """Print a table with a line for each effect.
+
+    With the name `at` of a spec the line has the places of the effect in it, and effects without a
+    place are left out; else it has the kinds of places.
+    """
     table = Table(
         "effect", f"places of {at}" if at else "fits", "what it is",
         box=None, pad_edge=False, header_style="bold",
@@ -29,7 +33,11 @@ def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str
 
 
 def print_effect(screen: Console, entry: EffectDescription, at: str | None) -> None:
-    """Print all information about an effect, with a spec also the changes of its equations."""
+    """Print all information about an effect: definition, signature, confusions and references.
+
+    With the name `at` of a spec also its places there and the changed equations of each place.
+    Empty parts are left out.
+    """
     effect = entry.effect
     lines = [f"{effect.name}: {effect.about}", f"fits {format_place_kinds(effect)}"]
     for name, (other, where) in VERDICT_ALIASES.items():
@@ -62,7 +70,11 @@ def _change_lines(changes: Sequence[EquationChange]) -> list[str]:
 
 
 def effect_json(entry: EffectDescription) -> dict[str, Any]:
-    """Return an effect as a dict for JSON."""
+    """Return an effect as a dict for JSON.
+
+    `places` and `changes` (changed equations by place) are empty if it was described without a
+    spec.
+    """
     effect = entry.effect
     return {
         "id": effect.name,

@@ -8,7 +8,11 @@ from language.text.diagnostic import Problem
 
 
 def annotation_lines(problems: Iterable[Problem]) -> str:
-    """Return one line `::error file=...::message` for each problem."""
+    """Return one line `::severity file=...,line=...::message` for each problem, in its order.
+
+    The message includes the help; reserved characters are escaped as GitHub Actions requires. Empty
+    without problems.
+    """
     return "".join(f"{_format_annotation(problem)}\n" for problem in problems)
 
 

@@ -30,7 +30,11 @@ const f=s.querySelector(".on");if(f)s.scrollTo({top:f.offsetTop-s.clientHeight/3
 
 
 def key_traces_json(traces: KeyTraces) -> dict[str, Any]:
-    """Return a key trace as a dict for JSON."""
+    """Return a key trace as a dict for JSON.
+
+    `keys` has the lines of C of each key, `silent` the keys that no line cites, `strays` the
+    citations of unknown keys.
+    """
     return {
         **format_entry("key-trace"),
         "keys": [
@@ -49,7 +53,10 @@ def key_traces_json(traces: KeyTraces) -> dict[str, Any]:
 
 
 def key_traces_lines(traces: KeyTraces) -> list[str]:
-    """Return the lines of a key trace: one for each key, and a summary."""
+    """Return one line `spec path: file 12, 15` for each key, and the summary as the last line.
+
+    A key that the C does not cite has `no line of C`.
+    """
     return [
         *(f"{key.spec} {key.path}: {_code_places(key)}" for key in traces.keys),
         key_traces_summary(traces),
@@ -57,7 +64,10 @@ def key_traces_lines(traces: KeyTraces) -> list[str]:
 
 
 def key_traces_summary(traces: KeyTraces) -> str:
-    """Return the number of keys and of those that C cites."""
+    """Return the number of keys and of those that C cites, in one line.
+
+    Citations of keys that no spec has are listed, if there are any.
+    """
     shown = len(traces.keys) - len(traces.uncited)
     text = f"{pluralise(len(traces.keys), 'key')}, {shown} of them in lines of C"
     return text + (
@@ -70,9 +80,10 @@ def key_traces_summary(traces: KeyTraces) -> str:
 def key_traces_html(
     traces: KeyTraces, specs: Mapping[str, str], code: Mapping[str, str], title: str
 ) -> str:
-    """Return a page with specs and C side by side; a click on a line highlights related lines.
+    """Return a self-contained page with specs and C side by side.
 
-    `specs` and `code` are texts by file.
+    A click on a line highlights the related lines. `specs` and `code` are texts by file. Keys that
+    no line of C cites are brown.
     """
     numbers = {(key.spec, key.path): f"k{n}" for n, key in enumerate(traces.keys)}
     marks: dict[CodeLine, list[str]] = {}

@@ -35,7 +35,10 @@ WIDTH, HEIGHT = 900, 90
 
 
 def metrics_table(automata: Sequence[AutomatonMetrics]) -> Table:
-    """Return the metrics as a table."""
+    """Return the metrics as a table with a row for each automaton and the columns HEADS.
+
+    Instructions are `not counted` without counts, the bound is `no bound` if there is none.
+    """
     table = Table(*HEADS, box=None, pad_edge=False, header_style="bold")
     for measured in automata:
         table.add_row(*_row(measured))
@@ -43,7 +46,10 @@ def metrics_table(automata: Sequence[AutomatonMetrics]) -> Table:
 
 
 def metrics_json(automata: Sequence[AutomatonMetrics]) -> dict[str, Any]:
-    """Return the metrics as a dict for JSON."""
+    """Return the fields of the metrics of each automaton as a dict for JSON.
+
+    `instructions` are the counts of all steps, or None.
+    """
     return {
         **format_entry("metrics"),
         "target": "cortex-m4f",
@@ -60,7 +66,10 @@ def metrics_json(automata: Sequence[AutomatonMetrics]) -> dict[str, Any]:
 
 
 def metrics_html(automata: Sequence[AutomatonMetrics]) -> str:
-    """Return a page with the table and the instructions of each step as figures."""
+    """Return a self-contained page with the table and the reasons for missing bounds.
+
+    Automata with instruction counts have a figure of the instructions of each step.
+    """
     heads = "".join(f"<th>{escape(head)}</th>" for head in HEADS)
     rows = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(measured)) + "</tr>\n"
@@ -87,7 +96,10 @@ def _row(measured: AutomatonMetrics) -> tuple[str, ...]:
 
 
 def unbounded_lines(automata: Sequence[AutomatonMetrics]) -> list[str]:
-    """Return the reason for each automaton whose steps have no bound."""
+    """Return the reason for each automaton without a bound on the instructions of a step.
+
+    A line is `name: no bound of a step: reason`; empty if all have a bound.
+    """
     unbounded = [metrics for metrics, _ in automata if metrics.longest is None]
     return [f"{one.name}: no bound of a step: {one.unbounded}" for one in unbounded]
 

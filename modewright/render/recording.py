@@ -24,7 +24,10 @@ MAX_CHANNELS = 24
 
 
 def print_check(screen: Console, check: RecordingCheck) -> None:
-    """Print channels, excitation and findings."""
+    """Print the table of channels, the excitation, the testable effects and the findings.
+
+    Effects that cannot be tested are listed with what they need. Without findings a line says so.
+    """
     screen.print(channel_table(check.channels))
     _print_excitation(screen, check.excitation)
     if not check.findings:
@@ -36,7 +39,10 @@ def print_check(screen: Console, check: RecordingCheck) -> None:
 
 
 def channel_table(channels: Sequence[ChannelCheck]) -> Table:
-    """Return a table of channels, with values in the units of the map."""
+    """Return a table of the first MAX_CHANNELS channels, and a row with the number of the others.
+
+    Values are in the units of the map; a step (quantum) of 0 is `-`.
+    """
     heads = ("recording", "channel", "signal", "unit", "rate", "jitter", "missing", "step", "noise")
     table = Table(*heads, "from", "to", box=None, pad_edge=False, header_style="bold")
     for channel in channels[:MAX_CHANNELS]:
@@ -78,7 +84,7 @@ def _print_excitation(screen: Console, excitation: Excitation) -> None:
 
 
 def check_json(check: RecordingCheck) -> dict[str, Any]:
-    """Return a check as a dict for JSON; values in SI."""
+    """Return a check with all channels as a dict for JSON; values in SI, not finite ones null."""
     excitation = check.excitation
     return {
         **format_entry("recording-check"),

@@ -11,7 +11,11 @@ from modewright.api.simulation import Replayed
 
 
 def replay_picture(replayed: Replayed, title: str, form: str = "png") -> bytes:
-    """Return a figure with one panel for each unit of the measured signals and of the outputs."""
+    """Return a figure of a replay as bytes in the format `form` (`png`, `svg` or `pdf`).
+
+    It has a panel for each unit of the measured signals, then one for each unit of the outputs, and
+    the band of the mode. Signals that are not real are left out.
+    """
     trajectory = replayed.result.trajectory
     panels = [*_panels(trajectory, measured=True), *_panels(trajectory, measured=False)]
     return draw_picture([trajectory], panels, [ModeBand("mode", "mode")], title).data(form)

@@ -24,12 +24,19 @@ MAX_EVENTS = 40
 
 
 def print_json(value: Mapping[str, Any]) -> None:
-    """Print one JSON document."""
+    """Print one JSON document, indented by two blanks, to stdout.
+
+    Raises ValueError for infinities and NaN.
+    """
     print(json.dumps(value, indent=2, allow_nan=False))
 
 
 def events_table(events: Sequence[Event]) -> Table:
-    """Return a table of transitions; the middle of long lists is left out."""
+    """Return a table of the events of a run; others than transitions have their message as target.
+
+    Of more than MAX_EVENTS events the first and the last MAX_EVENTS / 2, and the first MAX_EVENTS
+    that are no transitions, are shown; a row `...` has the number of those left out.
+    """
     table = Table(
         escape("time [s]"), "automaton", "transition", "from", "to",
         box=None, pad_edge=False, header_style="bold",
@@ -60,7 +67,10 @@ def _select_events(events: Sequence[Event]) -> set[int]:
 
 
 def verdict_table(verdicts: Iterable[Verdict]) -> Table:
-    """Return a table of lock-step verdicts."""
+    """Return a table of lock-step verdicts: `equal, bit for bit`, `DIFFERENT` or `not compared`.
+
+    An instance without ticks was not compared.
+    """
     table = Table(
         "lock-step", "ticks", "transitions", "values", "differing", "verdict",
         box=None, pad_edge=False, header_style="bold",
@@ -80,7 +90,10 @@ def verdict_table(verdicts: Iterable[Verdict]) -> Table:
 
 
 def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
-    """Print the verdicts with notes, instruction counts and the first difference of each."""
+    """Print the table of lock-step verdicts, then the details of each verdict.
+
+    These are its note, instruction counts and first difference; absent ones are left out.
+    """
     console.print(verdict_table(verdicts))
     for verdict in verdicts:
         if verdict.note:
@@ -94,7 +107,10 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
 
 
 def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
-    """Return events, last values and end of a run as a dict for JSON."""
+    """Return name, number of samples, events, units, stop and faults of a run as a dict for JSON.
+
+    `last` has the last value of each signal, None without samples; the samples are not contained.
+    """
     last = {
         name: (values[-1].item() if len(values) else None)
         for name, values in trajectory.signals.items()
@@ -112,7 +128,11 @@ def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """Return a lock-step verdict as a dict for JSON."""
+    """Return a lock-step verdict as a dict for JSON.
+
+    `first` is the first difference, `instructions` has steps, mean, min and max; both are None if
+    absent.
+    """
     return {
         "name": verdict.name,
         "program": verdict.program,
@@ -136,7 +156,11 @@ def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
 
 
 def replay_json(replayed: Replayed) -> dict[str, Any]:
-    """Return a replay as a dict for JSON."""
+    """Return a replay as a dict for JSON.
+
+    It has the keys of `trajectory_json`, innovation_rms, comparisons, columns_left_out and lockstep
+    (the verdict, None without C).
+    """
     return {
         **trajectory_json(replayed.result.trajectory),
         **format_entry("replay"),
@@ -148,7 +172,10 @@ def replay_json(replayed: Replayed) -> dict[str, Any]:
 
 
 def print_replay(console: Console, replayed: Replayed) -> None:
-    """Print transitions, innovations, comparisons and the lock-step verdict of a replay."""
+    """Print ticks, events, innovations, comparisons and the lock-step verdict of a replay.
+
+    Columns of the map that were left out are named; without a verdict that part is missing.
+    """
     result = replayed.result
     times = result.trajectory.times
     console.print(f"{len(times)} ticks from {times[0]:.6g} s to {times[-1]:.6g} s", highlight=False)
@@ -171,7 +198,12 @@ def print_replay(console: Console, replayed: Replayed) -> None:
 
 
 def print_difference(console: Console, difference: RunDifference) -> None:
-    """Print the differences of two runs: signals, modes, transitions and the first difference."""
+    """Print the differences of two runs and whether they are within tolerance.
+
+    Signals are a table with RMS, largest difference and the first time beyond tolerance; then
+    follow transition sequences, windows of different modes (at most MAX_EVENTS), signals of one run
+    only, and the first difference.
+    """
     table = Table(
         "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
         box=None, pad_edge=False, header_style="bold",
@@ -203,7 +235,10 @@ def print_difference(console: Console, difference: RunDifference) -> None:
 
 
 def difference_json(difference: RunDifference) -> dict[str, Any]:
-    """Return the differences of two runs as a dict for JSON; infinite values are null."""
+    """Return the differences of two runs as a dict for JSON.
+
+    In `signals` values that are not finite are null; `first` is [time, text] or None.
+    """
     return {
         **format_entry("comparison"),
         "within": difference.is_within,
@@ -232,7 +267,10 @@ def _sequence_line(sequence: ModeSequence) -> str:
 
 
 def null_nonfinite(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values for JSON, with None in place of infinities and NaN."""
+    """Return a dict with None in place of infinities and NaN, also in lists and nested lists.
+
+    Tuples become lists; nested dicts do not change.
+    """
     return {name: _null_nonfinite_value(value) for name, value in values.items()}
 
 
@@ -244,7 +282,7 @@ def _null_nonfinite_value(value: Any) -> Any:
 
 
 def print_health_check(console: Console, check: HealthCheck) -> None:
-    """Print a result of the doctor with its remedy."""
+    """Print a result of the doctor in one line, and its remedy in a second one if there is one."""
     colour = {"ok": "green", "absent": "yellow", "fault": "red"}[check.verdict]
     text = f"[{colour}]{check.verdict:<6}[/] {check.name:<12} {escape(check.message)}"
     console.print(text, highlight=False, soft_wrap=True)

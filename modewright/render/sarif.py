@@ -15,7 +15,11 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def to_sarif(problems: Sequence[Problem]) -> dict[str, Any]:
-    """Return problems as a SARIF log with one run; it lists the violated rules only."""
+    """Return problems as a SARIF log with one run, in their order.
+
+    The rules are the kinds of these problems only, sorted by code. Columns count code points; the
+    level is the severity.
+    """
     kinds = sorted({problem.kind for problem in problems}, key=code_of)
     places = {kind: index for index, kind in enumerate(kinds)}
     driver = {

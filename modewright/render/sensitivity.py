@@ -21,7 +21,11 @@ DESIGN_UNITS = {"saltelli": "blocks", "morris": "paths"}
 
 
 def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
-    """Print the indices by group and measure, the largest first."""
+    """Print the indices in the order of `sort_indices` with their confidence intervals.
+
+    Before them are the progress and a hint if variants are missing, after them the notes about
+    missing indices. Without indices there is no table.
+    """
     progress = progress_text(sensitivity.counts, sensitivity.expected)
     text = f"{sensitivity.study}: {sensitivity.method}; {progress}"
     console.print(escape_invisible(text), highlight=False, markup=False)
@@ -47,7 +51,10 @@ def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
 
 
 def incomplete_index_notes(sensitivity: Sensitivity) -> list[str]:
-    """Return a note if indices are missing because too few blocks or paths are complete."""
+    """Return one note about missing indices, or an empty list.
+
+    An index is missing if fewer than MIN_COMPLETE blocks (saltelli) or paths (morris) are complete.
+    """
     few = sum(one.used < MIN_COMPLETE for one in sensitivity.indices)
     whole = DESIGN_UNITS[sensitivity.method]
     hint = f"fewer than {MIN_COMPLETE} {whole} are complete (every point done and with the measure)"
@@ -55,7 +62,10 @@ def incomplete_index_notes(sensitivity: Sensitivity) -> list[str]:
 
 
 def sort_indices(sensitivity: Sensitivity) -> list[Index]:
-    """Return the indices by group and measure, the largest first and NaN last."""
+    """Return the indices by group and measure, the largest first and NaN last.
+
+    Groups and measures keep their order; the key is `total` for saltelli and `mu_star` for morris.
+    """
     key = "total" if sensitivity.method == "saltelli" else "mu_star"
     places: dict[object, int] = {}
     for one in sensitivity.indices:
@@ -70,7 +80,10 @@ def sort_indices(sensitivity: Sensitivity) -> list[Index]:
 
 
 def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
-    """Return the indices as a dict for JSON; missing values are null."""
+    """Return the indices in their stored order as a dict for JSON.
+
+    Numbers that are not finite and missing intervals are null.
+    """
     return {
         **format_entry("sensitivity"),
         "study": sensitivity.study,

@@ -19,7 +19,12 @@ SECONDS_DECIMALS = 3
 
 
 def spec_test_lines(run: TestRun) -> Iterator[str]:
-    """Yield the lines of a test: one if it passed, else also all failures."""
+    """Yield the lines of a test: one if it passed, else also its failures.
+
+    A failed expectation has its place, message, and the modes and values at that time; a difference
+    to C and a stop have one line each. Latched faults are warnings and are printed for passed
+    tests, too.
+    """
     word = "passed" if run.passed else "FAILED"
     also = f" and C, {run.backend.partition(':')[0]}" if run.backend else ""
     count = pluralise(len(run.outcomes), "expectation")
@@ -36,19 +41,25 @@ def spec_test_lines(run: TestRun) -> Iterator[str]:
 
 
 def failure_text(expectation: Expectation, outcome: Outcome) -> str:
-    """Return the failure of an expectation in one line."""
+    """Return the failure of an expectation in one line: its text in backticks, then the message.
+
+    The text is left out if it is empty.
+    """
     subject = f"`{escape_invisible(expectation.text)}` " if expectation.text else ""
     return f"{subject}{outcome.message}"
 
 
 def spec_tests_summary(runs: Sequence[TestRun]) -> str:
-    """Return the number of tests and of failures."""
+    """Return `n tests, m failed`."""
     failed = sum(not run.passed for run in runs)
     return f"{pluralise(len(runs), 'test')}, {failed} failed"
 
 
 def spec_test_json(run: TestRun) -> dict[str, Any]:
-    """Return the result of a test as a dict for JSON; times in s, values in SI."""
+    """Return the result of a test with all expectations as a dict for JSON; values in SI.
+
+    Times are in s, the duration with SECONDS_DECIMALS. `beside` names what ran beside the engine.
+    """
     return {
         "name": run.test.name,
         "file": run.test.span.source.name,
@@ -67,7 +78,11 @@ def spec_test_json(run: TestRun) -> dict[str, Any]:
 
 
 def junit_xml(runs: Sequence[TestRun]) -> bytes:
-    """Return the tests as JUnit XML with a suite for each test and a case for each expectation."""
+    """Return the tests as JUnit XML with a suite for each test and a case for each expectation.
+
+    A difference to C and a stop are additional failed cases `lock_step` and `run`. The duration of
+    a test is divided equally among its expectations.
+    """
     root = ElementTree.Element("testsuites", _counts(runs))
     for run in runs:
         suite = ElementTree.SubElement(root, "testsuite", {"name": run.test.name, **_counts([run])})

@@ -22,7 +22,10 @@ MAX_FAILURES = 5
 
 
 def print_summary(console: Console, summary: Summary) -> None:
-    """Print the number of variants by status, reasons of failure, measures and rates."""
+    """Print the number of variants by status, reasons of failure, and tables of measures and rates.
+
+    Empty tables are left out.
+    """
     text = f"{summary.study}: {progress_text(summary.counts, summary.expected)}"
     console.print(escape_invisible(text), highlight=False, markup=False)
     for text in failure_texts(summary):
@@ -34,14 +37,18 @@ def print_summary(console: Console, summary: Summary) -> None:
 
 
 def progress_text(counts: Mapping[str, int], expected: int) -> str:
-    """Return the number of stored variants by status."""
+    """Return the number of stored variants: `7 of 10 variants: 6 done, 1 stopped`.
+
+    `expected` is the number of all variants; without stored ones the list is `none yet`.
+    """
     ended = ", ".join(f"{count} {name}" for name, count in counts.items())
     return f"{sum(counts.values())} of {expected} variants: {ended or 'none yet'}"
 
 
 def failure_texts(summary: Summary) -> list[str]:
-    """Return the most frequent reasons of failure with one variant each, and a count of the
-    rest.
+    """Return the MAX_FAILURES most frequent reasons of failure, and a line that counts the others.
+
+    A line is `count status: message (variant n)`, with the first variant of that reason.
     """
     texts = [
         f"{one.count} {one.status}: {one.message} (variant {one.number})"
@@ -55,7 +62,7 @@ def failure_texts(summary: Summary) -> list[str]:
 
 
 def summary_json(summary: Summary) -> dict[str, Any]:
-    """Return a summary as a dict for JSON; missing values are null."""
+    """Return a summary as a dict for JSON; it has all failures, and numbers not finite are null."""
     return {
         **format_entry("summary"),
         "study": summary.study,
@@ -121,10 +128,10 @@ def _rate_cells(rate: Rate) -> list[str]:
 
 
 def interval_text(interval: tuple[float, float] | None) -> str:
-    """Return the ends of an interval; `-` for None."""
+    """Return the ends of an interval as `low .. high` with five digits; `-` for None."""
     return f"{format_number(interval[0])} .. {format_number(interval[1])}" if interval else "-"
 
 
 def format_number(number: float) -> str:
-    """Return a number with five digits; `-` for NaN."""
+    """Return a number with five significant digits; `-` for NaN."""
     return "-" if math.isnan(number) else f"{number:.5g}"

@@ -44,7 +44,12 @@ SVG_IDENTIFIER = re.compile(r"(\bid=\"|\"#|url\(#)")
 
 
 def render_study_page(store: Store) -> bytes:
-    """Return the page of the stored results. Raises SpecError and MissingToolError."""
+    """Return the stored results of a study as a self-contained HTML page.
+
+    It has description, counts, measures, sensitivity indices, plots, the variants with extreme
+    measures and those that failed; long tables are cut at MAX_EXTREMES, MAX_FAILED and MAX_INDICES
+    rows. Raises SpecError and MissingToolError.
+    """
     table = StudyTable(store)
     summary, manifest = summary_of(store), store.manifest
     context = {
@@ -226,5 +231,9 @@ def _render_template(context: Mapping[str, Any]) -> str:
 
 
 def study_report(out: str | Path) -> bytes:
-    """Return the results in a folder as a self-contained HTML page. Raises SpecError."""
+    """Return the results in the folder of a study as a self-contained HTML page.
+
+    No file is written. Raises SpecError if the folder has no results or a damaged block, and
+    MissingToolError without pyarrow.
+    """
     return render_study_page(read_store(Path(out)))

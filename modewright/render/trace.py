@@ -34,7 +34,11 @@ code{font-size:12px}.n{color:#666}
 
 
 def trace_lines(trace: RequirementTrace) -> Iterator[str]:
-    """Yield the lines of a trace: requirements with places and tests, and a summary."""
+    """Yield a line for each requirement with its state and text, and the summary as the last line.
+
+    Below each requirement are its places, with at most MAX_LINES lines of C each, and its tests
+    with their results.
+    """
     for each in trace.requirements:
         yield f"{each.name}: {each.state}" + (f" - {each.text}" if each.text else "")
         for claim in each.implementations:
@@ -45,7 +49,10 @@ def trace_lines(trace: RequirementTrace) -> Iterator[str]:
 
 
 def trace_summary(trace: RequirementTrace) -> str:
-    """Return the number of requirements, and the names of those that are not traced."""
+    """Return the number of requirements, and of those in each state other than `traced` with names.
+
+    The line is like `3 requirements; 1 untested: R2; 0 unimplemented`.
+    """
     text = pluralise(len(trace.requirements), "requirement")
     for state in ("untested", "unimplemented"):
         names = trace.with_state(state)
@@ -54,7 +61,11 @@ def trace_summary(trace: RequirementTrace) -> str:
 
 
 def trace_json(trace: RequirementTrace) -> dict[str, Any]:
-    """Return a trace as a dict for JSON."""
+    """Return a trace as a dict for JSON.
+
+    The keys are requirements (with specs, lines of C and tests), untested and unimplemented
+    (names).
+    """
     return {
         **format_entry("trace"),
         "requirements": [_requirement_json(each) for each in trace.requirements],
@@ -64,7 +75,10 @@ def trace_json(trace: RequirementTrace) -> dict[str, Any]:
 
 
 def trace_csv(trace: RequirementTrace) -> str:
-    """Return a trace as CSV with a row for each pair of place and test."""
+    """Return a trace as CSV with the columns HEADINGS and a row for each pair of place and test.
+
+    A requirement without places or without tests has empty cells there, but at least one row.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADINGS)
@@ -84,7 +98,10 @@ def trace_csv(trace: RequirementTrace) -> str:
 
 
 def trace_html(trace: RequirementTrace, title: str) -> str:
-    """Return a trace as an HTML page."""
+    """Return a trace as a self-contained HTML page with a row for each requirement.
+
+    `title` follows `Trace of` in the heading.
+    """
     rows = "\n".join(map(_html_row, trace.requirements))
     heads = "".join(f"<th>{head}</th>" for head in ("requirement", "state", "spec and C", "tests"))
     name = escape(title)
